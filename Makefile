@@ -5,7 +5,7 @@ CARGO ?= cargo
 PROFILE := --release
 
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo web edge test test-compile test-browser walk acceptance test-v4l test-peers test-ros2 test-slurm slurm-image network-grasps placing test-wgpu test-ndarray test-torch package lint base-weights bench bench-browser bench-planning clean
+.PHONY: help setup build demo web edge test test-compile test-browser walk acceptance test-v4l test-peers test-ros2 test-slurm slurm-image network-grasps placing heights test-wgpu test-ndarray test-torch package lint base-weights bench bench-browser bench-planning clean
 
 help: ## Lists the targets
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
@@ -85,6 +85,9 @@ network-grasps: setup ## Grasps of all parts over TCP and UDP beside the same in
 
 placing: setup ## 20 parts into a tray, grasps from a table 5 mm higher than told, in one process and over TCP and UDP in lockstep
 	@scripts/placing.sh
+
+heights: setup ## Grasps with no height told, from higher tables and from blocks: how exactly heights are measured, and how many hold (HEIGHTS=2 for fewer)
+	@scripts/heights.sh
 
 test-wgpu: setup ## Tests wgpu against flex, on a graphics card or else on Mesa's software Vulkan
 	@scripts/install.sh libvulkan1 mesa-vulkan-drivers

@@ -1,8 +1,7 @@
 //! A grasp as it would go from where the arm stands: planned with the same sequence and limits; nothing moves.
 
-use nalgebra::Isometry3;
 use sdg_robot::{
-    ArmState, CameraMount, GraspConfig, GraspStep, GraspTarget, PartFinder, PlaceGoal, PlacingConfig, PlannedArm,
+    ArmState, CameraMount, GraspConfig, GraspStep, GraspTarget, KnownTarget, PlaceGoal, PlacingConfig, PlannedArm,
     Result, Robot, SafetyLimits, Watch,
 };
 
@@ -21,24 +20,6 @@ pub struct DryRun {
     pub failed: Option<(GraspStep, String)>,
 }
 
-/// Finds the same target, or none, wherever the arm is.
-struct FixedTarget(Option<GraspTarget>);
-
-impl PartFinder<PlannedArm> for FixedTarget {
-    fn find(&mut self, _arm: &mut PlannedArm) -> sdg_robot::Result<Option<GraspTarget>> {
-        Ok(self.0)
-    }
-
-    /// What was put down lies where it was to lie.
-    fn find_nearest(
-        &mut self,
-        _arm: &mut PlannedArm,
-        base_from_tcp: &Isometry3<f64>,
-    ) -> sdg_robot::Result<Option<GraspTarget>> {
-        Ok(self.0.map(|target| GraspTarget { base_from_tcp: *base_from_tcp, ..target }))
-    }
-}
-
 impl DryRun {
     /// Plans the sequence from a state of the arm, with the part where it is seen from there, if it is.
     ///
@@ -55,7 +36,8 @@ impl DryRun {
     ) -> Result<Self> {
         let mut arm = PlannedArm::new(start.q_commanded, opening_m);
         let mut robot = Robot::new(&mut arm, limits, Watch::default());
-        let Ended { failed, .. } = run_sequence(&mut robot, &mut FixedTarget(target), mount, config, place)?;
+        let mut finder = KnownTarget::new(target, mount, config);
+        let Ended { failed, .. } = run_sequence(&mut robot, &mut finder, mount, config, place)?;
         Ok(Self { start, opening_m, arm, failed })
     }
 }

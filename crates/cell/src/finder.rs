@@ -5,17 +5,21 @@
 //! Arm ─ state ─ place of a camera on the hand ──────┘
 //! ```
 
+use std::ops::RangeInclusive;
 use std::time::{Duration, Instant, SystemTime};
 
 use image::RgbImage;
-use nalgebra::{Isometry3, Point2};
+use nalgebra::{Isometry3, Point2, Point3};
 use sdg_camera::LatestFrame;
-use sdg_grasp::{CameraOverTable, GraspModel, Verification};
+use sdg_geometry::Polygon;
+use sdg_grasp::{CameraOverTable, Circumstances, ErrorLength, GraspModel, Verification};
 use sdg_kinematics::Panda;
+use sdg_robot::height::{MeasuredHeight, Sighting};
 use sdg_robot::{Arm, GraspTarget, PartFinder, Place, RobotError};
 
 use crate::perception::{Found, Perception};
 use crate::placed_camera::PlacedCamera;
+use crate::surface::{PartOnSurface, PosedPicture, surface_height};
 
 /// How long a picture that was taken after the arm stopped is waited for.
 const MAX_WAIT: Duration = Duration::from_secs(5);
@@ -93,9 +97,38 @@ pub struct ModelFinder<P> {
     seen: Option<SeenOutline>,
     /// The other sure parts of the last picture.
     others: Vec<GraspTarget>,
+    /// How much higher than on the table parts may lie, m; `None` where they lie on it.
+    heights_m: Option<RangeInclusive<f64>>,
+    /// The pictures that heights are measured by, with what each shows.
+    sights: Vec<Sights>,
     /// Where parts are put down: those that lie there are not to be taken.
     pub places: Vec<Place>,
 }
+
+/// A picture with the parts in it, each with the corners of its outline in the plane of [`Sighting::middle_m`], base frame, m.
+#[derive(Debug)]
+struct Sights {
+    picture: PosedPicture,
+    parts: Vec<(Sighting, Polygon)>,
+}
+
+/// How much higher than on the table parts may lie where nothing is told of it, m.
+pub const UNKNOWN_HEIGHTS_M: RangeInclusive<f64> = -0.010..=0.080;
+/// Sizes are looked for so far beyond those of parts at the ends of these heights: what a pose is off by.
+const SIZE_LEEWAY: f64 = 0.03;
+/// By its size at a look, a part's height is known so well, m.
+const BY_SIZE_WITHIN_M: f64 = 0.015;
+/// A picture that is taken to measure a height shows the part so near to where it was seen before, m.
+const SAME_PART_M: f64 = 0.040;
+/// Sizes of demonstrations that differ by more say nothing of a height.
+const MAX_SIZE_DIFFERENCE: f64 = 0.003;
+/// A part may be so much higher than its marks, m.
+const TOP_LEEWAY_M: f64 = 0.002;
+/// The surface that a part lies on is looked for within so many standard deviations of where the part's pose puts it, between these bounds in m.
+const SURFACE_SIGMAS: f64 = 3.5;
+const SURFACE_WITHIN_M: [f64; 2] = [0.004, 0.009];
+/// Radius that holds 68 % of a place's errors over their standard deviation along x and along y.
+const SIGMAS_OF_RADIUS: f64 = 1.51;
 
 impl<P> ModelFinder<P> {
     /// Looks for the model's part through the camera.
@@ -110,6 +143,8 @@ impl<P> ModelFinder<P> {
             last: None,
             seen: None,
             others: Vec::new(),
+            heights_m: None,
+            sights: Vec::new(),
             places: Vec::new(),
         }
     }
@@ -117,6 +152,11 @@ impl<P> ModelFinder<P> {
     /// The same, with detections checked or not.
     pub fn with_verification(self, verification: Verification) -> Self {
         Self { verification, ..self }
+    }
+
+    /// The same for parts that may lie so much higher than on the table, m: at a look their size tells their height.
+    pub fn with_heights(self, heights_m: RangeInclusive<f64>) -> Self {
+        Self { heights_m: Some(heights_m), ..self }
     }
 
     /// The last picture, and its detections, best first.
@@ -134,25 +174,145 @@ impl<P> ModelFinder<P> {
     where
         P: Pictures<A>,
     {
+        self.sights.clear();
+        let heights_m = self.heights_m.clone();
+        let sightings = self.look(arm, 0.0, heights_m.as_ref())?;
+        if heights_m.is_none() {
+            return Ok(sightings.iter().map(|sighting| sighting.target).collect());
+        }
+        let at_its_height = |sighting: &Sighting| {
+            let height_m = sighting.height_by_size_m().unwrap_or(sighting.middle_m.z);
+            sighting.at_height(height_m).target
+        };
+        let targets: Vec<GraspTarget> = sightings.iter().map(at_its_height).collect();
+        // The outline lies where the best part was found.
+        if let (Some(seen), Some(sighting), Some(target)) = (&mut self.seen, sightings.first(), targets.first()) {
+            let higher_m = target.base_from_tcp.translation.z - sighting.target.base_from_tcp.translation.z;
+            let share = 1.0 - higher_m / sighting.distance_m();
+            let foot = sighting.camera_m.xy();
+            seen.outline_in_base.iter_mut().for_each(|corner| *corner = foot + (*corner - foot) * share);
+            seen.z_m.iter_mut().for_each(|z_m| *z_m += higher_m);
+        }
+        Ok(targets)
+    }
+
+    /// Takes a picture and finds all parts in it, the best first, as if they lay so much higher than on the table (m). Others are found as well
+    /// where heights are given, m over the table.
+    fn look<A: Arm>(
+        &mut self,
+        arm: &mut A,
+        higher_m: f64,
+        heights_m: Option<&RangeInclusive<f64>>,
+    ) -> sdg_robot::Result<Vec<Sighting>>
+    where
+        P: Pictures<A>,
+    {
         let state = arm.state()?;
         let TakenPicture { picture, taken } = self.pictures.take(arm)?;
         self.taken = taken;
-        let place = self.camera.over_table(&Panda::new().base_from_flange(&state.q));
+        let mut place = self.camera.over_table(&Panda::new().base_from_flange(&state.q));
+        place.table_height_m += higher_m;
         self.perception.move_to(&place)?;
+        let distance_m = place.camera.world_from_camera.translation.z - self.marks_z_m(&place);
+        self.perception.look_for_sizes(heights_m.map(|heights_m| {
+            // What lies higher is nearer to the camera, and larger.
+            let size =
+                |height_m: f64| (distance_m / (distance_m + higher_m - height_m).max(0.5 * distance_m)).max(0.51);
+            let [low, high] = [size(*heights_m.start()), size(*heights_m.end())];
+            (low * (1.0 - SIZE_LEEWAY)).clamp(0.5, 1.0)..=(high * (1.0 + SIZE_LEEWAY)).clamp(1.0, 2.0)
+        }))?;
         let found = self.perception.detect(&picture, self.verification)?;
         self.seen = found.first().and_then(|best| self.outline_of(best, &place));
-        let targets = found.iter().filter_map(target).collect();
+        let sightings = found.iter().filter_map(|found| self.sighting(found, &place)).collect();
         self.last = Some((picture, found));
-        Ok(targets)
+        Ok(sightings)
+    }
+
+    /// z of the marks of a part on the table, m.
+    fn marks_z_m(&self, place: &CameraOverTable) -> f64 {
+        place.table_height_m + self.perception.model().facts().lengths.map_or(0.0, |lengths| lengths.mark_height_m)
+    }
+
+    /// A detection in the plane of the marks.
+    fn sighting(&self, found: &Found, place: &CameraOverTable) -> Option<Sighting> {
+        let target = target(found)?;
+        let marks_z_m = self.marks_z_m(place);
+        let seen_middle = found.detection.outline.as_ref().map(Polygon::centroid);
+        let middle_m = match seen_middle {
+            Some(pixel) => place.camera.at_height(&pixel, marks_z_m)?,
+            None => Point3::new(target.base_from_tcp.translation.x, target.base_from_tcp.translation.y, marks_z_m),
+        };
+        let pose = found.pose?;
+        // What walls do to a pose is the relief's part, and alike in both pictures.
+        let noise_m = ErrorLength::POSITION.metres(&Circumstances { mark_height_m: 0.0, ..pose.circumstances });
+        Some(Sighting {
+            camera_m: place.camera.world_from_camera.translation.vector.into(),
+            middle_m,
+            place_sigma_m: noise_m / SIGMAS_OF_RADIUS,
+            size: self.size_of(found),
+            size_sigma: pose.uncertainty.yaw_rad,
+            target,
+        })
+    }
+
+    /// A part's size in the plane of the marks over its own; `None` where demonstrations contradict each other, or were not laid over the picture.
+    fn size_of(&self, found: &Found) -> Option<f64> {
+        found.detection.agreement?;
+        let model = self.perception.model();
+        let pixels_per_m = model.facts().lengths?.pixels_per_m;
+        let widths_px = model.demonstrations().iter().map(|demonstration| demonstration.marks.width_px);
+        let width_px = model.demonstrations().first()?.marks.width_px;
+        let is_one_size =
+            widths_px.into_iter().all(|other_px| (other_px / width_px - 1.0).abs() <= MAX_SIZE_DIFFERENCE);
+        is_one_size.then_some(found.pose?.opening_m * pixels_per_m / width_px)
     }
 
     fn outline_of(&self, found: &Found, place: &CameraOverTable) -> Option<SeenOutline> {
         let table_m = place.table_height_m;
-        let mark_m = self.perception.model().facts().lengths.map_or(table_m, |lengths| table_m + lengths.mark_height_m);
+        let mark_m = self.marks_z_m(place);
         let on_plane = |pixel| place.camera.at_height(pixel, mark_m).map(|p_in_base| p_in_base.xy());
         let corners = &found.detection.outline.as_ref()?.vertices;
         let outline_in_base = corners.iter().map(on_plane).collect::<Option<Vec<_>>>()?;
         Some(SeenOutline { outline_in_base, z_m: [table_m, mark_m] })
+    }
+
+    /// Keeps the last picture and the outlines of what it shows.
+    fn keep_sights(&mut self, sightings: &[Sighting]) {
+        let (Some((picture, found)), Some(place)) = (&self.last, self.perception.place()) else { return };
+        let outlines = found.iter().filter(|found| found.pose.is_some()).map(|found| found.detection.outline.as_ref());
+        let parts = sightings.iter().zip(outlines).filter_map(|(sighting, outline)| {
+            let on_plane = |pixel| place.camera.at_height(pixel, sighting.middle_m.z).map(|p_in_base| p_in_base.xy());
+            let vertices = outline?.vertices.iter().map(on_plane).collect::<Option<Vec<_>>>()?;
+            Some((*sighting, Polygon { vertices }))
+        });
+        let parts = parts.collect();
+        self.sights.push(Sights { picture: PosedPicture::new(picture, place.camera), parts });
+    }
+
+    /// The surface beside a part that two of the kept pictures show.
+    fn surface_of(&self, pair: &[Sighting; 2], expected: &MeasuredHeight) -> Option<MeasuredHeight> {
+        let lengths = self.perception.model().facts().lengths?;
+        let kept = |sighting: &Sighting| {
+            let shows = |(shown, _): &&(Sighting, Polygon)| shown == sighting;
+            self.sights.iter().find_map(|sights| Some((&sights.picture, &sights.parts.iter().find(shows)?.1)))
+        };
+        let ([one, other], [(first, outline), (second, _)]) = (*pair, [kept(&pair[0])?, kept(&pair[1])?]);
+        // The first picture's outline, at its height and where both pictures show it.
+        let marks_m = expected.height_m + lengths.mark_height_m;
+        let [here, there] = [one.middle_at(marks_m), other.middle_at(marks_m)];
+        let share = (one.camera_m.z - marks_m) / one.distance_m();
+        let foot = one.camera_m.xy();
+        let corner = |p: &Point2<f64>| foot + (p - foot) * share + 0.5 * (there - here);
+        let outline_m = Polygon { vertices: outline.vertices.iter().map(corner).collect() };
+        let part = PartOnSurface {
+            outline_m: &outline_m,
+            // Marks are in the middle of a round bar and on top of others.
+            top_m: lengths.mark_height_m.max(2.0 * lengths.grasp_height_m) + TOP_LEEWAY_M,
+            expected_m: expected.height_m,
+            within_m: (SURFACE_SIGMAS * expected.sigma_m).clamp(SURFACE_WITHIN_M[0], SURFACE_WITHIN_M[1]),
+        };
+        let found = surface_height([first, second], &part)?;
+        Some(MeasuredHeight { height_m: found.height_m, sigma_m: found.sigma_m })
     }
 
     fn keep_others(&mut self, found: Vec<GraspTarget>, chosen: Option<&GraspTarget>) {
@@ -192,6 +352,29 @@ impl<A: Arm, P: Pictures<A>> PartFinder<A> for ModelFinder<P> {
         let nearest = sure.min_by(|a, b| apart_m(a).total_cmp(&apart_m(b)));
         self.keep_others(found, nearest.as_ref());
         Ok(nearest)
+    }
+
+    fn sight(&mut self, arm: &mut A, expected: &GraspTarget) -> sdg_robot::Result<Vec<Sighting>> {
+        let lengths = self.perception.model().facts().lengths;
+        let grasp_height_m = lengths.map_or(0.0, |lengths| lengths.grasp_height_m);
+        let expected_at = expected.base_from_tcp.translation;
+        let higher_m = expected_at.z - grasp_height_m - self.camera.table_height_m;
+        let heights_m = higher_m - BY_SIZE_WITHIN_M..=higher_m + BY_SIZE_WITHIN_M;
+        let sightings = self.look(arm, higher_m, Some(&heights_m))?;
+        let is_near = |sighting: &Sighting| {
+            let apart = sighting.target.base_from_tcp.translation.vector - expected_at.vector;
+            sighting.target.score >= sdg_robot::CONFIRMED && apart.xy().norm() <= SAME_PART_M
+        };
+        self.keep_sights(&sightings);
+        Ok(sightings.into_iter().filter(is_near).collect())
+    }
+
+    fn surface_beside(
+        &mut self,
+        pair: &[Sighting; 2],
+        expected: &MeasuredHeight,
+    ) -> sdg_robot::Result<Option<MeasuredHeight>> {
+        Ok(self.surface_of(pair, expected))
     }
 
     fn others(&self) -> Vec<GraspTarget> {

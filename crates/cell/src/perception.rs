@@ -1,5 +1,7 @@
 //! A grasp model behind a camera whose place is known, or behind any camera.
 
+use std::ops::RangeInclusive;
+
 use image::RgbImage;
 use nalgebra::Point2;
 use sdg_calibration::{CalibratedCamera, CameraFileError, Frame};
@@ -75,6 +77,18 @@ impl Perception {
             }
         }
         Ok(())
+    }
+
+    /// Looks for parts of these sizes in the plane of the marks, over the part's own, as [`PlanDetector::look_for_sizes`]; nothing changes
+    /// for pictures of any camera.
+    ///
+    /// # Errors
+    /// A range that is none.
+    pub fn look_for_sizes(&mut self, sizes: Option<RangeInclusive<f64>>) -> Result<()> {
+        match &mut self.view {
+            View::AnyCamera(_) => Ok(()),
+            View::OverTable(detector, _) => Ok(detector.look_for_sizes(sizes)?),
+        }
     }
 
     /// Finds the part in a picture, best score first.

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args as ClapArgs;
 use sdg_grasp::ComputeBackend;
+use sdg_robot::height::ToldHeight;
 
 /// Where a network computes.
 #[derive(Debug, ClapArgs)]
@@ -33,6 +34,26 @@ impl TaughtCameraArgs {
     pub fn heights_m(&self) -> [f64; 2] {
         let mark = self.mark_height_mm.unwrap_or_default();
         [mark, self.grasp_height_mm.unwrap_or(0.5 * mark)].map(|height| 1e-3 * height)
+    }
+}
+
+/// How high the part lies, where that is known.
+#[derive(Debug, Clone, Copy, ClapArgs)]
+pub struct ToldHeightArgs {
+    /// Height of the marks over the workcell's table. With a camera on the hand it may be left out: it is measured from two pictures on the
+    /// way down; where it is given, the more certain of both is used, and a grasp is refused where they contradict each other
+    #[arg(long, value_name = "MM", value_parser = height_mm)]
+    pub mark_height_mm: Option<f64>,
+    /// How far that height may be off: one standard deviation
+    #[arg(long, value_name = "MM", value_parser = sigma_mm, default_value_t = 1.0, requires = "mark_height_mm")]
+    pub mark_height_sigma_mm: f64,
+}
+
+impl ToldHeightArgs {
+    /// The height that was told, over a table at this z of the base, m.
+    pub fn told(&self, table_height_m: f64) -> Option<ToldHeight> {
+        let height_m = table_height_m + 1e-3 * self.mark_height_mm?;
+        Some(ToldHeight { height_m, sigma_m: 1e-3 * self.mark_height_sigma_mm })
     }
 }
 
@@ -115,6 +136,11 @@ pub fn seconds(text: &str) -> Result<f64, String> {
 /// A height over the table. A part higher than half a metre was given in another unit.
 pub fn height_mm(text: &str) -> Result<f64, String> {
     millimetres(text, "a height", [0.0, 500.0])
+}
+
+/// How far a height may be off.
+fn sigma_mm(text: &str) -> Result<f64, String> {
+    millimetres(text, "a standard deviation", [0.1, 100.0])
 }
 
 /// The size of a part. No part is smaller than a millimetre; one that no hand takes is refused by its jaws.

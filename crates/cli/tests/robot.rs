@@ -77,7 +77,19 @@ fn the_simulated_arm_grasps_what_the_shipped_workcell_shows_it() {
     assert_eq!((&line["held"], &line["step"], &line["looks"]), (&true.into(), &"hold".into(), &vec![1, 1].into()));
     let width_m = line["closed_width_m"].as_f64().unwrap();
     assert!((width_m - 0.0158).abs() < 0.002, "{line}");
+    // Nothing was told of the part's height.
+    let height = &line["height"];
+    let [height_mm, sigma_mm] = ["mark_height_mm", "sigma_mm"].map(|key| height[key].as_f64().unwrap());
+    assert!(height["source"] == "measured" && (height_mm - 16.0).abs() < 1.0 && sigma_mm < 3.0, "{line}");
     assert!(!states.exists(), "nothing went wrong");
+
+    // A height that contradicts what is measured is refused, and 0 is a height.
+    let states_of = ["--states", text(&states), "--speed", "0.6", "--from", "sim:pendulum?seed=3"];
+    let wrong = sdg(&[&base[..], &states_of, &["--mark-height-mm", "0", "--mark-height-sigma-mm", "0.5"]].concat());
+    let stderr = String::from_utf8(wrong.stderr).unwrap();
+    assert_eq!(wrong.status.code(), Some(1), "{stderr}");
+    assert!(stderr.contains("detect: expected marks at the told height of 0.0 ± 0.5 mm, measured 1"), "{stderr}");
+    fs::remove_file(&states).unwrap();
 
     // A part that is not the taught one is not grasped.
     let other = sdg(&[&base[..], &["--from", "sim:key?seed=3", "--speed", "0.6", "--states", text(&states)]].concat());
@@ -132,6 +144,13 @@ fn wrong_files_and_options_are_refused_before_anything_moves() {
         let speed = format!("--speed={speed}");
         grasp(&workcell, &[&sim[..], &[&speed]].concat(), 2, &["--speed: expected a share", "at most 0.6"]);
     }
+
+    for (told, expected) in
+        [("1000", "a height of 0 to 500 millimetres, found 1000"), ("0.016", "metres given as millimetres?")]
+    {
+        grasp(&workcell, &[&sim[..], &["--mark-height-mm", told]].concat(), 2, &["--mark-height-mm", expected]);
+    }
+    grasp(&workcell, &[&sim[..], &["--mark-height-sigma-mm", "1"]].concat(), 2, &["--mark-height-mm"]);
 
     let write = |name: &str, from: &str, to: &str| {
         let path = folder.path().join(name);

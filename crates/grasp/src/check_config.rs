@@ -144,6 +144,11 @@ impl ScoreConfig {
         Self { is_size_known: true, size: KNOWN_SIZE, ..self }
     }
 
+    /// The same where lengths are known and heights are not: within the sizes that are looked for, none speaks for or against a part.
+    pub(crate) fn of_any_height(self) -> Self {
+        Self { is_size_known: true, size: term(0.0, 0.0, 0.0, 0.01), ..self }
+    }
+
     /// The most that a kind of evidence adds for a part.
     pub(crate) fn most_of(&self, kind: EvidenceKind) -> f64 {
         match kind {

@@ -32,7 +32,9 @@ mod arm_state;
 mod camera_pose;
 mod error;
 mod franka;
+pub mod height;
 mod impedance;
+mod known_target;
 mod lying_part;
 mod pace;
 mod part_shape;
@@ -59,6 +61,7 @@ pub use camera_pose::CameraPose;
 pub use error::{Result, RobotError};
 pub use franka::{FrankaArm, Scheduling, check_real_time};
 pub use impedance::{Impedance, ImpedanceControl, TcpReference};
+pub use known_target::KnownTarget;
 pub use lying_part::LyingPart;
 pub use pace::{DEFAULT_SPEED, MAX_SPEED, Pace};
 pub use part_shape::PartShape;
@@ -70,8 +73,8 @@ pub use robot::Robot;
 pub use robot_address::RobotAddress;
 pub use safety::{CheckedMotion, LinkCapsules, SafetyLimits, SelfCollision, Violation, WorkspaceBox};
 pub use sequence::{
-    CameraMount, FREE_CLEARANCE_M, GraspConfig, GraspOutcome, GraspReport, LOOK_AT_M, LOOK_HEIGHT_M, LookOut,
-    PlaceOutcome, PlaceReport, PlacingConfig, SURE, camera_looking_down, grasp, grasp_and_place, grasp_softly,
+    CONFIRMED, CameraMount, FREE_CLEARANCE_M, GraspConfig, GraspOutcome, GraspReport, LOOK_AT_M, LOOK_HEIGHT_M,
+    LookOut, PlaceOutcome, PlaceReport, PlacingConfig, SURE, camera_looking_down, grasp, grasp_and_place, grasp_softly,
 };
 pub use surroundings::{Destination, Surroundings, Way};
 pub use touch::{Descent, TouchDown, Touched};

@@ -7,6 +7,7 @@ use nalgebra::Isometry3;
 
 use crate::arm::Arm;
 use crate::error::Result;
+use crate::height::{MeasuredHeight, Sighting};
 
 /// Where the hand should close, as perception sees it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,6 +35,24 @@ pub trait PartFinder<A: Arm> {
     /// As [`PartFinder::find`].
     fn find_nearest(&mut self, arm: &mut A, _base_from_tcp: &Isometry3<f64>) -> Result<Option<GraspTarget>> {
         self.find(arm)
+    }
+
+    /// Takes a picture and tells where it shows parts that may be the one at a grasp, wherever in height: for a height that is not known.
+    /// Nothing where it shows none, and for perception that measures no heights.
+    ///
+    /// # Errors
+    /// As [`PartFinder::find`].
+    fn sight(&mut self, _arm: &mut A, _expected: &GraspTarget) -> Result<Vec<Sighting>> {
+        Ok(Vec::new())
+    }
+
+    /// z of the surface beside a part that two sightings of the last calls of [`PartFinder::sight`] show, looked for about where it is expected;
+    /// `None` where nothing is seen of it.
+    ///
+    /// # Errors
+    /// As [`PartFinder::find`].
+    fn surface_beside(&mut self, _pair: &[Sighting; 2], _expected: &MeasuredHeight) -> Result<Option<MeasuredHeight>> {
+        Ok(None)
     }
 
     /// What else the picture of the last call shows for sure: parts of the same kind that lie beside the one that was found.

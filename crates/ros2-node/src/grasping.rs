@@ -5,12 +5,13 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant, SystemTime};
 
 use anyhow::{Context, Result};
-use sdg_cell::{ModelFinder, Pictures, PlacedCamera, TakenPicture, part_shape};
+use sdg_cell::{ModelFinder, Pictures, PlacedCamera, TakenPicture, UNKNOWN_HEIGHTS_M, height_measurement, part_shape};
 use sdg_grasp::{GraspError, GraspModel};
+use sdg_robot::height::ToldHeight;
 use sdg_robot::workcell::Workcell;
 use sdg_robot::{
-    Arm, GraspConfig, GraspOutcome, GraspStep, GraspTarget, Pace, PartFinder, PlannedArm, Robot, RobotError,
-    StepObserver, StopReason, Watch,
+    Arm, GraspConfig, GraspOutcome, GraspStep, GraspTarget, KnownTarget, Pace, PartFinder, PlannedArm, Robot,
+    RobotError, StepObserver, StopReason, Watch,
 };
 use sdg_ros2::dds::TrajectoryArm;
 use sdg_ros2::messages::{GraspRequest, GraspResponse, Header, PoseStamped, Time};
@@ -28,6 +29,8 @@ pub struct GraspSettings {
     pub workcell: Workcell,
     /// The camera of the pictures.
     pub camera: PlacedCamera,
+    /// The height that was told, which is measured otherwise.
+    pub told: Option<ToldHeight>,
     /// Share of the joints' velocity limits, unless a request says another.
     pub speed: f64,
     /// The frame of poses in answers.
@@ -102,7 +105,9 @@ impl Grasping {
         if model.facts().lengths.is_none() {
             return Err(GraspError::NoLengths.into());
         }
+        let camera = self.settings.camera.with_marks_at(model, self.settings.told.as_ref());
         let config = GraspConfig {
+            height: height_measurement(model, &camera, self.settings.told),
             pace,
             max_detection_age_secs: 1.0,
             part: part_shape(model),
@@ -110,7 +115,10 @@ impl Grasping {
         };
         let mut arm = self.arm.take().context("the arm is lost")?;
         let (settings, is_interrupted) = (Arc::clone(&self.settings), Arc::clone(&self.is_interrupted));
-        let mut finder = ModelFinder::new(model.clone(), settings.camera, self.pictures.clone());
+        let mut finder = ModelFinder::new(model.clone(), camera, self.pictures.clone());
+        if config.height.is_some() {
+            finder = finder.with_heights(UNKNOWN_HEIGHTS_M);
+        }
         let is_dry_run = request.dry_run;
         self.running = Some(std::thread::spawn(move || {
             let (answer, latched) = if is_dry_run {
@@ -196,7 +204,9 @@ fn planned(
     let mut planned = PlannedArm::new(state.q, hand.opening_m);
     let mut robot = Robot::new(&mut planned, settings.workcell.safety_limits(), Default::default());
     let mut step = LastStep(GraspStep::Detect);
-    let ended = sdg_robot::grasp(&mut robot, &mut Known(target), &mut step, settings.camera.mount(), config);
+    let mount = settings.camera.mount();
+    let mut known = KnownTarget::new(Some(target), mount, config);
+    let ended = sdg_robot::grasp(&mut robot, &mut known, &mut step, mount, config);
     let (success, message) = match ended.map(|report| report.outcome) {
         Ok(GraspOutcome::Held) => (true, "the part can be grasped".to_owned()),
         Ok(GraspOutcome::Failed { step, why }) => (false, format!("{step}: {why}")),
@@ -208,15 +218,6 @@ fn planned(
         step: step.0.name().to_owned(),
         pose: pose(settings, Some(&target)),
         closed_width_m: target.jaw_width_m,
-    }
-}
-
-/// Finds the part where it was found before.
-struct Known(GraspTarget);
-
-impl PartFinder<PlannedArm> for Known {
-    fn find(&mut self, _arm: &mut PlannedArm) -> sdg_robot::Result<Option<GraspTarget>> {
-        Ok(Some(self.0))
     }
 }
 

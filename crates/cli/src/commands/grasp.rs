@@ -7,10 +7,12 @@ use anyhow::{Context, Result, anyhow};
 use clap::Args;
 use sdg_camera::{Address, LatestFrame, PixelFrame};
 use sdg_cell::{
-    DryRun, Ended, LivePictures, ModelFinder, Pictures, PlacedCamera, SeenOutline, part_shape, run_sequence,
+    DryRun, Ended, LivePictures, ModelFinder, Pictures, PlacedCamera, SeenOutline, UNKNOWN_HEIGHTS_M,
+    height_measurement, part_shape, run_sequence,
 };
 use sdg_grasp::{GraspError, GraspModel};
 use sdg_inputs::camera_files;
+use sdg_robot::height::HeightReport;
 use sdg_robot::workcell::Workcell;
 use sdg_robot::{
     Arm, CompliantArm, DEFAULT_SPEED, FrankaArm, GraspConfig, GraspOutcome, GraspReport, GraspStep, GraspTarget,
@@ -24,7 +26,7 @@ use crate::interrupt::Interrupt;
 use crate::json_line::json_line;
 use crate::live_pictures::{self, RequestArgs};
 use crate::robots::{self, Consent, RobotChoice, confirm, draw_dry_run, print_plan, write_states};
-use crate::shared_args::ComputeArgs;
+use crate::shared_args::{ComputeArgs, ToldHeightArgs};
 
 /// `sdg grasp`
 #[derive(Debug, Args)]
@@ -49,6 +51,9 @@ pub struct GraspArgs {
     /// counted from 1 along its x
     #[arg(long, value_name = "NAME")]
     pub place: Option<String>,
+    /// How high the part lies
+    #[command(flatten)]
+    pub height: ToldHeightArgs,
     /// Come down softly on the last 2 cm: for a table whose height is not known to a millimetre
     #[arg(long)]
     pub soft: bool,
@@ -134,7 +139,10 @@ fn prepare(args: &GraspArgs) -> Result<Prepared> {
         return Err(GraspError::NoLengths).with_context(|| args.grasp_model.display().to_string());
     }
     sdg_files::check_writable(&args.states)?;
+    let told = args.height.told(workcell.table_height_m);
+    let camera = camera.with_marks_at(&model, told.as_ref());
     let config = GraspConfig {
+        height: height_measurement(&model, &camera, told),
         pace,
         max_detection_age_secs: args.max_detection_age_secs,
         soft_approach: args.soft.then(TouchDown::default),
@@ -195,6 +203,9 @@ fn attempt<A: CompliantArm, P: Pictures<A>>(
     address: Option<&str>,
 ) -> Result<Outcome> {
     let mut finder = ModelFinder::new(prepared.model.clone(), prepared.camera, pictures);
+    if prepared.config.height.is_some() {
+        finder = finder.with_heights(UNKNOWN_HEIGHTS_M);
+    }
     if prepared.place.is_some() {
         finder.places.clone_from(&prepared.workcell.places);
     }
@@ -255,6 +266,11 @@ fn print_report(args: &GraspArgs, prepared: &Prepared, ended: &Ended, secs: f64,
         println!("{}", json_line(&to_json(prepared, ended, secs, robot))?);
     }
     let Ended { grasp, failed, beside, .. } = ended;
+    if let Some(height) = grasp.height.as_ref().and_then(|height| height.settled) {
+        let height_mm = 1e3 * (height.height_m - prepared.workcell.table_height_m);
+        let (sigma_mm, source) = (1e3 * height.sigma_m, height.source.name());
+        eprintln!("its marks lie {height_mm:.1} ± {sigma_mm:.1} mm over the table, as {source}");
+    }
     match (failed, &prepared.place) {
         (None, None) => {
             let width_mm = grasp.closed.map_or(f64::NAN, |hand| hand.opening_m * 1e3);
@@ -320,6 +336,9 @@ fn to_json(prepared: &Prepared, ended: &Ended, secs: f64, robot: &str) -> Value 
         "closed_width_m": report.closed.map(|hand| hand.opening_m),
         "seconds": secs,
     });
+    if let Some(height) = &report.height {
+        object["height"] = height_json(height, prepared.workcell.table_height_m);
+    }
     if let Some((goal, _)) = &prepared.place {
         object["place"] = json!({
             "name": goal.name,
@@ -330,4 +349,17 @@ fn to_json(prepared: &Prepared, ended: &Ended, secs: f64, robot: &str) -> Value 
         });
     }
     object
+}
+
+/// How high the marks lie over the table, and where that is from.
+fn height_json(height: &HeightReport, table_height_m: f64) -> Value {
+    let over_table_mm = |height_m: f64| 1e3 * (height_m - table_height_m);
+    json!({
+        "source": height.settled.map(|settled| settled.source.name()),
+        "mark_height_mm": height.settled.map(|settled| over_table_mm(settled.height_m)),
+        "sigma_mm": height.settled.map(|settled| 1e3 * settled.sigma_m),
+        "measured_mm": height.measured.map(|measured| over_table_mm(measured.height_m)),
+        "measured_sigma_mm": height.measured.map(|measured| 1e3 * measured.sigma_m),
+        "not_measured": height.why_not,
+    })
 }

@@ -12,6 +12,8 @@ mod demonstration;
 mod picture;
 mod uncertainty;
 
+use std::ops::RangeInclusive;
+
 use image::RgbImage;
 use nalgebra::{Isometry3, Point2, Point3, Rotation2, UnitQuaternion, Vector2, Vector3};
 use sdg_geometry::{Angle, BoundingBox, PlanView, PlanarGrasp, Polygon, PosedCamera, Workspace};
@@ -79,6 +81,8 @@ pub struct PlanDetector {
     lengths: Lengths,
     view: PlanView,
     map: PlanMap,
+    /// Sizes over the part's own at which it is looked for, where parts may lie at another height than the table's.
+    sizes: Option<RangeInclusive<f64>>,
 }
 
 impl PlanDetector {
@@ -90,7 +94,28 @@ impl PlanDetector {
         let lengths = model.facts().lengths.ok_or(GraspError::NoLengths)?;
         let view = plan_view(over_table, &lengths)?;
         let map = PlanMap::new(&over_table.camera, &view);
-        Ok(Self { model: model.of_known_size()?, over_table: *over_table, lengths, view, map })
+        Ok(Self { model: model.of_known_size()?, over_table: *over_table, lengths, view, map, sizes: None })
+    }
+
+    /// Looks for parts of these sizes in the plan view, over the part's own: what lies higher appears larger. No size within the range speaks
+    /// against a part then. With `None` sizes are those of parts on the table again, and another size is another part.
+    ///
+    /// # Errors
+    /// A range that is none, as [`GraspModel::with_size_tolerance`].
+    pub fn look_for_sizes(&mut self, sizes: Option<RangeInclusive<f64>>) -> Result<()> {
+        if self.sizes == sizes {
+            return Ok(());
+        }
+        let model = self.model.clone();
+        self.model = match &sizes {
+            Some(range) => model.with_check(|check| {
+                check.search.scales = range.clone();
+                check.score = check.score.of_any_height();
+            })?,
+            None => model.of_known_size()?,
+        };
+        self.sizes = sizes;
+        Ok(())
     }
 
     /// Goes on behind another camera, or the same camera in another place.

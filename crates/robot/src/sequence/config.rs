@@ -6,6 +6,7 @@ use sdg_kinematics::{IkOptions, JointVector, Panda, ready_pose};
 
 use crate::arm_state::Load;
 use crate::error::{Result, RobotError};
+use crate::height::HeightMeasurement;
 use crate::lying_part::LyingPart;
 use crate::pace::Pace;
 use crate::part_shape::PartShape;
@@ -69,6 +70,8 @@ pub struct GraspConfig {
     /// How the hand comes down on the last centimetres before it closes, on an arm that yields: where the table's height is not known
     /// to a millimetre. In joint positions where `None`.
     pub soft_approach: Option<TouchDown>,
+    /// How the part's height is measured with a camera on the hand; where `None`, or with a camera beside the robot, it is as perception says.
+    pub height: Option<HeightMeasurement>,
     /// What stands in the cell besides the table: free motions are planned around it.
     pub obstacles: Vec<Obstacle>,
     /// The part reaches so far to all sides of its grasp, m: it is kept off the obstacles, too.
@@ -100,6 +103,7 @@ impl Default for GraspConfig {
             max_detection_age_secs: 1.0,
             load: None,
             soft_approach: None,
+            height: None,
             obstacles: Vec::new(),
             part_radius_m: 0.06,
             part: None,

@@ -39,7 +39,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         }
         let q = self.robot.state()?.q;
         let base_from_tcp = self.robot.panda().forward(&q);
-        self.held = Some(HeldPart::new(target, &base_from_tcp, self.robot.limits().table_height_m, self.config));
+        self.held = Some(HeldPart::new(target, &base_from_tcp, self.surface_height_m(), self.config));
         Ok(())
     }
 

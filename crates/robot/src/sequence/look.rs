@@ -16,7 +16,7 @@ pub(super) const HOVER_SHIFTS_M: [[f64; 2]; 3] = [[0.0, 0.0], [-0.03, 0.03], [0.
 pub const SURE: f64 = 0.5;
 /// What lies where the first look found the part is it at a lower score already, where it lies within so many metres and
 /// radians of that.
-const CONFIRMED: f64 = 0.2;
+pub const CONFIRMED: f64 = 0.2;
 const CONFIRMED_WITHIN: (f64, f64) = (0.015, 0.26);
 
 impl<A: Arm> Sequence<'_, '_, A> {
@@ -111,10 +111,21 @@ impl<A: Arm> Sequence<'_, '_, A> {
 
     /// Puts the camera over a grasp or shifted from there, the hand turned as for one of the grasps, which are at one place, or by half a turn more.
     pub(super) fn hover(&mut self, grasps: &[Isometry3<f64>], shift_m: [f64; 2], step: GraspStep) -> Steps<()> {
+        self.look_down(grasps, shift_m, self.config.hover_height_m, step)
+    }
+
+    /// The same from another height above the table.
+    pub(super) fn look_down(
+        &mut self,
+        grasps: &[Isometry3<f64>],
+        shift_m: [f64; 2],
+        height_m: f64,
+        step: GraspStep,
+    ) -> Steps<()> {
         let seed = self.robot.commanded()?;
         let grasp = grasps.first().map_or_else(Vector3::zeros, |grasp| grasp.translation.vector);
         let [x, y] = [grasp.x + shift_m[0], grasp.y + shift_m[1]];
-        let height_m = self.robot.limits().table_height_m + self.config.hover_height_m;
+        let height_m = self.robot.limits().table_height_m + height_m;
         let both_ways = grasps.iter().flat_map(|grasp| [*grasp, with_fingers_exchanged(grasp)]);
         let poses: Vec<Isometry3<f64>> = both_ways
             .map(|base_from_grasp| {

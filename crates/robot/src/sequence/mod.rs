@@ -4,6 +4,8 @@
 //! look ─> find ─> hover, turned ─> find ─> above ─> straight down ─> close ─> lift ─> hold
 //!          └ detect                 └ detect └────── approach ──┘       └───────┴───────┴ the hand's width and force decide
 //! ```
+//! Where the height of parts is not told, a camera on the hand takes two pictures on the way down, beside each other (measure.rs).
+//!
 //! After an empty detection the arm looks from the next place: another place shows a tall part from another side, and shadows of the arm
 //! elsewhere. A camera beside the robot looks once, with the arm out of its view.
 //!
@@ -14,6 +16,7 @@ mod config;
 mod held_part;
 mod hold;
 mod look;
+mod measure;
 mod place;
 mod reach;
 mod travel;
@@ -25,13 +28,14 @@ use sdg_kinematics::{HAND_OPENING_MAX_M, Trajectory};
 use crate::arm::{Arm, CompliantArm};
 use crate::arm_state::HandState;
 use crate::error::{Result, RobotError};
+use crate::height::HeightReport;
 use crate::lying_part::LyingParts;
 use crate::perception::{GraspStep, GraspTarget, PartFinder, StepObserver};
 use crate::robot::Robot;
 use crate::touch::{TouchDown, Touched};
 
 pub use config::{CameraMount, GraspConfig, LOOK_AT_M, LOOK_HEIGHT_M, LookOut, camera_looking_down};
-pub use look::SURE;
+pub use look::{CONFIRMED, SURE};
 pub use place::{PlaceOutcome, PlaceReport, PlacingConfig, grasp_and_place};
 
 use held_part::HeldPart;
@@ -70,6 +74,8 @@ pub struct GraspReport {
     pub hand_verdicts: Vec<(GraspStep, Option<String>)>,
     /// What was touched on soft ways down, in their order.
     pub touched: Vec<Touched>,
+    /// How high the part lies, where that was to be measured.
+    pub height: Option<HeightReport>,
 }
 
 /// Grasps the part once.
@@ -150,6 +156,10 @@ struct Sequence<'s, 'r, A: Arm> {
     /// What was touched on soft ways down.
     touched: Vec<Touched>,
     held: Option<HeldPart>,
+    /// How high the part lies, where that was to be measured.
+    height: Option<HeightReport>,
+    /// z of what the part lies on by that, m.
+    surface_m: Option<f64>,
     /// Parts that lie and are not to be touched.
     lying: LyingParts,
     /// How far the hand is open, or is to be on the next straight way, m.
@@ -187,6 +197,8 @@ impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
             touch: None,
             touched: Vec::new(),
             held: None,
+            height: None,
+            surface_m: None,
             lying: LyingParts::new(&config.lying),
             opening_m: HAND_OPENING_MAX_M,
             opening_margin_m: config.opening_margin_m,
@@ -218,13 +230,17 @@ impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
             closed: self.closed,
             hand_verdicts: std::mem::take(&mut self.hand_verdicts),
             touched: std::mem::take(&mut self.touched),
+            height: self.height.take(),
         }
     }
 
     fn run(&mut self, is_wanted: impl FnOnce(&mut Self, &GraspTarget) -> Steps<()>) -> Steps<()> {
         let first = self.look_around()?;
         let target = match self.mount {
-            CameraMount::Hand { .. } => self.look_from_above(&first)?,
+            CameraMount::Hand { .. } => {
+                let seen = self.look_from_above(&first)?;
+                self.measure_height(&seen)?
+            }
             CameraMount::Base => first,
         };
         is_wanted(self, &target)?;
@@ -239,6 +255,11 @@ impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
         self.close(target)?;
         self.lift()?;
         self.hold()
+    }
+
+    /// z of what the part lies on, m: as measured, or else the table's as told.
+    fn surface_height_m(&self) -> f64 {
+        self.surface_m.unwrap_or(self.robot.limits().table_height_m)
     }
 
     /// Tells the observer that a step is done; its word is a failure of the step.

@@ -142,7 +142,7 @@ impl PlaceOutcome {
 impl<A: Arm> Sequence<'_, '_, A> {
     /// Refuses a part that has no room in its place by what is known now, and keeps off what may lie around.
     fn prepare(&mut self, target: &GraspTarget, goal: &PlaceGoal, placing: &PlacingConfig) -> Steps<()> {
-        let table_height_m = self.robot.limits().table_height_m;
+        let table_height_m = self.surface_height_m();
         let Some(part) = shape_of(target, table_height_m, self.config) else { return Ok(()) };
         goal.check_room(&part, placing.symmetry, placing.release_margin_m)
             .map_err(|error| Stop::Failed(GraspStep::Detect, error.to_string()))?;
@@ -211,8 +211,13 @@ impl<A: Arm> Sequence<'_, '_, A> {
             // The hand is turned as it let the part go, where its fingers had room.
             let mut target =
                 GraspTarget { base_from_tcp: as_aimed(&aim.base_from_part, &found.base_from_tcp, &error), ..found };
-            // Perception takes the part to lie on the table.
-            target.base_from_tcp.translation.z += goal.surface_m - self.robot.limits().table_height_m;
+            target.base_from_tcp.translation.z = match self.config.height {
+                // The place is told, and what lies in it was measured before it was taken.
+                Some(_) => aim.base_from_part.translation.z,
+                // Perception takes the part to lie on the table.
+                None => found.base_from_tcp.translation.z + goal.surface_m - self.robot.limits().table_height_m,
+            };
+            self.surface_m = self.config.height.map(|_| goal.surface_m);
             // It was looked at from above, and others lie beside it: the hand opens no wider than to let go.
             self.opening_margin_m = placing.release_margin_m;
             self.take(&target)?;

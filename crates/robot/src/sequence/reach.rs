@@ -39,7 +39,8 @@ impl<A: Arm> Sequence<'_, '_, A> {
     pub(super) fn go_above(&mut self, target: &GraspTarget) -> Steps<JointPath> {
         self.check_age()?;
         let limits = self.robot.limits();
-        let lowest = limits.table_height_m + limits.fingertip_beyond_tcp_m + FINGERTIP_CLEARANCE_M;
+        let lowest =
+            self.surface_height_m().max(limits.table_height_m) + limits.fingertip_beyond_tcp_m + FINGERTIP_CLEARANCE_M;
         let mut base_from_grasp = target.base_from_tcp;
         base_from_grasp.translation.z = base_from_grasp.translation.z.max(lowest);
 

@@ -6,7 +6,7 @@ use clap::Args;
 use sdg_ros2::Remapping;
 use sdg_ros2::dds::Rmw;
 
-use crate::shared_args::{ComputeArgs, positive, share};
+use crate::shared_args::{ComputeArgs, ToldHeightArgs, positive, share};
 
 /// `sdg ros2`
 #[derive(Debug, Args)]
@@ -107,6 +107,9 @@ pub struct ArmArgs {
     /// Share of the joints' velocity limits, above 0 and at most 0.6, unless a request says another
     #[arg(long, value_name = "SHARE", default_value_t = sdg_robot::DEFAULT_SPEED)]
     pub speed: f64,
+    /// How high parts lie
+    #[command(flatten)]
+    pub height: ToldHeightArgs,
 }
 
 /// What `~/teach_trigger` teaches.

@@ -82,5 +82,6 @@ pub(super) fn grasp_settings(args: &Ros2Args) -> Result<GraspSettings> {
     let (calibrated, _) = camera_files::read(&camera_path)?;
     let camera = camera_files::placed(&calibrated, &workcell, &camera_path)?;
     let base_frame = args.base_frame.clone().unwrap_or_else(|| "panda_link0".to_owned());
-    Ok(GraspSettings { workcell, camera, speed: args.arm.speed, base_frame })
+    let told = args.arm.height.told(workcell.table_height_m);
+    Ok(GraspSettings { workcell, camera, told, speed: args.arm.speed, base_frame })
 }

@@ -1,0 +1,31 @@
+//! How the height of parts is found out: measured by a camera on the hand, or told.
+
+use sdg_grasp::GraspModel;
+use sdg_robot::CameraPose;
+use sdg_robot::height::{HeightMeasurement, ToldHeight};
+
+use crate::placed_camera::PlacedCamera;
+
+/// How the height of a model's part is measured, with a camera on the hand and a model that knows lengths; `told` is z of the base, m.
+pub fn height_measurement(
+    model: &GraspModel,
+    camera: &PlacedCamera,
+    told: Option<ToldHeight>,
+) -> Option<HeightMeasurement> {
+    let lengths = model.facts().lengths?;
+    let measurement = HeightMeasurement::new(lengths.mark_height_m, lengths.grasp_height_m);
+    matches!(camera.pose, CameraPose::OnFlange(_)).then_some(HeightMeasurement { told, ..measurement })
+}
+
+impl PlacedCamera {
+    /// A camera beside the robot, for parts whose marks are as high as told (z of the base, m) instead of as high over the table as the model
+    /// knows. A camera on the hand measures.
+    pub fn with_marks_at(self, model: &GraspModel, told: Option<&ToldHeight>) -> Self {
+        match (self.pose, model.facts().lengths, told) {
+            (CameraPose::InBase(_), Some(lengths), Some(told)) => {
+                Self { table_height_m: told.height_m - lengths.mark_height_m, ..self }
+            }
+            _ => self,
+        }
+    }
+}

@@ -1,0 +1,115 @@
+//! Told and measured: the more certain of both, unless they contradict each other.
+
+use super::triangulation::MeasuredHeight;
+
+/// Told and measured heights may differ by so many standard deviations of their difference.
+const MAX_SIGMAS: f64 = 3.0;
+
+/// A height of the marks that was told; z of the base.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ToldHeight {
+    /// Height, m.
+    pub height_m: f64,
+    /// Its standard deviation, m.
+    pub sigma_m: f64,
+}
+
+/// Where a height is from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum HeightSource {
+    /// From two pictures.
+    Measured,
+    /// Told.
+    Told,
+}
+
+impl HeightSource {
+    /// The name in JSON.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Measured => "measured",
+            Self::Told => "told",
+        }
+    }
+}
+
+/// The height of the marks that a grasp uses; z of the base.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SettledHeight {
+    /// Height, m.
+    pub height_m: f64,
+    /// Its standard deviation, m.
+    pub sigma_m: f64,
+    /// Where it is from.
+    pub source: HeightSource,
+}
+
+/// The more certain of both heights; the measured one where both are as certain.
+///
+/// # Errors
+/// Why there is none, in one sentence: neither is there (`why_not` measured), or they differ by more than three standard deviations.
+pub fn settle(
+    told: Option<ToldHeight>,
+    measured: Option<MeasuredHeight>,
+    why_not: Option<&str>,
+) -> Result<SettledHeight, String> {
+    let by_told = |ToldHeight { height_m, sigma_m }| SettledHeight { height_m, sigma_m, source: HeightSource::Told };
+    let by_measurement =
+        |MeasuredHeight { height_m, sigma_m }| SettledHeight { height_m, sigma_m, source: HeightSource::Measured };
+    let (told, measured) = match (told, measured) {
+        (Some(told), Some(measured)) => (told, measured),
+        (Some(told), None) => return Ok(by_told(told)),
+        (None, Some(measured)) => return Ok(by_measurement(measured)),
+        (None, None) => {
+            let why = why_not.unwrap_or("no picture was taken for it");
+            return Err(format!("the height of the part was not measured, and none was told: {why}"));
+        }
+    };
+    let [apart_mm, told_mm, measured_mm] =
+        [(told.height_m - measured.height_m).abs(), told.height_m, measured.height_m].map(|length| length * 1e3);
+    let max_mm = MAX_SIGMAS * told.sigma_m.hypot(measured.sigma_m) * 1e3;
+    if apart_mm > max_mm {
+        let [told_sigma_mm, measured_sigma_mm] = [told.sigma_m, measured.sigma_m].map(|sigma| sigma * 1e3);
+        return Err(format!(
+            "expected marks at the told height of {told_mm:.1} ± {told_sigma_mm:.1} mm, measured {measured_mm:.1} ± \
+             {measured_sigma_mm:.1} mm: at most {max_mm:.1} mm apart are allowed, found {apart_mm:.1} mm"
+        ));
+    }
+    Ok(if told.sigma_m < measured.sigma_m { by_told(told) } else { by_measurement(measured) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn told(height_mm: f64, sigma_mm: f64) -> Option<ToldHeight> {
+        Some(ToldHeight { height_m: 1e-3 * height_mm, sigma_m: 1e-3 * sigma_mm })
+    }
+
+    fn measured(height_mm: f64, sigma_mm: f64) -> Option<MeasuredHeight> {
+        Some(MeasuredHeight { height_m: 1e-3 * height_mm, sigma_m: 1e-3 * sigma_mm })
+    }
+
+    #[test]
+    fn the_more_certain_of_both_is_used() {
+        let source = |told, measured| settle(told, measured, None).unwrap().source;
+        assert_eq!(source(told(16.0, 0.3), measured(17.0, 0.8)), HeightSource::Told);
+        assert_eq!(source(told(16.0, 2.0), measured(17.0, 0.8)), HeightSource::Measured);
+        assert_eq!(source(told(16.0, 0.3), None), HeightSource::Told);
+        assert_eq!(source(None, measured(17.0, 0.8)), HeightSource::Measured);
+    }
+
+    #[test]
+    fn heights_that_contradict_each_other_are_refused() {
+        // 3 √(0.6² + 0.8²) = 3 mm.
+        assert!(settle(told(16.0, 0.6), measured(18.99, 0.8), None).is_ok());
+        let why = settle(told(16.0, 0.6), measured(19.01, 0.8), None).unwrap_err();
+        assert!(why.contains("told height of 16.0 ± 0.6 mm, measured 19.0 ± 0.8 mm: at most 3.0 mm apart"), "{why}");
+    }
+
+    #[test]
+    fn without_any_height_the_reason_is_told() {
+        let why = settle(None, None, Some("the second picture does not show the part")).unwrap_err();
+        assert!(why.ends_with("none was told: the second picture does not show the part"), "{why}");
+    }
+}

@@ -1,0 +1,175 @@
+//! Two lines of sight to one part give its height.
+//!
+//! ```text
+//! height = where the lines of sight come nearest     sigma² = (places' sigmas / difference of the slopes)² + relief²
+//! ```
+//! A slope is how far a line of sight goes sideways for a metre downwards: two of 0.12 m apart at 0.27 m differ by 0.44. The relief is what no picture
+//! tells: walls, feet and rims are edges, too, so a part is seen a little above or below its marks, the same way each time.
+//!
+//! Sizes in both pictures say which of several parts is the same, and nothing more: they err by more (docs/robot.md).
+
+use super::sighting::Sighting;
+
+/// The camera has to move so far sideways at least, m.
+pub const MIN_BASELINE_M: f64 = 0.080;
+/// Lines of sight whose slopes differ by less are as good as parallel: 80 mm at 0.8 m.
+const MIN_SLOPE_DIFFERENCE: f64 = 0.1;
+/// Lines of sight to one part pass each other within so many standard deviations, and within so much, m: hands and eyes are not calibrated better.
+const MAX_MISS_SIGMAS: f64 = 4.0;
+const MIN_MISS_ALLOWED_M: f64 = 0.004;
+/// A part lies at least so far below the cameras, m.
+const MIN_DISTANCE_M: f64 = 0.05;
+
+/// How far a part may be seen above or below its marks, one standard deviation, m: fitted on the twelve shipped parts, which by their lines of sight
+/// lie 3.2 mm below to 3.9 mm above their marks (`heights raw 4 101`).
+pub const RELIEF_M: f64 = 2.3e-3;
+
+/// The height of a part's marks, z of the base.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MeasuredHeight {
+    /// Height, m.
+    pub height_m: f64,
+    /// Its standard deviation, m.
+    pub sigma_m: f64,
+}
+
+/// Measurements that differ by more standard deviations are of different things.
+const MAX_APART_SIGMAS: f64 = 4.0;
+
+impl MeasuredHeight {
+    /// The mean of two independent measurements, each weighted by its variance; `None` where they contradict each other.
+    pub fn mean(&self, other: &Self) -> Option<Self> {
+        let apart_m = (self.height_m - other.height_m).abs();
+        let [own, others] = [self.sigma_m, other.sigma_m].map(|sigma_m| sigma_m.powi(-2));
+        (apart_m <= MAX_APART_SIGMAS * self.sigma_m.hypot(other.sigma_m)).then(|| Self {
+            height_m: (self.height_m * own + other.height_m * others) / (own + others),
+            sigma_m: (own + others).sqrt().recip(),
+        })
+    }
+}
+
+/// Why two pictures give no height.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
+pub enum HeightError {
+    /// The camera did not move far enough.
+    #[error(
+        "expected two pictures from places at least {:.0} mm apart sideways, found {:.1} mm",
+        MIN_BASELINE_M * 1e3,
+        .apart_m * 1e3
+    )]
+    SamePlace { apart_m: f64 },
+    /// Both lines of sight have nearly the same direction.
+    #[error("expected lines of sight whose slopes differ by {MIN_SLOPE_DIFFERENCE} or more, found {difference:.3}")]
+    Parallel { difference: f64 },
+    /// They cross above a camera, or right below it.
+    #[error(
+        "expected a part at least {:.0} mm below the camera, which is {:.0} mm high, found lines of sight that cross at {:.0} mm",
+        MIN_DISTANCE_M * 1e3,
+        .camera_m * 1e3,
+        .height_m * 1e3
+    )]
+    BehindCamera { height_m: f64, camera_m: f64 },
+    /// They do not cross: two parts.
+    #[error("expected lines of sight that pass each other within {:.1} mm, found {:.1} mm: two parts", .max_m * 1e3, .miss_m * 1e3)]
+    OtherPart { miss_m: f64, max_m: f64 },
+    /// A number that is none.
+    #[error("expected finite places and sizes, and sigmas above 0")]
+    NotFinite,
+}
+
+/// Height of the marks of a part that two pictures show, with a relief of so much, m.
+///
+/// # Errors
+/// [`HeightError`]: pictures from one place, lines of sight that are parallel, cross above a camera or pass each other.
+pub fn triangulate(one: &Sighting, other: &Sighting, relief_m: f64) -> Result<MeasuredHeight, HeightError> {
+    let is_sound = |sighting: &Sighting| {
+        let finite = sighting.camera_m.iter().chain(sighting.middle_m.iter()).all(|value| value.is_finite());
+        let size = sighting.size.is_none_or(|size| size.is_finite() && size > 0.0 && sighting.size_sigma > 0.0);
+        finite && size && sighting.place_sigma_m > 0.0 && sighting.place_sigma_m.is_finite()
+    };
+    if !(is_sound(one) && is_sound(other)) {
+        return Err(HeightError::NotFinite);
+    }
+    let lowest_camera_m = one.camera_m.z.min(other.camera_m.z);
+    if let Some(behind) = [one, other].into_iter().find(|sighting| sighting.distance_m() < MIN_DISTANCE_M) {
+        return Err(HeightError::BehindCamera { height_m: behind.middle_m.z, camera_m: behind.camera_m.z });
+    }
+    let apart_m = (one.camera_m - other.camera_m).xy().norm();
+    if apart_m < MIN_BASELINE_M {
+        return Err(HeightError::SamePlace { apart_m });
+    }
+    // A line of sight is at a + b z for a height z.
+    let [b_one, b_other] = [one, other].map(|sighting| -sighting.slope());
+    let [a_one, a_other] =
+        [(one, b_one), (other, b_other)].map(|(sighting, b)| sighting.middle_m.xy().coords - b * sighting.middle_m.z);
+    let (a, b) = (a_one - a_other, b_one - b_other);
+    let difference = b.norm();
+    if difference < MIN_SLOPE_DIFFERENCE {
+        return Err(HeightError::Parallel { difference });
+    }
+    let crossing_m = -b.dot(&a) / b.norm_squared();
+    if crossing_m > lowest_camera_m - MIN_DISTANCE_M {
+        return Err(HeightError::BehindCamera { height_m: crossing_m, camera_m: lowest_camera_m });
+    }
+    let [one, other] = [one, other].map(|sighting| sighting.at_height(crossing_m));
+    let apart_sigma_m = one.place_sigma_m.hypot(other.place_sigma_m);
+    let miss_m = (a + b * crossing_m).norm();
+    let max_m = (MAX_MISS_SIGMAS * apart_sigma_m).max(MIN_MISS_ALLOWED_M);
+    if miss_m > max_m {
+        return Err(HeightError::OtherPart { miss_m, max_m });
+    }
+    Ok(MeasuredHeight { height_m: crossing_m, sigma_m: (apart_sigma_m / difference).hypot(relief_m) })
+}
+
+/// The same where each picture shows several parts: of all pairs the one that is most likely one part. Their order says nothing.
+///
+/// # Errors
+/// That of the best pair where none gives a height.
+pub fn triangulate_nearest(
+    ones: &[Sighting],
+    others: &[Sighting],
+    relief_m: f64,
+) -> Option<Result<(MeasuredHeight, [Sighting; 2]), HeightError>> {
+    let mut best: Option<(f64, MeasuredHeight, [Sighting; 2])> = None;
+    let mut error = None;
+    for one in ones {
+        for other in others {
+            match triangulate(one, other, relief_m) {
+                Ok(height) => {
+                    let misfit = misfit(one, other, &height);
+                    if best.as_ref().is_none_or(|(least, ..)| misfit < *least) {
+                        best = Some((misfit, height, [*one, *other]));
+                    }
+                }
+                Err(found) => {
+                    error.get_or_insert(found);
+                }
+            }
+        }
+    }
+    match (best, error) {
+        (Some((_, height, pair)), _) => Some(Ok((height, pair))),
+        (None, error) => error.map(Err),
+    }
+}
+
+/// Standard deviation that is added to each height by size, m: what it does not know of walls.
+const SIZE_LEEWAY_M: f64 = 0.004;
+
+/// By how many variances a pair contradicts itself: in the miss of the lines of sight, and where sizes say another height than their crossing.
+fn misfit(one: &Sighting, other: &Sighting, height: &MeasuredHeight) -> f64 {
+    let [one, other] = [one, other].map(|sighting| sighting.at_height(height.height_m));
+    let miss_m = (one.middle_m - other.middle_m).norm();
+    let place = (miss_m / one.place_sigma_m.hypot(other.place_sigma_m)).powi(2);
+    let sizes = [one, other].into_iter().filter_map(|sighting| {
+        let beside_m = sighting.height_by_size_m()? - height.height_m;
+        let sigma_m = (sighting.distance_m() * sighting.size_sigma).hypot(SIZE_LEEWAY_M);
+        Some((beside_m / sigma_m).powi(2))
+    });
+    place + sizes.sum::<f64>()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,63 @@
+//! Perception for an arm that moves nothing: the part is where it was seen, wherever the arm is.
+
+use nalgebra::{Isometry3, Point3};
+use sdg_kinematics::Panda;
+
+use crate::Arm;
+use crate::error::Result;
+use crate::height::{MeasuredHeight, Sighting};
+use crate::perception::{GraspTarget, PartFinder};
+use crate::planned_arm::PlannedArm;
+use crate::sequence::{CameraMount, GraspConfig};
+
+/// Places and sizes are exact to so much, m and as a share.
+const EXACT: f64 = 1e-4;
+
+/// Finds the same target, or none, wherever the arm is.
+#[derive(Debug, Clone, Copy)]
+pub struct KnownTarget {
+    target: Option<GraspTarget>,
+    mount: CameraMount,
+    /// How far the grasp lies below the marks, m.
+    marks_over_grasp_m: f64,
+}
+
+impl KnownTarget {
+    /// A target that was seen, for a sequence with this camera and configuration.
+    pub fn new(target: Option<GraspTarget>, mount: CameraMount, config: &GraspConfig) -> Self {
+        let marks_over_grasp_m = config.height.map_or(0.0, |height| height.marks_over_grasp_m());
+        Self { target, mount, marks_over_grasp_m }
+    }
+}
+
+impl PartFinder<PlannedArm> for KnownTarget {
+    fn find(&mut self, _arm: &mut PlannedArm) -> Result<Option<GraspTarget>> {
+        Ok(self.target)
+    }
+
+    /// What was put down lies where it was to lie.
+    fn find_nearest(&mut self, _arm: &mut PlannedArm, base_from_tcp: &Isometry3<f64>) -> Result<Option<GraspTarget>> {
+        Ok(self.target.map(|target| GraspTarget { base_from_tcp: *base_from_tcp, ..target }))
+    }
+
+    fn sight(&mut self, arm: &mut PlannedArm, _expected: &GraspTarget) -> Result<Vec<Sighting>> {
+        let CameraMount::Hand { tcp_from_camera } = self.mount else { return Ok(Vec::new()) };
+        let base_from_camera = Panda::new().forward(&arm.state()?.q) * tcp_from_camera;
+        let sighting = |target: GraspTarget| {
+            let p = target.base_from_tcp.translation;
+            Sighting {
+                camera_m: base_from_camera.translation.vector.into(),
+                middle_m: Point3::new(p.x, p.y, p.z + self.marks_over_grasp_m),
+                place_sigma_m: EXACT,
+                size: Some(1.0),
+                size_sigma: EXACT,
+                target,
+            }
+        };
+        Ok(self.target.map(sighting).into_iter().collect())
+    }
+
+    fn surface_beside(&mut self, _pair: &[Sighting; 2], expected: &MeasuredHeight) -> Result<Option<MeasuredHeight>> {
+        Ok(Some(MeasuredHeight { sigma_m: EXACT, ..*expected }))
+    }
+}

@@ -1,0 +1,168 @@
+//! Two pictures on the way down, from places beside each other: the height of the part.
+
+use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
+use sdg_geometry::Angle;
+
+use super::{Sequence, Steps, Stop};
+use crate::arm::Arm;
+use crate::height::{
+    HeightError, HeightMeasurement, HeightReport, HeightSource, MIN_BASELINE_M, MeasuredHeight, Sighting, settle,
+    triangulate_nearest,
+};
+use crate::perception::{GraspStep, GraspTarget};
+
+/// The camera is at least so far from the part, m: nearer, pictures show too little of it.
+const MIN_DISTANCE_M: f64 = 0.18;
+
+/// Share of the way sideways of a picture in place of one that showed nothing: with the one on the other side it is far enough apart.
+const NEARER: f64 = 0.5;
+
+impl<A: Arm> Sequence<'_, '_, A> {
+    /// Measures how high the part lies, where that is asked for; the grasp at that height.
+    pub(super) fn measure_height(&mut self, seen: &GraspTarget) -> Steps<GraspTarget> {
+        let Some(measurement) = self.config.height else { return Ok(*seen) };
+        let mut report = HeightReport::default();
+        let measured = self.look_from_two_places(seen, &measurement, &mut report);
+        let measured = match measured {
+            Ok(measured) => Ok(measured),
+            // The arm stands still and may go on.
+            Err(Stop::Failed(_, why)) if self.robot.latched().is_none() => Err(why),
+            Err(stop) => return Err(stop),
+        };
+        report.measured = measured.as_ref().ok().map(|(height, _)| *height);
+        report.why_not = measured.as_ref().err().cloned();
+        let settled = settle(measurement.told, report.measured, report.why_not.as_deref());
+        report.settled = settled.as_ref().ok().copied();
+        let sightings = match measured {
+            Ok((_, pair)) => pair.to_vec(),
+            Err(_) => report.sightings.clone(),
+        };
+        self.height = Some(report);
+        let settled = settled.map_err(|why| Stop::Failed(GraspStep::Detect, why))?;
+        self.surface_m = Some(settled.height_m - measurement.mark_height_m);
+        let target = match (settled.source, &sightings[..]) {
+            (HeightSource::Measured, [..]) => between(&sightings, settled.height_m),
+            // What one picture showed is nearer to the part than the look before it.
+            (HeightSource::Told, [nearer]) => Some(nearer.at_height(settled.height_m).target),
+            (HeightSource::Told, []) => None,
+            (HeightSource::Told, several) => between(several, settled.height_m),
+        };
+        let mut target = target.unwrap_or(*seen);
+        target.base_from_tcp.translation.z = settled.height_m - measurement.marks_over_grasp_m();
+        self.targets.push(Some(target));
+        self.passed(GraspStep::Detect)?;
+        Ok(target)
+    }
+
+    /// Takes pictures across the marked line, then along it, until two of them give a height by what lies beside the part: along wooden grain only one of
+    /// both directions does. Else the part's own height is the best there is.
+    fn look_from_two_places(
+        &mut self,
+        seen: &GraspTarget,
+        measurement: &HeightMeasurement,
+        report: &mut HeightReport,
+    ) -> Steps<(MeasuredHeight, [Sighting; 2])> {
+        let table_height_m = self.robot.limits().table_height_m;
+        let camera_m = table_height_m + measurement.camera_height_m;
+        let marks_m = seen.base_from_tcp.translation.z + measurement.marks_over_grasp_m();
+        if camera_m - marks_m < MIN_DISTANCE_M {
+            let [distance_mm, min_mm, camera_mm] =
+                [camera_m - marks_m, MIN_DISTANCE_M, measurement.camera_height_m].map(|length| length * 1e3);
+            return Err(fails(format!(
+                "from {camera_mm:.0} mm above the table the part is {distance_mm:.0} mm away, expected at least {min_mm:.0} mm"
+            )));
+        }
+        let half_m = 0.5 * measurement.baseline_m;
+        let (mut pictures, mut why): (Vec<Vec<Sighting>>, Option<String>) = (Vec::new(), None);
+        let mut by_part: Option<(MeasuredHeight, [Sighting; 2])> = None;
+        // Where one of the first two shows nothing, the next is nearer to the part: long parts fill the picture, and gloss moves.
+        let nearer_m = NEARER * half_m;
+        let mut shown_at_m = None;
+        for [across_m, along_m] in
+            [[half_m, 0.0], [-half_m, 0.0], [nearer_m, 0.0], [-nearer_m, 0.0], [0.0, half_m], [0.0, -half_m]]
+        {
+            let is_nearer = across_m.abs() == nearer_m;
+            if is_nearer && (pictures.len() != 1 || shown_at_m.is_some_and(|shown_m: f64| shown_m * across_m > 0.0)) {
+                continue;
+            }
+            if let Err(stop) = self.go_beside(seen, [along_m, across_m], measurement.camera_height_m) {
+                match stop {
+                    Stop::Failed(_, because) if self.robot.latched().is_none() => {
+                        why.get_or_insert(because);
+                        continue;
+                    }
+                    stop => return Err(stop),
+                }
+            }
+            let shown = self.finder.sight(self.robot.arm(), seen)?;
+            self.picture_time = self.finder.picture_time();
+            if shown.is_empty() {
+                let which = if pictures.is_empty() { "first" } else { "second" };
+                why.get_or_insert(format!("the {which} picture does not show the part"));
+                continue;
+            }
+            for earlier in &pictures {
+                match triangulate_nearest(earlier, &shown, measurement.relief_m) {
+                    Some(Ok((height, pair))) => {
+                        let surface_m = height.height_m - measurement.mark_height_m;
+                        let expected = MeasuredHeight { height_m: surface_m, ..height };
+                        let surface = self.finder.surface_beside(&pair, &expected)?;
+                        let (first, _) = by_part.get_or_insert((height, pair));
+                        report.by_part = Some(*first);
+                        if let Some(surface) = surface {
+                            report.sightings.extend(pair);
+                            return Ok((measurement.combined(&height, &surface), pair));
+                        }
+                    }
+                    // Pictures at a right angle to each other may be too near.
+                    Some(Err(error @ HeightError::SamePlace { .. })) => why = why.or(Some(error.to_string())),
+                    Some(Err(error)) => why = Some(error.to_string()),
+                    None => {}
+                }
+            }
+            pictures.push(shown);
+            shown_at_m.get_or_insert(across_m);
+        }
+        if let Some((height, pair)) = by_part {
+            report.sightings.extend(pair);
+            return Ok((height, pair));
+        }
+        report.sightings.extend(pictures.iter().filter_map(|shown| shown.first()));
+        let min_mm = MIN_BASELINE_M * 1e3;
+        Err(fails(why.unwrap_or_else(|| format!("no two pictures from places {min_mm:.0} mm apart show the part"))))
+    }
+
+    /// Puts the camera beside a part (m along and across its marked line), looking down, the hand turned to it.
+    fn go_beside(&mut self, seen: &GraspTarget, [along_m, across_m]: [f64; 2], height_m: f64) -> Steps<()> {
+        let beside = seen.base_from_tcp.rotation * Vector3::new(along_m, across_m, 0.0);
+        self.look_down(&[seen.base_from_tcp], [beside.x, beside.y], height_m, GraspStep::Hover)
+    }
+}
+
+/// The grasp between those of several pictures of one part, with its marks at a height; `None` without pictures.
+fn between(sightings: &[Sighting], height_m: f64) -> Option<GraspTarget> {
+    let targets: Vec<GraspTarget> = sightings.iter().map(|sighting| sighting.at_height(height_m).target).collect();
+    let first = *targets.first()?;
+    let yaw = |target: &GraspTarget| {
+        let along = target.base_from_tcp.rotation * Vector3::x();
+        Angle::from_direction(along.x, along.y)
+    };
+    let share = 1.0 / targets.len() as f64;
+    let (mut middle, mut turn_rad, mut width_m, mut score) = (Vector3::zeros(), 0.0, 0.0, f64::INFINITY);
+    for target in &targets {
+        middle += target.base_from_tcp.translation.vector * share;
+        turn_rad += (yaw(target) - yaw(&first)).radians() * share;
+        width_m += target.jaw_width_m * share;
+        score = target.score.min(score);
+    }
+    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), turn_rad);
+    let base_from_tcp = Isometry3::from_parts(Point3::from(middle).into(), turn * first.base_from_tcp.rotation);
+    Some(GraspTarget { base_from_tcp, jaw_width_m: width_m, score })
+}
+
+fn fails(why: String) -> Stop {
+    Stop::Failed(GraspStep::Detect, why)
+}
+
+#[cfg(test)]
+mod tests;

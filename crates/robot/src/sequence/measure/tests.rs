@@ -1,0 +1,161 @@
+//! The sequence with an arm that moves nothing and a part that is shown in some pictures and not in others.
+
+use nalgebra::UnitQuaternion;
+use sdg_kinematics::{Panda, ready_pose};
+
+use super::*;
+use crate::height::ToldHeight;
+use crate::known_target::KnownTarget;
+use crate::perception::PartFinder;
+use crate::planned_arm::{PlannedAction, PlannedArm};
+use crate::robot::Robot;
+use crate::safety::SafetyLimits;
+use crate::sequence::{CameraMount, GraspConfig, GraspOutcome, GraspReport, grasp};
+use crate::watch::Watch;
+
+/// A part whose looks say another height than it has: by its lines of sight it lies where `known` does.
+struct Shown {
+    known: KnownTarget,
+    seen: GraspTarget,
+    /// Which of the pictures for the height show it; the last holds for all further ones.
+    shows: Vec<bool>,
+    num_sights: usize,
+    sees_surface: bool,
+}
+
+impl PartFinder<PlannedArm> for Shown {
+    fn find(&mut self, _arm: &mut PlannedArm) -> crate::Result<Option<GraspTarget>> {
+        Ok(Some(self.seen))
+    }
+
+    fn sight(&mut self, arm: &mut PlannedArm, expected: &GraspTarget) -> crate::Result<Vec<Sighting>> {
+        let is_shown = self.shows.get(self.num_sights).or(self.shows.last()).copied().unwrap_or(true);
+        self.num_sights += 1;
+        if is_shown { self.known.sight(arm, expected) } else { Ok(Vec::new()) }
+    }
+
+    fn surface_beside(
+        &mut self,
+        pair: &[Sighting; 2],
+        expected: &MeasuredHeight,
+    ) -> crate::Result<Option<MeasuredHeight>> {
+        let surface = self.known.surface_beside(pair, expected)?;
+        Ok(surface.filter(|_| self.sees_surface))
+    }
+}
+
+/// Marks 16 mm and grasp 9 mm over what the part lies on.
+const HEIGHTS_M: [f64; 2] = [0.016, 0.009];
+
+fn mount() -> CameraMount {
+    CameraMount::Hand { tcp_from_camera: Isometry3::translation(0.072, 0.0, -0.0534) }
+}
+
+fn config(told: Option<ToldHeight>) -> GraspConfig {
+    let height = HeightMeasurement { told, ..HeightMeasurement::new(HEIGHTS_M[0], HEIGHTS_M[1]) };
+    GraspConfig { height: Some(height), ..GraspConfig::default() }
+}
+
+/// A part on something `higher_m` over the table.
+fn part(higher_m: f64) -> GraspTarget {
+    let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+    let base_from_tcp = Isometry3::from_parts(Vector3::new(0.5, 0.05, higher_m + HEIGHTS_M[1]).into(), down);
+    GraspTarget { base_from_tcp, jaw_width_m: 0.02, score: 0.9 }
+}
+
+/// Grasps a part that lies 20 mm higher than the table and is seen 5 mm higher than it lies; the camera's places for the height.
+fn grasped(config: &GraspConfig, shows: &[bool], sees_surface: bool) -> (GraspReport, Vec<Vector3<f64>>, usize) {
+    let mut arm = PlannedArm::new(ready_pose(), 0.08);
+    let mut robot = Robot::new(&mut arm, SafetyLimits::default(), Watch::default());
+    let known = KnownTarget::new(Some(part(0.020)), mount(), config);
+    let mut finder = Shown { known, seen: part(0.025), shows: shows.to_vec(), num_sights: 0, sees_surface };
+    let report = grasp(&mut robot, &mut finder, &mut (), mount(), config).unwrap();
+    let num_sights = finder.num_sights;
+    let CameraMount::Hand { tcp_from_camera } = mount() else { unreachable!() };
+    let places = arm.actions().iter().filter_map(|action| match action {
+        PlannedAction::Motion(motion) => {
+            Some((Panda::new().forward(motion.end()) * tcp_from_camera).translation.vector)
+        }
+        _ => None,
+    });
+    // The look-out and the look from above come first.
+    let places: Vec<Vector3<f64>> = places.skip(2).take(num_sights).collect();
+    (report, places, num_sights)
+}
+
+#[test]
+fn two_pictures_below_300_mm_give_the_height() {
+    let (report, places, num_sights) = grasped(&config(None), &[], true);
+    assert_eq!((&report.outcome, num_sights), (&GraspOutcome::Held, 2));
+    let height = report.height.unwrap();
+    assert!((height.settled.unwrap().height_m - 0.036).abs() < 1e-6, "{height:?}");
+    assert_eq!(height.settled.unwrap().source, HeightSource::Measured);
+    assert!(places.iter().all(|place| place.z <= 0.30 + 1e-4), "{places:?}");
+    assert!((places[0] - places[1]).xy().norm() >= 0.080, "{places:?}");
+    let target = report.targets.last().unwrap().unwrap().base_from_tcp.translation;
+    assert!((target.vector - part(0.020).base_from_tcp.translation.vector).norm() < 1e-6, "{target}");
+}
+
+#[test]
+fn where_nothing_is_seen_of_the_surface_the_other_direction_is_tried() {
+    let (report, places, num_sights) = grasped(&config(None), &[], false);
+    assert_eq!((&report.outcome, num_sights, places.len()), (&GraspOutcome::Held, 4, 4));
+    let measured = report.height.unwrap().measured.unwrap();
+    // By the part itself, whose relief is not known.
+    assert!((measured.height_m - 0.036).abs() < 1e-6 && measured.sigma_m > 2e-3, "{measured:?}");
+}
+
+#[test]
+fn a_picture_that_does_not_show_the_part_is_the_reason() {
+    let (report, _, num_sights) = grasped(&config(None), &[true, false], true);
+    let GraspOutcome::Failed { step: GraspStep::Detect, why } = report.outcome else { panic!("{report:?}") };
+    assert!(why.ends_with("none was told: the second picture does not show the part"), "{why}");
+    assert_eq!(num_sights, 5);
+    let (report, ..) = grasped(&config(None), &[false], true);
+    let GraspOutcome::Failed { why, .. } = report.outcome else { panic!("{report:?}") };
+    assert!(why.ends_with("the first picture does not show the part"), "{why}");
+    // A third picture, nearer to the part, is as good as the second; and one along the marked line.
+    for shows in [&[true, false, true][..], &[false, true, true], &[true, false, false, true]] {
+        let (report, places, num_sights) = grasped(&config(None), shows, true);
+        assert_eq!((report.outcome, num_sights), (GraspOutcome::Held, shows.len()));
+        let [.., last] = &places[..] else { panic!("{places:?}") };
+        let first = places[usize::from(!shows[0])];
+        assert!((first - last).xy().norm() >= 0.080, "{places:?}");
+    }
+}
+
+#[test]
+fn a_told_height_is_used_where_there_is_no_other_and_refused_where_it_contradicts() {
+    let told = |height_m: f64| Some(ToldHeight { height_m, sigma_m: 0.001 });
+    let (report, ..) = grasped(&config(told(0.030)), &[false], true);
+    assert_eq!(report.outcome, GraspOutcome::Held);
+    let settled = report.height.unwrap().settled.unwrap();
+    assert_eq!((settled.source, settled.height_m), (HeightSource::Told, 0.030));
+    let z_m = report.targets.last().unwrap().unwrap().base_from_tcp.translation.z;
+    assert!((z_m - 0.023).abs() < 1e-9, "{z_m}");
+
+    let (report, ..) = grasped(&config(told(0.030)), &[], true);
+    let GraspOutcome::Failed { step: GraspStep::Detect, why } = report.outcome else { panic!("{report:?}") };
+    assert!(why.starts_with("expected marks at the told height of 30.0 ± 1.0 mm, measured 36.0"), "{why}");
+    let (report, ..) = grasped(&config(told(0.0355)), &[], true);
+    assert_eq!(report.height.unwrap().settled.unwrap().source, HeightSource::Measured);
+}
+
+#[test]
+fn parts_near_the_camera_are_told() {
+    let high = HeightMeasurement::new(0.14, 0.009);
+    let (report, ..) = grasped(&GraspConfig { height: Some(high), ..GraspConfig::default() }, &[], true);
+    let GraspOutcome::Failed { why, .. } = report.outcome else { panic!("{report:?}") };
+    assert!(why.ends_with("from 300 mm above the table the part is 135 mm away, expected at least 180 mm"), "{why}");
+}
+
+#[test]
+fn a_camera_beside_the_robot_measures_nothing() {
+    let mut arm = PlannedArm::new(ready_pose(), 0.08);
+    let mut robot = Robot::new(&mut arm, SafetyLimits::default(), Watch::default());
+    let look_outs = vec![crate::LookOut::Joints(ready_pose())];
+    let config = GraspConfig { look_outs, ..config(None) };
+    let mut known = KnownTarget::new(Some(part(0.020)), CameraMount::Base, &config);
+    let report = grasp(&mut robot, &mut known, &mut (), CameraMount::Base, &config).unwrap();
+    assert_eq!((report.outcome, report.height), (GraspOutcome::Held, None));
+}
