@@ -4,7 +4,8 @@ use image::RgbImage;
 use sdg_geometry::PlanarSimilarity;
 use sdg_shape::Differences;
 
-use crate::model::{GraspDetection, GraspModel};
+use crate::detection::GraspDetection;
+use crate::model::GraspModel;
 use crate::sizes::SizeRange;
 use crate::verification::{SearchedImage, differences};
 

@@ -6,25 +6,21 @@
 //!                                    PlanarGrasp, score ─ of those on one part the best ─ verdict ─ evidence ─┘
 //! ```
 
-use std::iter::repeat;
 use std::ops::RangeInclusive;
 
 use burn::tensor::{Device, read_sync};
 use image::RgbImage;
-use nalgebra::Point2;
-use sdg_geometry::{BoundingBox, PlanarGrasp, PlanarSimilarity, Polygon, Slant};
-use sdg_shape::CloseLook;
+use sdg_geometry::Slant;
 
 use crate::calibrations::Calibrations;
 use crate::check_config::CheckConfig;
-use crate::colors::Colors;
+use crate::detection::{Found, GraspDetection, Placement};
 use crate::error::{GraspError, Result};
-use crate::evidence_kind::{Advice, EvidenceKind};
-use crate::facts::{ModelKind, TeachingFacts, TurnSource};
+use crate::facts::{ModelKind, TeachingFacts};
 use crate::models::{Network, PoseCandidate, Proposals};
 use crate::same_part::{SAME_PART_IOU, are_outlines_of_same_part};
 use crate::sighting::{Sighting, sightings};
-use crate::slanted::{LevelImage, explains_more, suggested_slants};
+use crate::slanted::{LevelImage, explains_more, suggested_slant};
 use crate::taught::TaughtDemonstration;
 use crate::verdict::{Clues, Contributions, judge_picture, judge_picture_of_sequence};
 use crate::verification::{PlacedDemonstration, SearchedImage, Shot};
@@ -51,53 +47,6 @@ pub enum Verification {
     ByShape,
     /// The network alone decides and places. Model S has no network: it looks as ever.
     Off,
-}
-
-/// One grasp found in an image; places in pixels of the image as given.
-#[derive(Debug, Clone, PartialEq)]
-pub struct GraspDetection {
-    /// Calibrated, in `[0, 1]`: at least 0.5 is accepted.
-    pub score: f64,
-    /// The network's own score, in `[0, 1]`; zero for what no network has seen (model S, what only the search found).
-    pub network_score: f64,
-    /// How well the demonstration agrees with the image there, in `[0, 1]`; `None` without verification.
-    pub agreement: Option<f64>,
-    /// What the score is made of; `None` without verification.
-    pub evidence: Option<Contributions>,
-    /// The box around the part.
-    pub bbox: BoundingBox,
-    /// Keypoints along the grasp line, each with the network's score; empty for models without.
-    pub keypoints: Vec<(Point2<f64>, f64)>,
-    /// The demonstration's outline as it lies in the image; `None` without verification.
-    pub outline: Option<Polygon>,
-    /// Grasp point, direction and width, in pixels.
-    pub grasp: PlanarGrasp,
-    /// What the turn was first read from.
-    pub turn_source: TurnSource,
-    /// Mean brightness there over that of the demonstration; 1 without verification.
-    pub light: f64,
-}
-
-impl GraspDetection {
-    /// Whether the part is there.
-    pub fn is_accepted(&self) -> bool {
-        self.score >= 0.5
-    }
-
-    /// Why it is not accepted, in words: the strongest objection. `None` for what is accepted.
-    pub fn refused(&self) -> Option<&'static str> {
-        if self.is_accepted() {
-            return None;
-        }
-        let Some(evidence) = &self.evidence else { return Some("the network is not sure") };
-        Some(evidence.strongest_objection().map_or("all evidence together is too weak", EvidenceKind::objection))
-    }
-
-    /// The further demonstration, or the setting, that would help where this is the part and was refused.
-    pub fn advice(&self) -> Option<Advice> {
-        let evidence = self.evidence.as_ref().filter(|_| !self.is_accepted())?;
-        evidence.advice(self.light)
-    }
 }
 
 impl GraspModel {
@@ -240,28 +189,26 @@ impl GraspModel {
 
     /// As a level camera sees it, or a slanted one where that explains the picture better.
     async fn find_at_any_slant(&self, image: &RgbImage) -> Result<Vec<Found>> {
-        let (level, slants) = self.find_at_slant(image, &Shot::level(image), true).await?;
-        for slant in slants {
-            let Some(made_level) = LevelImage::new(image, &slant) else { continue };
-            let (found, _) = self.find_at_slant(&made_level.image, &made_level.shot(), false).await?;
-            if explains_more(&found, &level) {
-                return Ok(found.into_iter().filter_map(|found| made_level.seen(found)).collect());
-            }
+        let (level, slant) = self.find_at_slant(image, &Shot::level(image), true).await?;
+        let Some(made_level) = slant.and_then(|slant| LevelImage::new(image, &slant)) else { return Ok(level) };
+        let (found, _) = self.find_at_slant(&made_level.image, &made_level.shot(), false).await?;
+        if explains_more(&found, &level) {
+            return Ok(found.into_iter().filter_map(|found| made_level.seen(found)).collect());
         }
         Ok(level)
     }
 
-    /// What is found in an image that was taken so, and what slants its best places suggest where they are asked for.
-    async fn find_at_slant(&self, image: &RgbImage, shot: &Shot, suggest: bool) -> Result<(Vec<Found>, Vec<Slant>)> {
+    /// What is found in an image that was taken so, and the slant that its best places suggest where it is asked for.
+    async fn find_at_slant(&self, image: &RgbImage, shot: &Shot, suggest: bool) -> Result<(Vec<Found>, Option<Slant>)> {
         let searched = SearchedImage::of(image, shot, &self.demonstrations);
         let proposals = match &self.network {
             Some(network) => network.proposals_async(image, &self.demonstrations).await?,
             None => Proposals::default(),
         };
         let sightings = sightings(&proposals, &searched);
-        let is_known = self.demonstrations[0].check().score.is_size_known;
-        let slants = if suggest && !is_known { suggested_slants(&sightings, &searched, shot) } else { Vec::new() };
-        Ok((self.judged(sightings), slants))
+        let is_asked = suggest && !self.demonstrations[0].check().score.is_size_known;
+        let slant = if is_asked { suggested_slant(image, &sightings, &searched) } else { None };
+        Ok((self.judged(sightings), slant))
     }
 
     fn unverified(&self, candidate: &PoseCandidate) -> GraspDetection {
@@ -316,74 +263,6 @@ impl GraspModel {
     }
 }
 
-/// A detection and what it was made of.
-pub(crate) struct Found {
-    pub(crate) detection: GraspDetection,
-    /// `None` without verification.
-    pub(crate) placement: Option<Placement>,
-}
-
-/// Where a demonstration lies in an image, and what else a later image of the sequence needs.
-#[derive(Debug, Clone)]
-pub(crate) struct Placement {
-    pub(crate) demonstration_idx: usize,
-    pub(crate) image_from_cutout: PlanarSimilarity,
-    pub(crate) image_from_marks: PlanarSimilarity,
-    /// Whether the image has colours.
-    pub(crate) colors: Colors,
-    pub(crate) agreement: f64,
-    pub(crate) close: Option<CloseLook>,
-    pub(crate) network_score: f64,
-    pub(crate) keypoint_scores: Vec<f64>,
-    pub(crate) turn_source: TurnSource,
-}
-
-impl Placement {
-    fn of(sighting: &Sighting<'_>) -> Self {
-        let PlacedDemonstration {
-            demonstration_idx,
-            image_from_cutout,
-            image_from_marks,
-            colors,
-            agreement,
-            evidence,
-            ..
-        } = sighting.placed;
-        Self {
-            demonstration_idx,
-            image_from_cutout,
-            image_from_marks,
-            colors,
-            agreement,
-            close: evidence.close,
-            network_score: sighting.network_score,
-            keypoint_scores: sighting.keypoint_scores.clone(),
-            turn_source: sighting.turn_source,
-        }
-    }
-}
-
-impl Sighting<'_> {
-    /// A detection as the demonstration says, where it lies.
-    pub(crate) fn detection(self, score: f64, evidence: Contributions, num_keypoints: usize) -> GraspDetection {
-        let PlacedDemonstration { demonstration, image_from_marks, agreement, .. } = self.placed;
-        let outline = self.placed.outline();
-        let marked = demonstration.keypoints().into_iter().map(|keypoint| image_from_marks.apply(&keypoint.point()));
-        GraspDetection {
-            score,
-            network_score: self.network_score,
-            agreement: Some(agreement),
-            evidence: Some(evidence),
-            bbox: outline.bounds(),
-            keypoints: marked.zip(self.keypoint_scores.into_iter().chain(repeat(0.0))).take(num_keypoints).collect(),
-            outline: Some(outline),
-            grasp: demonstration.grasp(&image_from_marks),
-            turn_source: self.turn_source,
-            light: self.placed.light,
-        }
-    }
-}
-
 /// Of detections of the same part the best one stays: by the overlap of their outlines, or of their boxes where there are no
 /// outlines. Of those that ended in the same pose it is the one that the network was surest of, and not a matter of the
 /// last bit.
@@ -415,7 +294,8 @@ pub(crate) fn are_of_same_part(one: &GraspDetection, other: &GraspDetection) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sdg_geometry::Angle;
+    use crate::facts::TurnSource;
+    use sdg_geometry::{Angle, BoundingBox, PlanarGrasp};
 
     fn detection(x: f64, score: f64, network_score: f64) -> GraspDetection {
         GraspDetection {

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::model::GraspDetection;
+use crate::detection::GraspDetection;
 use crate::{Contributions, ModelKind, TurnSource};
 
 /// A [`GraspDetection`] under the names that files and programs rely on; pixels and degrees.

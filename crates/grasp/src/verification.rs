@@ -304,6 +304,28 @@ pub(crate) fn foreshortening(searched: &SearchedImage<'_>, placed: &PlacedDemons
     sized.prepared.search.template().foreshortening(&view.field, &pose)
 }
 
+/// How well edges and surface agree where a placed demonstration lies in a window that was made level, refined there; `None` where
+/// its size is not looked for.
+pub(crate) fn agreement_in(
+    searched: &SearchedImage<'_>,
+    placed: &PlacedDemonstration<'_>,
+    window: &RgbImage,
+    window_point: impl Fn(&Point2<f64>) -> Option<Point2<f64>>,
+) -> Option<f64> {
+    let sized = searched.sized_for(placed.demonstration_idx, placed.image_from_cutout.scale)?;
+    let taught = placed.demonstration.outline(&PlanarSimilarity::IDENTITY).vertices;
+    let level: Option<Vec<_>> = placed.outline().vertices.iter().map(window_point).collect();
+    let pose = sized.view_from_working(&PlanarSimilarity::fit(&taught, &level?)?);
+    let mut image = Cow::Borrowed(window);
+    for _ in 0..sized.working.halvings {
+        image = Cow::Owned(halved(&image));
+    }
+    let field = GradientField::with_config(&image, &placed.demonstration.check().search.shape.gradient);
+    let table = &searched.views[sized.view_idx].table;
+    let comparison = sized.prepared.search.comparison(&Picture { image: &image, field: &field, table });
+    Some(comparison.agreement(&comparison.refined_by_edges(&pose)).both())
+}
+
 /// Where picture and demonstration differ at a pose, in pixels of the picture; `None` where its size is not looked for.
 pub(crate) fn differences(
     searched: &SearchedImage<'_>,

@@ -139,3 +139,48 @@ fn gather(level: &TemplateLevel, matched: &MatchedLevel<'_>, pose: &Affine, reac
     }
     Some(sightings)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::ShapeConfig;
+    use image::{Rgb, RgbImage};
+    use sdg_geometry::{BoundingBox, Polygon};
+
+    const MIDDLE: Point2<f64> = Point2::new(120.0, 100.0);
+
+    /// A dark plate of 100 × 60 pixels with a hole, shortened by a factor in a direction of the image.
+    fn plate(factor: f64, direction_deg: f64) -> RgbImage {
+        let (sin, cos) = direction_deg.to_radians().sin_cos();
+        RgbImage::from_fn(240, 200, |x, y| {
+            let samples = (0..16).map(|k| {
+                let [right, down] = [k % 4, k / 4].map(|k| f64::from(k) / 4.0 + 0.125);
+                let from = Vector2::new(f64::from(x) + right, f64::from(y) + down) - MIDDLE.coords;
+                let along = cos * from.x + sin * from.y;
+                let level = from + (along / factor - along) * Vector2::new(cos, sin);
+                let on_plate =
+                    level.x.abs() < 50.0 && level.y.abs() < 30.0 && (level.x - 30.0).hypot(level.y - 8.0) > 9.0;
+                if on_plate { 60.0 } else { 200.0 }
+            });
+            Rgb([(samples.sum::<f64>() / 16.0) as u8; 3])
+        })
+    }
+
+    #[test]
+    fn a_plate_seen_at_a_slant_is_shortened_where_and_as_much_as_it_is() {
+        let outline = Polygon::from_box(&BoundingBox { x1: 70.0, y1: 70.0, x2: 170.0, y2: 130.0 });
+        let template = ShapeTemplate::new(&plate(1.0, 0.0), &outline, &ShapeConfig::DEFAULT).unwrap();
+        let seen = |factor: f64, direction_deg: f64| {
+            let field = GradientField::new(&plate(factor, direction_deg));
+            template.foreshortening(&field, &PlanarSimilarity::IDENTITY).unwrap()
+        };
+        assert!(seen(1.0, 0.0).log_ratio < 0.01);
+        for (factor, direction_deg) in [(0.94, 30.0), (0.87, 100.0), (0.82, 0.0)] {
+            let found = seen(factor, direction_deg);
+            let off_deg =
+                (2.0 * (found.direction.degrees() - direction_deg)).to_radians().sin().asin().to_degrees() / 2.0;
+            assert!((found.log_ratio + factor.ln()).abs() < 0.02 && off_deg.abs() < 5.0, "{factor}: {found:?}");
+            assert!(found.consensus > found.level_consensus + 0.05, "{found:?}");
+        }
+    }
+}

@@ -5,9 +5,9 @@ use nalgebra::Point2;
 use sdg_demonstration::{Annotation, Demonstration};
 use sdg_geometry::{BoundingBox, GraspLine, PlanView, Polygon, PosedCamera};
 
-use super::picture::PlanMap;
 use super::{CameraOverTable, Lengths, plan_view, slant};
 use crate::error::{GraspError, Result};
+use crate::resampled::PlanMap;
 
 /// Photos and their marks in the plan view of the marks' plane, and how fine that is: as the first photo shows the part.
 ///

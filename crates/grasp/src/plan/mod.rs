@@ -9,7 +9,6 @@
 //! camera serves any other.
 
 mod demonstration;
-mod picture;
 mod uncertainty;
 
 use std::ops::RangeInclusive;
@@ -19,12 +18,12 @@ use nalgebra::{Isometry3, Point2, Point3, Rotation2, UnitQuaternion, Vector2, Ve
 use sdg_geometry::{Angle, BoundingBox, PlanView, PlanarGrasp, Polygon, PosedCamera, Workspace};
 
 pub use self::demonstration::{pictures_from_above, seen_from_above};
-pub(crate) use self::picture::PixelRect;
-use self::picture::PlanMap;
 pub use self::uncertainty::{Circumstances, ErrorLength, Uncertainty};
+use crate::detection::GraspDetection;
 use crate::error::{GraspError, Result};
 use crate::lengths::Lengths;
-use crate::model::{GraspDetection, GraspModel, Verification};
+use crate::model::{GraspModel, Verification};
+use crate::resampled::{PixelRect, PlanMap};
 
 /// A table and a camera over it.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -11,8 +11,9 @@ use sdg_layers::state_dict::{self, StateDict, WeightTensor};
 use super::tests::{demonstration, small_plan, taught};
 use super::*;
 use crate::check_config::CheckConfig;
+use crate::detection::GraspDetection;
 use crate::device::ComputeBackend;
-use crate::model::{GraspDetection, Verification};
+use crate::model::Verification;
 
 /// What a place may differ, in pixels of the image as given: a fifth of what half precision may move it.
 const PLACE_PX: f64 = 0.02;

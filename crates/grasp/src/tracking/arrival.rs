@@ -12,7 +12,7 @@ use super::detector::PartDetector;
 use super::follow::Effort;
 use super::frames::FrameBuffer;
 use super::track::{PastPose, Standing, Track};
-use crate::model::{Found, Placement};
+use crate::detection::{Found, Placement};
 use crate::same_part::are_outlines_of_same_part;
 
 /// A pose this far from that of its track is carried forward like one of another part: from the track's own pose a capture does

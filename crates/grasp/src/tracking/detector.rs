@@ -6,9 +6,11 @@ use image::{RgbImage, imageops};
 
 use burn::tensor::read_sync;
 
+use crate::detection::{Found, GraspDetection};
 use crate::error::Result;
-use crate::model::{Found, GraspDetection, GraspModel, Verification};
-use crate::plan::{PixelRect, PlanDetector, PlanarPose};
+use crate::model::{GraspModel, Verification};
+use crate::plan::{PlanDetector, PlanarPose};
+use crate::resampled::PixelRect;
 
 /// A model, and the plan view that it works in where the camera is calibrated.
 #[derive(Debug, Clone)]

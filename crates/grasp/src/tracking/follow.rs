@@ -15,9 +15,9 @@ use sdg_shape::{CloseLook, Evidence, GradientField, Picture, Reach, TableColors}
 
 use super::detector::PartDetector;
 use crate::colors::Colors;
-use crate::model::Placement;
-use crate::plan::PixelRect;
+use crate::detection::Placement;
 use crate::prepared::{Prepared, WorkingSize};
+use crate::resampled::PixelRect;
 use crate::sizes::{SizeRange, scaling};
 use crate::taught::TaughtDemonstration;
 

@@ -32,7 +32,7 @@ use std::time::Duration;
 
 pub use self::detector::{PartDetector, PartSearch, SearchOutcome};
 pub use self::tracker::Tracker;
-use crate::model::GraspDetection;
+use crate::detection::GraspDetection;
 use crate::plan::PlanarPose;
 
 /// Whether a part is where its track says.

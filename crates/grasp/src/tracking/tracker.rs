@@ -14,8 +14,9 @@ use super::follow::{Effort, Followed};
 use super::frames::{BufferedFrame, FrameBuffer};
 use super::track::{PastPose, Standing, Track};
 use super::{TrackState, TrackedPart, TrackerConfig};
+use crate::detection::{Found, GraspDetection};
 use crate::error::Result;
-use crate::model::{Found, GraspDetection, are_of_same_part};
+use crate::model::are_of_same_part;
 use crate::plan::PlanarPose;
 use crate::verdict::Clues;
 

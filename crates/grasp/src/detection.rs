@@ -1,0 +1,129 @@
+//! What is found in an image: a grasp with its score, and where the demonstration lies.
+
+use std::iter::repeat;
+
+use nalgebra::Point2;
+use sdg_geometry::{BoundingBox, PlanarGrasp, PlanarSimilarity, Polygon};
+use sdg_shape::CloseLook;
+
+use crate::colors::Colors;
+use crate::evidence_kind::{Advice, EvidenceKind};
+use crate::facts::TurnSource;
+use crate::sighting::Sighting;
+use crate::verdict::Contributions;
+use crate::verification::PlacedDemonstration;
+
+/// One grasp found in an image; places in pixels of the image as given.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GraspDetection {
+    /// Calibrated, in `[0, 1]`: at least 0.5 is accepted.
+    pub score: f64,
+    /// The network's own score, in `[0, 1]`; zero for what no network has seen (model S, what only the search found).
+    pub network_score: f64,
+    /// How well the demonstration agrees with the image there, in `[0, 1]`; `None` without verification.
+    pub agreement: Option<f64>,
+    /// What the score is made of; `None` without verification.
+    pub evidence: Option<Contributions>,
+    /// The box around the part.
+    pub bbox: BoundingBox,
+    /// Keypoints along the grasp line, each with the network's score; empty for models without.
+    pub keypoints: Vec<(Point2<f64>, f64)>,
+    /// The demonstration's outline as it lies in the image; `None` without verification.
+    pub outline: Option<Polygon>,
+    /// Grasp point, direction and width, in pixels.
+    pub grasp: PlanarGrasp,
+    /// What the turn was first read from.
+    pub turn_source: TurnSource,
+    /// Mean brightness there over that of the demonstration; 1 without verification.
+    pub light: f64,
+}
+
+impl GraspDetection {
+    /// Whether the part is there.
+    pub fn is_accepted(&self) -> bool {
+        self.score >= 0.5
+    }
+
+    /// Why it is not accepted, in words: the strongest objection. `None` for what is accepted.
+    pub fn refused(&self) -> Option<&'static str> {
+        if self.is_accepted() {
+            return None;
+        }
+        let Some(evidence) = &self.evidence else { return Some("the network is not sure") };
+        Some(evidence.strongest_objection().map_or("all evidence together is too weak", EvidenceKind::objection))
+    }
+
+    /// The further demonstration, or the setting, that would help where this is the part and was refused.
+    pub fn advice(&self) -> Option<Advice> {
+        let evidence = self.evidence.as_ref().filter(|_| !self.is_accepted())?;
+        evidence.advice(self.light)
+    }
+}
+
+/// A detection and what it was made of.
+pub(crate) struct Found {
+    pub(crate) detection: GraspDetection,
+    /// `None` without verification.
+    pub(crate) placement: Option<Placement>,
+}
+
+/// Where a demonstration lies in an image, and what else a later image of the sequence needs.
+#[derive(Debug, Clone)]
+pub(crate) struct Placement {
+    pub(crate) demonstration_idx: usize,
+    pub(crate) image_from_cutout: PlanarSimilarity,
+    pub(crate) image_from_marks: PlanarSimilarity,
+    /// Whether the image has colours.
+    pub(crate) colors: Colors,
+    pub(crate) agreement: f64,
+    pub(crate) close: Option<CloseLook>,
+    pub(crate) network_score: f64,
+    pub(crate) keypoint_scores: Vec<f64>,
+    pub(crate) turn_source: TurnSource,
+}
+
+impl Placement {
+    pub(crate) fn of(sighting: &Sighting<'_>) -> Self {
+        let PlacedDemonstration {
+            demonstration_idx,
+            image_from_cutout,
+            image_from_marks,
+            colors,
+            agreement,
+            evidence,
+            ..
+        } = sighting.placed;
+        Self {
+            demonstration_idx,
+            image_from_cutout,
+            image_from_marks,
+            colors,
+            agreement,
+            close: evidence.close,
+            network_score: sighting.network_score,
+            keypoint_scores: sighting.keypoint_scores.clone(),
+            turn_source: sighting.turn_source,
+        }
+    }
+}
+
+impl Sighting<'_> {
+    /// A detection as the demonstration says, where it lies.
+    pub(crate) fn detection(self, score: f64, evidence: Contributions, num_keypoints: usize) -> GraspDetection {
+        let PlacedDemonstration { demonstration, image_from_marks, agreement, .. } = self.placed;
+        let outline = self.placed.outline();
+        let marked = demonstration.keypoints().into_iter().map(|keypoint| image_from_marks.apply(&keypoint.point()));
+        GraspDetection {
+            score,
+            network_score: self.network_score,
+            agreement: Some(agreement),
+            evidence: Some(evidence),
+            bbox: outline.bounds(),
+            keypoints: marked.zip(self.keypoint_scores.into_iter().chain(repeat(0.0))).take(num_keypoints).collect(),
+            outline: Some(outline),
+            grasp: demonstration.grasp(&image_from_marks),
+            turn_source: self.turn_source,
+            light: self.placed.light,
+        }
+    }
+}
