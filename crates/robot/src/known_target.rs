@@ -5,8 +5,9 @@ use sdg_kinematics::Panda;
 
 use crate::Arm;
 use crate::error::Result;
+use crate::grasp_target::GraspTarget;
 use crate::height::{MeasuredHeight, Sighting};
-use crate::perception::{GraspTarget, PartFinder};
+use crate::perception::PartFinder;
 use crate::planned_arm::PlannedArm;
 use crate::sequence::{CameraMount, GraspConfig};
 

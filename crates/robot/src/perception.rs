@@ -7,19 +7,8 @@ use nalgebra::Isometry3;
 
 use crate::arm::Arm;
 use crate::error::Result;
+use crate::grasp_target::GraspTarget;
 use crate::height::{MeasuredHeight, Sighting};
-
-/// Where the hand should close, as perception sees it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct GraspTarget {
-    /// Pose of the tool centre point when closing, in the base frame, metres: z into the table, y
-    /// along the fingers' motion.
-    pub base_from_tcp: Isometry3<f64>,
-    /// Width of the part between the fingers, in metres.
-    pub jaw_width_m: f64,
-    /// How sure perception is, 0 to 1; 0.5 is where to decide.
-    pub score: f64,
-}
 
 /// Finds the grasp of the taught part with the arm where it stands.
 pub trait PartFinder<A: Arm> {

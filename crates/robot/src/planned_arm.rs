@@ -170,7 +170,8 @@ impl CompliantArm for PlannedArm {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::perception::{GraspTarget, PartFinder};
+    use crate::grasp_target::GraspTarget;
+    use crate::perception::PartFinder;
     use crate::robot::Robot;
     use crate::safety::SafetyLimits;
     use crate::sequence::{CameraMount, GraspConfig, GraspOutcome, grasp};

@@ -2,7 +2,7 @@
 
 use nalgebra::{Point2, Point3, Vector2};
 
-use crate::perception::GraspTarget;
+use crate::grasp_target::GraspTarget;
 
 /// A part in a picture, as if its marks lay in a plane that was assumed.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -4,8 +4,8 @@ use nalgebra::Isometry3;
 use sdg_kinematics::collision::Capsule;
 
 use super::config::GraspConfig;
+use crate::grasp_target::GraspTarget;
 use crate::part_shape::PartShape;
-use crate::perception::GraspTarget;
 
 /// What the hand holds, from when it closed.
 #[derive(Debug, Clone)]

@@ -11,7 +11,8 @@ use super::{Sequence, Steps, Stop, fails_at};
 use crate::arm::Arm;
 use crate::arm_state::{HandCommand, HandState, Load, MIN_HELD_WIDTH_M};
 use crate::error::RobotError;
-use crate::perception::{GraspStep, GraspTarget};
+use crate::grasp_target::GraspTarget;
+use crate::perception::GraspStep;
 
 /// Speed at which the opening changes when the hand closes, m/s.
 const CLOSING_SPEED_M_S: f64 = 0.1;

@@ -6,8 +6,9 @@ use sdg_kinematics::{HAND_OPENING_MAX_M, IkOptions, IkSolution, KinematicsError,
 use super::held_part::shape_of;
 use super::{SETTLE_SECS, Sequence, Steps, Stop, camera_looking_down};
 use crate::arm::Arm;
+use crate::grasp_target::GraspTarget;
 use crate::lying_part::LyingPart;
-use crate::perception::{GraspStep, GraspTarget};
+use crate::perception::GraspStep;
 use crate::surroundings::Destination;
 
 /// Where the camera looks from above the part: small shifts, so that it stays in the middle of the picture, m.

@@ -5,11 +5,12 @@ use sdg_geometry::Angle;
 
 use super::{Sequence, Steps, Stop};
 use crate::arm::Arm;
+use crate::grasp_target::GraspTarget;
 use crate::height::{
     HeightError, HeightMeasurement, HeightReport, HeightSource, MIN_BASELINE_M, MeasuredHeight, Sighting, settle,
     triangulate_nearest,
 };
-use crate::perception::{GraspStep, GraspTarget};
+use crate::perception::GraspStep;
 
 /// The camera is at least so far from the part, m: nearer, pictures show too little of it.
 const MIN_DISTANCE_M: f64 = 0.18;

@@ -28,9 +28,10 @@ use sdg_kinematics::{HAND_OPENING_MAX_M, Trajectory};
 use crate::arm::{Arm, CompliantArm};
 use crate::arm_state::HandState;
 use crate::error::{Result, RobotError};
+use crate::grasp_target::GraspTarget;
 use crate::height::HeightReport;
 use crate::lying_part::LyingParts;
-use crate::perception::{GraspStep, GraspTarget, PartFinder, StepObserver};
+use crate::perception::{GraspStep, PartFinder, StepObserver};
 use crate::robot::Robot;
 use crate::touch::{TouchDown, Touched};
 

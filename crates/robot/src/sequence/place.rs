@@ -20,8 +20,9 @@ use super::{CameraMount, GraspConfig, GraspOutcome, GraspReport, SETTLE_SECS, SU
 use crate::arm::{Arm, CompliantArm};
 use crate::arm_state::{HandCommand, Load};
 use crate::error::Result;
+use crate::grasp_target::GraspTarget;
 use crate::lying_part::LyingPart;
-use crate::perception::{GraspStep, GraspTarget, PartFinder, StepObserver};
+use crate::perception::{GraspStep, PartFinder, StepObserver};
 use crate::place::{PlaceError, PlaceGoal};
 use crate::robot::Robot;
 use crate::room::{release_opening_m, same_turns_rad};

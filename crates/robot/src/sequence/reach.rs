@@ -9,7 +9,8 @@ use super::{Sequence, Steps, Stop, fails_at};
 use crate::arm::Arm;
 use crate::arm_state::{ContactSensitivity, HandCommand};
 use crate::error::RobotError;
-use crate::perception::{GraspStep, GraspTarget};
+use crate::grasp_target::GraspTarget;
+use crate::perception::GraspStep;
 use crate::surroundings::{Destination, Way};
 use crate::touch::TouchDown;
 

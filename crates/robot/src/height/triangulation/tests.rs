@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Point3};
 use proptest::prelude::*;
 
 use super::*;
-use crate::perception::GraspTarget;
+use crate::grasp_target::GraspTarget;
 
 /// A camera at `[x, z]` over y = 0 shows a part that lies at (x, 0.02) and `height_m` in a plane, exactly.
 fn shown([camera_x_m, camera_z_m]: [f64; 2], part_x_m: f64, height_m: f64, plane_m: f64) -> Sighting {
