@@ -50,8 +50,7 @@ fn all_marks_are_made_and_corrected_by_keys() {
     assert!((b.center().x - a.center().x + 1.0).abs() < 0.02 && (b.center().y - a.center().y).abs() < 0.02);
 
     // Numbers are typed, too.
-    browser.run("const f = document.getElementById('grasp-width'); f.focus(); f.value = ''", &[]).unwrap();
-    browser.find("#grasp-width").unwrap().type_text("44\u{e004}").unwrap();
+    page.fill("#grasp-width", "44");
     assert_eq!(page.saved().jaw_width, Some(44.0));
 
     // Deleted and brought back.

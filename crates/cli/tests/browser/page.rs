@@ -73,6 +73,14 @@ impl Page {
         self.browser.find(css).unwrap().click().unwrap();
     }
 
+    /// Writes over what a field shows, by keys alone: the page may write a field that is not in focus at any time, and
+    /// one that is not shown yet takes no focus.
+    pub fn fill(&self, css: &str, text: &str) {
+        let shown = format!("return document.querySelector({css:?}).checkVisibility()");
+        self.wait_for("a field that is shown", &shown);
+        self.browser.find(css).unwrap().type_text(&format!("\u{e009}a\u{e000}{text}\u{e004}")).unwrap();
+    }
+
     pub fn text(&self, css: &str) -> String {
         let text = self.browser.run("return document.querySelector(arguments[0]).innerText", &[json!(css)]).unwrap();
         text.as_str().unwrap_or_default().to_owned()

@@ -41,9 +41,7 @@ fn assert_light(page: &Page) {
 
 fn mark(page: &Page) {
     let browser = &page.browser;
-    // Focused first: a field in focus is not written by the page.
-    browser.run("const label = document.getElementById('label'); label.focus(); label.value = ''", &[]).unwrap();
-    browser.find("#label").unwrap().type_text("pendulum\u{e004}").unwrap();
+    page.fill("#label", "pendulum");
     page.draw_box();
     let boxed = page.saved();
     let close = |a: f64, b: f64| (a - b).abs() < 1.5;
