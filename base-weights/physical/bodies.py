@@ -46,9 +46,11 @@ class Body:
 def grasp_ends(body, spec):
     """Ends (2, 3) of the grasp line in the body's frame, on its upper face.
 
-    Without `grasp` in the spec the line is a third of the body's length, along x; a part without symmetry gets it
+    A part of revolution has it on its axis, and `lift` brings it to the upper side. Without `grasp` in the spec the line is a third of the body's length, along x; a part without symmetry gets it
     at the y nearest to the middle where the body is solid and not low under both ends.
     """
+    if spec.get("roll"):
+        return np.array([[-body.size[0] / 6, 0, 0], [body.size[0] / 6, 0, 0]])
     if spec.get("grasp"):
         x0, y0, x1, y1 = spec["grasp"]
     else:
@@ -66,11 +68,34 @@ def grasp_ends(body, spec):
     return np.array([[x0, y0, np.mean(heights)], [x1, y1, np.mean(heights)]])
 
 
+def lift(body, spec):
+    """How far above the axis of a part of revolution its upper side lies, about the grasp line; 0 for other parts."""
+    if not spec.get("roll"):
+        return 0.0
+    near = np.abs(body.v[:, 0]) < body.size[0] / 6
+    return float(np.hypot(body.v[:, 1], body.v[:, 2])[near].max())
+
+
 def rest(angle, x, y):
     """world_from_body of a body that lies on the table, turned by `angle` degrees."""
     m = meshes.rot("z", angle)
     m[:3, 3] = [x, y, 0.06]
     return m
+
+
+def lying(body, angle, roll, x, y):
+    """world_from_body of a part of revolution, rolled by `roll` degrees about its axis, resting on the two places it touches."""
+    m = meshes.rot("x", roll)
+    side = (body.hull.vertices @ m[:3, :3].T)[:, [0, 2]]
+    q = np.array(MultiPoint(side).convex_hull.exterior.coords)
+    center = body.hull.center_mass[0]
+    for (x0, z0), (x1, z1) in zip(q[:-1], q[1:]):
+        if min(x0, x1) <= center <= max(x0, x1) and (z0 + z1) / 2 < side[:, 1].mean():
+            m = meshes.rot("y", np.degrees(np.arctan2((z1 - z0) * np.sign(x1 - x0), abs(x1 - x0)))) @ m
+            break
+    low = (body.hull.vertices @ m[:3, :3].T)[:, 2].min()
+    m[2, 3] = -low
+    return rest(angle, x, y) @ m
 
 
 def footprint(body, m):

@@ -14,6 +14,7 @@ import numpy as np
 
 import camera  # noqa: F401 (sets Mitsuba's variant)
 import materials
+import parts_roll
 import parts_tune
 import parts_untuned
 from bodies import Body, grasp_ends

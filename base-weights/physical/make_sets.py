@@ -2,7 +2,7 @@
 
     make_sets.py GROUP OUT_DIR [--sets a,b] [--only demo,plain_0,...] [--spp 10] [--resume]
 
-GROUP is `tune` or `untuned`. The list of parts and the group's seed decide everything that is drawn.
+GROUP is `tune`, `roll` or `untuned`. The list of parts and the group's seed decide everything that is drawn.
 """
 
 import argparse
@@ -19,11 +19,12 @@ from shapely.geometry import Polygon
 import camera  # noqa: F401 (sets Mitsuba's variant: before everything else that uses Mitsuba)
 import clutter
 import materials
+import parts_roll
 import parts_tune
 import parts_untuned
 import photo
 import surfaces
-from bodies import Body, footprint, grasp_ends, rest
+from bodies import Body, footprint, grasp_ends, lift, lying, rest
 from camera import HEIGHT, WIDTH, Camera, cast, hidden
 from scatter import scatter
 from scene import SLOTS, Scene, make_light, stream
@@ -51,6 +52,13 @@ GROUPS = dict(
         clutter.TUNE,
         "tune 2025-1",
         dict(plain=2, view=1, light=3, clutter=2, several=1, neg_other=1, neg_look=4),
+    ),
+    roll=Group(
+        "roll",
+        parts_roll.PARTS,
+        clutter.TUNE,
+        "roll 2026-1",
+        dict(plain=4, view=3, light=3, clutter=3, several=3, neg_other=1, neg_look=4),
     ),
     untuned=Group(
         "untuned",
@@ -130,7 +138,7 @@ class SetMaker:
         self.looks = [(what, Body.get(f"{name}_{k + 1}", make)) for k, (what, make) in enumerate(self.spec["look"])]
         self.others = [Body.get(f"{o}_0", p["make"]) for o, p in group.parts.items() if o != name]
         self.pool = [Body.get(f"c_{group.name}_{c}", make) for c, make in group.clutter.items()]
-        self.marks = grasp_ends(self.body, self.spec)
+        self.marks, self.lift = grasp_ends(self.body, self.spec), lift(self.body, self.spec)
         self.bsdfs = {}
         self.truth = []
         rng = stream(group.seed, name, "camera")
@@ -169,7 +177,7 @@ class SetMaker:
         for attempt in range(400):
             free = where is None or attempt >= 40
             x, y = (rng.uniform(x0, x1), rng.uniform(y0, y1)) if free else where
-            m = rest(rng.uniform(0, 360), x, y)
+            m = self.rest(rng, body, rng.uniform(0, 360), x, y)
             p = cam.project(body.hull.vertices @ m[:3, :3].T + m[:3, 3])
             if p.min() < 6 or p[:, 0].max() > WIDTH - 6 or p[:, 1].max() > HEIGHT - 6:
                 continue
@@ -178,6 +186,13 @@ class SetMaker:
             if all(foot.distance(other) > gap for other in taken):
                 return m, foot
         return None, None
+
+    def rest(self, rng, body, angle, x, y):
+        return lying(body, angle, rng.uniform(0, 360), x, y) if self.spec.get("roll") else rest(angle, x, y)
+
+    def ends(self, m):
+        """The grasp line's ends in the world."""
+        return self.marks @ m[:3, :3].T + m[:3, 3] + [0, 0, self.lift]
 
     def render(self, rng, setting, items):
         light = make_light(rng, setting.style)
@@ -206,7 +221,7 @@ class SetMaker:
 
     def instance(self, cam, m, hid=(0.0, 0.0, 0.0)):
         """The truth of one instance: its grasp line's ends through the true camera."""
-        ends = self.marks @ m[:3, :3].T + m[:3, 3]
+        ends = self.ends(m)
         p = cam.project(ends)
         scale = cam.f / cam.depth(ends.mean(0)) / self.demo_scale
         d = p[1] - p[0]
@@ -226,8 +241,8 @@ class SetMaker:
     def demo(self):
         rng = stream(self.group.seed, self.name, "demo")
         cam = self.camera(rng, tilt=(0, 2.5), dist=(1.0, 1.0))
-        m = rest(rng.uniform(0, 360), *(cam.target[:2] + rng.uniform(-0.08, 0.08, 2) * self.height))
-        self.demo_scale = cam.f / cam.depth((self.marks @ m[:3, :3].T + m[:3, 3]).mean(0))
+        m = self.rest(rng, self.body, rng.uniform(0, 360), *(cam.target[:2] + rng.uniform(-0.08, 0.08, 2) * self.height))
+        self.demo_scale = cam.f / cam.depth(self.ends(m).mean(0))
         mask = (cast(cam, [(self.body, m)], 1) == 0).astype(np.uint8)
         ys, xs = np.nonzero(mask)
         lo, hi = (float(xs.min()), float(ys.min())), (float(xs.max() + 1), float(ys.max() + 1))
@@ -255,7 +270,7 @@ class SetMaker:
         about = dict(
             part=self.name,
             symmetry=self.spec.get("sym", 1),
-            rolls=False,
+            rolls=bool(self.spec.get("roll")),
             chiral=self.spec["chiral"],
             height_mm=round(float(self.body.size[2]), 1),
             size_mm=[round(float(v), 1) for v in self.body.size],

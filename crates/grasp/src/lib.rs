@@ -79,6 +79,7 @@ mod pose;
 mod prepared;
 mod record;
 mod resampled;
+mod round_top;
 mod safetensors_file;
 mod same_part;
 mod sighting;

@@ -16,6 +16,7 @@ use sdg_shape::{SearchConfig, ShapeSearch};
 
 use crate::error::Result;
 use crate::marks_shift::MarksShift;
+use crate::round_top::RoundTop;
 use crate::sizes::SizeRange;
 use crate::taught_marks::TaughtMarks;
 
@@ -62,8 +63,10 @@ impl WorkingSize {
 #[derive(Debug)]
 pub(crate) struct Prepared {
     pub(crate) search: ShapeSearch,
-    /// `None` where there are too few edges about the marks.
+    /// `None` where there are too few edges about the marks, and for a part of revolution.
     pub(crate) marks_shift: Option<MarksShift>,
+    /// Of a part of revolution alone.
+    pub(crate) round_top: Option<RoundTop>,
 }
 
 impl Prepared {
@@ -78,7 +81,9 @@ impl Prepared {
             (&resized, marks.resized(cutout_scale))
         };
         let search = ShapeSearch::new(cutout, &marks.region(), config)?;
-        Ok(Self { search, marks_shift: MarksShift::new(cutout, &marks, &config.shape) })
+        let round_top = RoundTop::new(cutout, &marks);
+        let marks_shift = if round_top.is_some() { None } else { MarksShift::new(cutout, &marks, &config.shape) };
+        Ok(Self { search, marks_shift, round_top })
     }
 }
 

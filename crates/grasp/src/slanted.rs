@@ -15,7 +15,7 @@ use sdg_shape::parallel;
 use crate::detection::{Found, GraspDetection};
 use crate::resampled::PlanMap;
 use crate::sighting::Sighting;
-use crate::verification::{SearchedImage, Shot, agreement_in, foreshortening};
+use crate::verification::{SearchedImage, Shot, agreement_in, foreshortening, usual_focal_px};
 
 /// Places that are asked, the best first, and what they agree by at least. Chosen by hand, for time.
 const NUM_ASKED: usize = 4;
@@ -26,8 +26,6 @@ const MIN_CONSENSUS: f64 = 0.3;
 const SHORTENING_NOISE: f64 = 0.12;
 /// A smaller tilt shortens by less than 3 %: as good as none.
 const MIN_TILT: f64 = 0.24;
-/// Focal length of the camera in widths of the picture, where nothing tells it: 49° across, as a telephone's. Chosen by hand.
-const FOCAL_WIDTHS: f64 = 1.1;
 /// What a slant must explain of the shortening that a level camera leaves: less is the noise of the fits. Chosen by hand, for time:
 /// whether the places agree better decides.
 const MIN_EXPLAINED: f64 = 0.1;
@@ -85,7 +83,7 @@ pub(crate) fn suggested_slant(
         })
     });
     let shortened: Vec<Shortened> = shortened.into_iter().flatten().collect();
-    let focal_px = FOCAL_WIDTHS * f64::from(size[0].max(size[1]));
+    let focal_px = usual_focal_px(size);
     let costs: Vec<(f64, Slant)> =
         slants(focal_px).filter_map(|slant| Some((cost(&slant, &shortened)?, slant))).collect();
     let least = |all: &mut dyn Iterator<Item = &(f64, Slant)>| all.min_by(|a, b| a.0.total_cmp(&b.0)).copied();

@@ -37,6 +37,14 @@ pub(crate) struct Shot {
     pub(crate) below_camera: Point2<f64>,
 }
 
+/// Focal length of a camera in widths of the picture, where nothing tells it: 49° across, as a telephone's. Chosen by hand.
+const FOCAL_WIDTHS: f64 = 1.1;
+
+/// Focal length of the camera that took a picture of this width and height, in pixels.
+pub(crate) fn usual_focal_px(size: [u32; 2]) -> f64 {
+    FOCAL_WIDTHS * f64::from(size[0].max(size[1]))
+}
+
 impl Shot {
     /// Of a camera that looks straight down.
     pub(crate) fn level(image: &RgbImage) -> Self {
@@ -49,6 +57,7 @@ impl Shot {
 struct View<'a> {
     halvings: u32,
     below_camera: Point2<f64>,
+    focal_px: f64,
     image: Cow<'a, RgbImage>,
     field: GradientField,
     table: TableColors,
@@ -120,8 +129,9 @@ impl<'a> SearchedImage<'a> {
         }
         let field = GradientField::with_config(&view, &demonstration.check().search.shape.gradient);
         let table = TableColors::new(&view);
-        let below_camera = shot.below_camera / f64::from(1u32 << halvings);
-        self.views.push(View { halvings, below_camera, image: view, field, table });
+        let pixel_size = f64::from(1u32 << halvings);
+        let (below_camera, focal_px) = (shot.below_camera / pixel_size, usual_focal_px(shot.size) / pixel_size);
+        self.views.push(View { halvings, below_camera, focal_px, image: view, field, table });
         self.views.len() - 1
     }
 }
@@ -195,8 +205,12 @@ impl<'a> SizedDemonstration<'a> {
         // camera three were off by 7 to 8 mm with it, and 2 to 4 mm without (pendulum, rod end).
         let is_flat = self.demonstration.check().score.is_size_known || agreement < MIN_MARKED;
         let marks_shift = self.prepared.marks_shift.as_ref().filter(|_| !is_flat);
-        let marks = marks_shift
-            .map_or(*view_from_working, |shift| shift.placed(&view.picture(), view.below_camera, view_from_working));
+        let round_top = self.prepared.round_top.as_ref().filter(|_| !is_flat);
+        let marks = match (round_top, marks_shift) {
+            (Some(top), _) => top.placed(view.focal_px, view.below_camera, view_from_working),
+            (None, Some(shift)) => shift.placed(&view.picture(), view.below_camera, view_from_working),
+            (None, None) => *view_from_working,
+        };
         let (agreement, evidence) = match marks_shift.filter(|_| marks != *view_from_working) {
             Some(shift) => self.raised(view, shift, view_from_working, &marks, (agreement, evidence)),
             None => (agreement, evidence),

@@ -24,6 +24,7 @@ use crate::config::{AgreementConfig, RefinementConfig};
 use crate::details::Details;
 use crate::gradient_field::GradientField;
 use crate::likeness::Likeness;
+use crate::profile::Profile;
 use crate::structure::Structure;
 use crate::surface::Surface;
 use crate::template::ShapeTemplate;
@@ -62,6 +63,7 @@ pub struct Comparison<'a> {
     pub(crate) close_up: &'a CloseUp,
     pub(crate) mirrored: Option<&'a Rival>,
     pub(crate) turned: &'a Rival,
+    pub(crate) profile: Option<&'a Profile>,
     /// Poses that agree by less are not worth that network's time.
     pub min_agreement: f64,
     /// The image over which the demonstration is laid.
@@ -154,6 +156,9 @@ impl Comparison<'_> {
         if self.agreement(pose).both() < MIN_TURNED {
             return *pose;
         }
+        if let Some(profile) = self.profile {
+            return profile.placed(self.picture.field, pose, scales);
+        }
         let turned = self.turned.better_turn(self.picture.image, self.picture.field, pose);
         turned.filter(|turned| scales.contains(&turned.scale)).unwrap_or(*pose)
     }
@@ -165,9 +170,11 @@ impl Comparison<'_> {
         let rival = |rival: &Rival| rival.against(self.close_up, &seen, self.picture.field, image_from_demonstration);
         let likeness = self.likeness.log_odds(self.picture.image, image_from_demonstration);
         let is_open = look.is_plausible() && likeness >= MIN_LIKENESS;
+        let details = is_open.then(|| self.details.log_odds(self.picture.image, image_from_demonstration)).flatten();
         CloseLook {
             likeness,
-            details: is_open.then(|| self.details.log_odds(self.picture.image, image_from_demonstration)).flatten(),
+            // In another roll the part itself has its features elsewhere.
+            details: if self.profile.is_some() { details.map(|details| details.max(0.0)) } else { details },
             mirrored: self.mirrored.filter(|_| look.is_plausible()).and_then(rival),
             ..look
         }
@@ -176,7 +183,10 @@ impl Comparison<'_> {
     /// As [`Self::evidence`] but for the close look, which takes nine tenths of the time; and [`Agreement::both`].
     pub fn evidence_from_afar(&self, image_from_demonstration: &PlanarSimilarity) -> (Evidence, f64) {
         let agreement = self.agreement(image_from_demonstration);
-        let Agreement { edges, surface, .. } = agreement;
+        let surface = agreement.surface;
+        // What edges a part of revolution has inside its outline depends on its roll: its profile counts as much as all of them.
+        let profile = self.profile.map(|profile| profile.agreement(self.picture.field, image_from_demonstration));
+        let edges = profile.map_or(agreement.edges, |profile| 0.5 * (agreement.edges + profile));
         let structure = self.structure.agreement(self.picture.field, image_from_demonstration);
         let evidence = Evidence {
             edges,

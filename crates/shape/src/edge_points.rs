@@ -41,6 +41,8 @@ pub(crate) struct EdgeSelection<'a> {
     pub(crate) max_points: usize,
     /// Weight of an edge on the outline relative to one inside.
     pub(crate) outline_weight: f64,
+    /// Weight of an edge inside: less than 1 where edges there are not the part's in every roll.
+    pub(crate) inner_weight: f64,
 }
 
 struct EdgeCandidate {
@@ -57,6 +59,9 @@ pub(crate) fn select_edge_points(
     selection: &EdgeSelection<'_>,
 ) -> Vec<EdgePoint> {
     let mut candidates = find_candidates(level, pixel_size, selection);
+    if selection.inner_weight == 0.0 {
+        candidates.retain(|candidate| candidate.on_outline);
+    }
     candidates.sort_by(|a, b| b.strength.total_cmp(&a.strength));
     let spread = spread_out(&candidates, selection.max_points, pixel_size);
     let median = upper_median(spread.iter().map(|&i| candidates[i].strength)).unwrap_or(1.0);
@@ -67,7 +72,7 @@ pub(crate) fn select_edge_points(
         let offset = candidate.position - selection.center;
         let n = candidate.normal;
         let own = candidate.strength / (candidate.strength + median);
-        let boost = if candidate.on_outline { selection.outline_weight } else { 1.0 };
+        let boost = if candidate.on_outline { selection.outline_weight } else { selection.inner_weight };
         points.push(EdgePoint {
             offset: [offset.x as f32, offset.y as f32],
             normal: [n.x as f32, n.y as f32],

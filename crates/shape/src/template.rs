@@ -52,6 +52,23 @@ impl ShapeTemplate {
     /// [`ShapeError`] for an outline that is no area or outside the image, for a part without edges,
     /// and for a configuration out of range.
     pub fn new(image: &RgbImage, outline: &Polygon, config: &ShapeConfig) -> Result<Self, ShapeError> {
+        Self::with_inner_edges(image, outline, config, 1.0)
+    }
+
+    /// The same of the edges along the outline alone.
+    ///
+    /// # Errors
+    /// As there.
+    pub(crate) fn of_outline(image: &RgbImage, outline: &Polygon, config: &ShapeConfig) -> Result<Self, ShapeError> {
+        Self::with_inner_edges(image, outline, config, 0.0)
+    }
+
+    fn with_inner_edges(
+        image: &RgbImage,
+        outline: &Polygon,
+        config: &ShapeConfig,
+        inner_weight: f64,
+    ) -> Result<Self, ShapeError> {
         check_config(config)?;
         let outline = checked_outline(image, outline)?;
         let bounds = outline.bounds();
@@ -75,6 +92,7 @@ impl ShapeTemplate {
                     config.max_points
                 },
                 outline_weight: config.outline_weight,
+                inner_weight,
             };
             let points = select_edge_points(field.level(idx), pixel_size, &selection);
             if points.len() < MIN_POINTS {

@@ -34,6 +34,7 @@ use crate::gradient_field::GradientField;
 use crate::likeness::Likeness;
 use crate::parallel;
 use crate::pose::Pose;
+use crate::profile::Profile;
 use crate::search::bank::Bank;
 use crate::search::responses::{PITCH, Responses};
 use crate::search::sweep::{Start, sweep};
@@ -166,6 +167,8 @@ pub struct ShapeSearch {
     /// `None` where the mirror image is the same, or has too few edges.
     mirrored: Option<Rival>,
     turned: Rival,
+    /// Of a part of revolution alone.
+    profile: Option<Profile>,
     outline: Polygon,
     bank: Bank,
     sweep_level_idx: usize,
@@ -193,6 +196,9 @@ impl ShapeSearch {
             let (level_idx, points) = sweep_points(&flipped, template, outline, config);
             places_in_photo(&points, level_idx, template, &field, config)
         };
+        let profile = Profile::of(image, outline, &config.shape);
+        let mirrored =
+            || Rival::mirrored(image, outline, &field, &config.shape, places_of_mirrored, &close_up).ok().flatten();
         Ok(Self {
             config: config.clone(),
             surface: Surface::new(image, outline, &config.shape.surface),
@@ -200,9 +206,9 @@ impl ShapeSearch {
             likeness: Likeness::new(image, outline),
             details: Details::new(image, outline),
             turned: Rival::turned(&close_up, &template, &field, outline.bounds().center(), &own_places),
-            mirrored: Rival::mirrored(image, outline, &field, &config.shape, places_of_mirrored, &close_up)
-                .ok()
-                .flatten(),
+            // What differs from the mirror image is the light on one side of the axis.
+            mirrored: if profile.is_some() { None } else { mirrored() },
+            profile,
             close_up,
             outline: outline.clone(),
             bank: Bank::new(&points, config.num_points, (1u32 << sweep_level_idx) as f64, log_scales),
@@ -309,7 +315,7 @@ impl ShapeSearch {
 
     /// The demonstration over an image.
     pub fn comparison<'a>(&'a self, picture: &Picture<'a>) -> Comparison<'a> {
-        let Self { template, surface, structure, likeness, details, close_up, mirrored, turned, .. } = self;
+        let Self { template, surface, structure, likeness, details, close_up, mirrored, turned, profile, .. } = self;
         let (min_agreement, mirrored) = (self.config.min_agreement, mirrored.as_ref());
         Comparison {
             template,
@@ -320,6 +326,7 @@ impl ShapeSearch {
             close_up,
             mirrored,
             turned,
+            profile: profile.as_ref(),
             min_agreement,
             picture: *picture,
         }
@@ -452,6 +459,7 @@ fn sweep_points(
         center: template.center,
         max_points: SWEEP_POINTS,
         outline_weight: config.shape.outline_weight,
+        inner_weight: 1.0,
     };
     let points_at = |idx: usize| select_edge_points(field.level(idx), (1u32 << idx) as f64, &selection);
     let (mut idx, mut points) = (coarsest, points_at(coarsest));

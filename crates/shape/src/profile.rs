@@ -1,0 +1,129 @@
+//! Where a part of revolution lies along its axis, and which of its ends is which.
+//!
+//! In another roll its threads have moved along it and its light has changed, so that edges inside its outline draw a pose along the
+//! axis or to its other end. Its profile is the same in every roll.
+
+use std::ops::RangeInclusive;
+
+use image::RgbImage;
+use nalgebra::{Point2, Vector2};
+use sdg_geometry::{Angle, PlanarSimilarity, Polygon};
+
+use crate::config::ShapeConfig;
+use crate::following::Reach;
+use crate::gradient_field::GradientField;
+use crate::revolution::Revolution;
+use crate::template::ShapeTemplate;
+
+/// Shifts along the axis from which the profile is laid over the picture, in lengths: a thread's pitch and more to either side.
+const NUM_SHIFTS: i32 = 4;
+const SHIFT: f64 = 0.03;
+/// How far it then moves, and what it must gain in agreement.
+const REACH: Reach = Reach { shift_px: 4.0, turn_rad: 0.06, log_scale: 0.03 };
+const MIN_GAIN: f64 = 0.05;
+
+/// The edges along the outline of a part of revolution.
+#[derive(Debug, Clone)]
+pub(crate) struct Profile {
+    template: ShapeTemplate,
+    middle: Point2<f64>,
+    /// As long as the part.
+    axis: Vector2<f64>,
+}
+
+impl Profile {
+    /// `None` for any other part.
+    pub(crate) fn of(image: &RgbImage, outline: &Polygon, config: &ShapeConfig) -> Option<Self> {
+        let revolution = Revolution::of(image, outline)?;
+        let template = ShapeTemplate::of_outline(image, outline, config).ok()?;
+        Some(Self { template, middle: outline.bounds().center(), axis: revolution.axis() })
+    }
+
+    /// How well the edges along the outline agree at a pose, in `[0, 1]`.
+    pub(crate) fn agreement(&self, field: &GradientField, pose: &PlanarSimilarity) -> f64 {
+        self.template.agreement(field, pose)
+    }
+
+    /// `pose`, or one along the axis or the other way round at which the profile agrees better. Scales stay in `scales`.
+    pub(crate) fn placed(
+        &self,
+        field: &GradientField,
+        pose: &PlanarSimilarity,
+        scales: &RangeInclusive<f64>,
+    ) -> PlanarSimilarity {
+        let half_turns = [0.0, std::f64::consts::PI];
+        let starts = half_turns.into_iter().flat_map(|turn| {
+            (-NUM_SHIFTS..=NUM_SHIFTS).map(move |k| {
+                let to = self.middle + f64::from(k) * SHIFT * self.axis;
+                PlanarSimilarity::about(self.middle, to, Angle::from_radians(turn), 1.0)
+            })
+        });
+        let placed = starts
+            .map(|start| self.template.snapped(field, &pose.compose(&start), &REACH))
+            .filter(|placed| scales.contains(&placed.scale))
+            .map(|placed| (placed, self.agreement(field, &placed)))
+            .max_by(|a, b| a.1.total_cmp(&b.1));
+        match placed {
+            Some((placed, gained)) if gained >= self.agreement(field, pose) + MIN_GAIN => placed,
+            _ => *pose,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::Rgb;
+
+    /// A bar with a thick head, lit as a round one, with a thread that `phase` moves along it.
+    fn screw(phase: f64) -> (RgbImage, Polygon) {
+        let profile = [[-60.0, 9.0], [30.0, 9.0], [30.0, 17.0], [60.0, 17.0]];
+        let middle = Point2::new(120.0, 60.0);
+        let side =
+            |sign: f64| profile.into_iter().map(move |[along, radius]| middle + Vector2::new(along, sign * radius));
+        let outline = Polygon { vertices: side(-1.0).chain(side(1.0).rev()).collect() };
+        let color = |x: f64, y: f64| {
+            let (along, across) = (x - middle.x, y - middle.y);
+            let radius = if along < 30.0 { 9.0 } else { 17.0 };
+            if along.abs() > 60.0 || across.abs() > radius {
+                return 70.0;
+            }
+            let light = 0.5 + 0.5 * (1.0 - (across / radius - 0.3).powi(2)).max(0.0);
+            let thread =
+                if along < 30.0 && ((along - 0.4 * across - phase) / 14.0).rem_euclid(1.0) < 0.5 { 0.5 } else { 1.0 };
+            230.0 * light * thread
+        };
+        let image = RgbImage::from_fn(240, 120, |x, y| {
+            let samples = (0..16).map(|k| {
+                let [right, down] = [k % 4, k / 4].map(|k| f64::from(k) / 4.0 + 0.125);
+                color(f64::from(x) + right, f64::from(y) + down)
+            });
+            Rgb([(samples.sum::<f64>() / 16.0) as u8; 3])
+        });
+        (image, outline)
+    }
+
+    #[test]
+    fn a_pose_that_follows_the_thread_goes_back_to_the_ends() {
+        let (photo, outline) = screw(0.0);
+        let profile = Profile::of(&photo, &outline, &ShapeConfig::DEFAULT).unwrap();
+        let (rolled, _) = screw(7.0);
+        let field = GradientField::new(&rolled);
+        let moved = PlanarSimilarity { tx: 7.0, ..PlanarSimilarity::IDENTITY };
+        let middle = profile.middle;
+        let turned = PlanarSimilarity::about(middle, middle, Angle::from_radians(std::f64::consts::PI), 1.0);
+        for start in [moved, turned.compose(&moved)] {
+            let placed = profile.placed(&field, &start, &(0.8..=1.25));
+            let off = (placed.apply(&middle) - middle).norm();
+            assert!(off < 1.5 && placed.angle.radians().abs() < 0.05, "{start:?} → {placed:?}");
+        }
+    }
+
+    #[test]
+    fn a_pose_that_fits_stays() {
+        let (photo, outline) = screw(0.0);
+        let profile = Profile::of(&photo, &outline, &ShapeConfig::DEFAULT).unwrap();
+        let field = GradientField::new(&photo);
+        assert_eq!(profile.placed(&field, &PlanarSimilarity::IDENTITY, &(0.8..=1.25)), PlanarSimilarity::IDENTITY);
+    }
+}
