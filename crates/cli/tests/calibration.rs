@@ -87,15 +87,15 @@ fn printed(svg: &str) -> impl Fn(&Point2<f64>) -> bool + use<> {
     // Millions of places are asked for: only what lies within a side of a place's cell is looked through.
     const CELLS: usize = 32;
     let cell = move |value: f64, start: f64| ((value - start) / side).floor() + (CELLS / 2) as f64;
-    let mut near: Vec<(Vec<[f64; 3]>, Vec<([f64; 3], bool)>)> = Vec::new();
+    let mut near = Vec::new();
     for k in 0..CELLS * CELLS {
         let is_near = |x: f64, y: f64| {
             let [column, row] = [cell(x, left), cell(y, top)].map(|at| at as i64);
             column.abs_diff((k % CELLS) as i64) <= 1 && row.abs_diff((k / CELLS) as i64) <= 1
         };
         near.push((
-            squares.iter().copied().filter(|[left, top, _]| is_near(*left, *top)).collect(),
-            dots.iter().copied().filter(|([cx, cy, _], _)| is_near(*cx, *cy)).collect(),
+            squares.iter().copied().filter(|[left, top, _]| is_near(*left, *top)).collect::<Vec<_>>(),
+            dots.iter().copied().filter(|([cx, cy, _], _)| is_near(*cx, *cy)).collect::<Vec<_>>(),
         ));
     }
     assert!(dots.iter().all(|([.., radius], _)| *radius < side));
