@@ -5,7 +5,7 @@ use std::path::Path;
 
 use sdg_evaluation::{Settings, Store};
 
-use crate::support::{Folder, sdg, shipped};
+use crate::support::{Folder, sdg, shipped, taught_pendulum};
 
 /// Asserts exit code and one line on standard error that contains every part.
 fn assert_refused(arguments: &[&str], code: i32, parts: &[&str]) {
@@ -237,9 +237,7 @@ fn augment_writes_pictures_and_their_list() {
 fn a_picture_of_another_size_with_nothing_in_it_is_answered_with_advice() {
     let folder = tempfile::tempdir().unwrap();
     let (model, picture) = (folder.path().join("model.sdg"), folder.path().join("table.png"));
-    let demonstration = pair(&shipped("pendulum", "image.png"), &shipped("pendulum", "annotation.json"));
-    let taught = sdg(&["teach", "--model", "S", "--demo", &demonstration, "--out", model.to_str().unwrap()]);
-    assert!(taught.status.success(), "{}", String::from_utf8_lossy(&taught.stderr));
+    taught_pendulum(&model, None);
     for (size, advised) in [([320, 200], true), ([640, 480], false), ([480, 640], false)] {
         image::RgbImage::from_pixel(size[0], size[1], image::Rgb([120; 3])).save(&picture).unwrap();
         let output = sdg(&["detect", "--grasp-model", model.to_str().unwrap(), picture.to_str().unwrap()]);

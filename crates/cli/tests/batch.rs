@@ -5,16 +5,16 @@ use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
-use crate::support::{Folder, sdg, shipped, stdout};
+use crate::support::{Folder, sdg, shipped, stdout, taught_pendulum};
 use image::{ImageFormat, Rgb, RgbImage};
 use serde_json::Value;
 
-/// The lever's photo and its marks in a folder, and a model S taught from them by the photo's name alone.
+/// The lever's photo and its marks in a folder, and a model S taught from them.
 fn taught(folder: &Folder) -> String {
     fs::copy(shipped("pendulum", "image.png"), folder.path("photo.png")).unwrap();
     fs::copy(shipped("pendulum", "annotation.json"), folder.path("photo.json")).unwrap();
     let model = folder.path("model.sdg");
-    stdout(&["teach", "--model", "S", "--demo", &folder.path("photo.png"), "--out", &model]);
+    taught_pendulum(&model, None);
     model
 }
 

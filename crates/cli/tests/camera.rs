@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Output;
 
-use crate::support::{Folder, sdg, shipped};
+use crate::support::{Folder, sdg, shipped, taught_pendulum};
 use image::RgbImage;
 use sdg_calibration::{CalibratedCamera, Frame, TablePose};
 use sdg_simulation::objects::ObjectSpec;
@@ -12,7 +12,7 @@ use sdg_simulation::views::{OTHER_CAMERAS, OnTable, other_view};
 use serde_json::{Value, json};
 
 /// The wrist camera as the shipped photos were taken: straight down from 0.58 m, the picture's right along -y of the base.
-const CAMERA: &str = include_str!("wrist.yaml");
+pub const WRIST_CAMERA: &str = include_str!("wrist.yaml");
 
 impl Folder {
     fn teach(&self, out: &str, further: &[&str]) -> Output {
@@ -38,7 +38,7 @@ fn assert_refused(output: &Output, code: i32, parts: &[&str]) {
 #[test]
 fn a_part_taught_with_a_camera_is_found_in_metres() {
     let files = Folder::new();
-    let camera = files.text("wrist.yaml", CAMERA);
+    let camera = files.text("wrist.yaml", WRIST_CAMERA);
     let taught = files.teach("part.sdg", &["--camera", &camera, "--mark-height-mm", "16", "--grasp-height-mm", "9"]);
     assert!(taught.status.success(), "{}", String::from_utf8_lossy(&taught.stderr));
     let told = String::from_utf8_lossy(&taught.stdout).into_owned();
@@ -77,8 +77,8 @@ fn a_part_taught_with_a_camera_is_found_in_metres() {
 fn camera_files_that_are_none_and_pictures_of_other_cameras_are_refused() {
     let files = Folder::new();
     let teach = |name: &str, from: &str, to: &str| {
-        assert!(CAMERA.contains(from), "{from}");
-        let camera = files.text(name, &CAMERA.replace(from, to));
+        assert!(WRIST_CAMERA.contains(from), "{from}");
+        let camera = files.text(name, &WRIST_CAMERA.replace(from, to));
         let output = files.teach("part.sdg", &["--camera", &camera, "--mark-height-mm", "16"]);
         assert!(!Path::new(&files.path("part.sdg")).exists());
         output
@@ -88,16 +88,16 @@ fn camera_files_that_are_none_and_pictures_of_other_cameras_are_refused() {
     let up = teach("up.yaml", "[0.7071067811865475, -0.7071067811865476, 0.0, 0.0]", "[0.0, 0.0, 0.0, 1.0]");
     assert_refused(&up, 1, &["does not meet the plane", "0.016 m"]);
     assert_refused(&teach("text.yaml", "image_width: 640", "no camera"), 1, &["text.yaml", "camera_calibration"]);
-    let table = CAMERA.find("table:").unwrap();
-    let alone = teach("alone.yaml", &CAMERA[table..], "");
+    let table = WRIST_CAMERA.find("table:").unwrap();
+    let alone = teach("alone.yaml", &WRIST_CAMERA[table..], "");
     assert_refused(&alone, 1, &["alone.yaml", "pose over the table"]);
 
-    let camera = files.text("wrist.yaml", CAMERA);
+    let camera = files.text("wrist.yaml", WRIST_CAMERA);
     assert_refused(&files.teach("part.sdg", &["--camera", &camera]), 2, &["--mark-height-mm"]);
     let metres = files.teach("part.sdg", &["--camera", &camera, "--mark-height-mm", "1600"]);
     assert_refused(&metres, 2, &["0 to 500 millimetres", "1600"]);
 
-    assert!(files.teach("no_camera.sdg", &[]).status.success());
+    taught_pendulum(files.path("no_camera.sdg"), None);
     let (model, photo) = (files.path("no_camera.sdg"), shipped("pendulum", "image.png"));
     let found = sdg(&["detect", "--grasp-model", &model, "--camera", &camera, photo.to_str().unwrap()]);
     assert_refused(&found, 1, &["no_camera.sdg", "taught with a camera", "--mark-height-mm"]);
@@ -149,10 +149,9 @@ fn labelled(marks: [[f64; 2]; 2], file: &str, [width, height]: [u32; 2]) -> Valu
 #[test]
 fn a_model_taught_with_one_camera_is_tested_and_rehearsed_with_another() {
     let files = Folder::new();
-    let first = files.text("wrist.yaml", CAMERA);
-    let taught = files.teach("part.sdg", &["--camera", &first, "--mark-height-mm", "16", "--grasp-height-mm", "9"]);
-    assert!(taught.status.success(), "{}", String::from_utf8_lossy(&taught.stderr));
+    let first = files.text("wrist.yaml", WRIST_CAMERA);
     let model = files.path("part.sdg");
+    taught_pendulum(&model, Some(Path::new(&first)));
     let second = second_camera(&files);
 
     let folder = PathBuf::from(files.path("pictures"));
@@ -210,7 +209,7 @@ fn a_model_taught_with_one_camera_is_tested_and_rehearsed_with_another() {
     assert!(rehearsed.status.success(), "{}", String::from_utf8_lossy(&rehearsed.stderr));
     let told: Value = serde_json::from_slice(&rehearsed.stdout).unwrap();
     assert_eq!(told["successes"], 2, "{told}");
-    assert!(files.teach("no_camera.sdg", &[]).status.success());
+    taught_pendulum(files.path("no_camera.sdg"), None);
     let without = files.path("no_camera.sdg");
     let refused = sdg(&[
         "rehearse",

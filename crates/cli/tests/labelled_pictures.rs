@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::support::{sdg, shipped, stdout};
+use crate::support::{sdg, shipped, stdout, taught_pendulum};
 use serde_json::{Value, json};
 
 /// Samples: enough that some lack the part and some show it cut by the border.
@@ -16,9 +16,7 @@ fn text(path: &Path) -> &str {
 /// Model S of the shipped pendulum.
 fn teach(folder: &Path) -> PathBuf {
     let model = folder.join("model.sdg");
-    let demonstration =
-        format!("{}:{}", text(&shipped("pendulum", "image.png")), text(&shipped("pendulum", "annotation.json")));
-    stdout(&["teach", "--model", "S", "--demo", &demonstration, "--out", text(&model)]);
+    taught_pendulum(&model, None);
     model
 }
 

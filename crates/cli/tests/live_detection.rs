@@ -3,10 +3,10 @@
 use std::fs;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{TcpListener, TcpStream};
-
+use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
-use crate::support::{sdg, shipped};
+use crate::support::{sdg, shipped, taught_pendulum};
 use image::RgbImage;
 use sdg_calibration::{CalibratedCamera, Frame, TablePose};
 use sdg_simulation::table_camera::TableCamera;
@@ -17,12 +17,9 @@ fn path(folder: &tempfile::TempDir, name: &str) -> String {
 }
 
 /// Model S of the pendulum.
-fn taught(folder: &tempfile::TempDir, further: &[&str]) -> String {
-    let demonstration =
-        format!("{}:{}", shipped("pendulum", "image.png").display(), shipped("pendulum", "annotation.json").display());
+fn taught(folder: &tempfile::TempDir, camera: Option<&str>) -> String {
     let out = path(folder, "part.sdg");
-    let done = sdg(&[&["teach", "--model", "S", "--demo", &demonstration, "--out", &out], further].concat());
-    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    taught_pendulum(&out, camera.map(Path::new));
     out
 }
 
@@ -34,7 +31,7 @@ fn lines(output: &Output) -> Vec<Value> {
 #[test]
 fn a_folder_is_played_and_its_part_followed() {
     let folder = tempfile::tempdir().unwrap();
-    let model = taught(&folder, &[]);
+    let model = taught(&folder, None);
     let pictures = folder.path().join("pictures");
     fs::create_dir(&pictures).unwrap();
     fs::copy(shipped("pendulum", "image.png"), pictures.join("a.png")).unwrap();
@@ -85,7 +82,7 @@ fn grasps(line: &Value) -> Vec<Value> {
 #[test]
 fn pictures_of_a_folder_and_on_request_show_what_files_show() {
     let folder = tempfile::tempdir().unwrap();
-    let model = taught(&folder, &[]);
+    let model = taught(&folder, None);
     let frames = folder.path().join("frames");
     fs::create_dir(&frames).unwrap();
     let pictures = unrelated_pictures();
@@ -140,7 +137,7 @@ fn a_rendered_part_is_followed_in_metres() {
     };
     let file = path(&folder, "sim.yaml");
     fs::write(&file, camera.to_yaml()).unwrap();
-    let model = taught(&folder, &["--camera", &file, "--mark-height-mm", "16", "--grasp-height-mm", "9"]);
+    let model = taught(&folder, Some(&file));
     let from = format!("sim:{SIM}");
     let detected = sdg(&["detect", "--grasp-model", &model, "--camera", &file, "--from", &from, "--json"]);
     assert_eq!(detected.status.code(), Some(0), "{}", String::from_utf8_lossy(&detected.stderr));
@@ -163,7 +160,7 @@ fn a_rendered_part_is_followed_in_metres() {
 #[test]
 fn drawn_frames_are_served_to_browsers() {
     let folder = tempfile::tempdir().unwrap();
-    let model = taught(&folder, &[]);
+    let model = taught(&folder, None);
     let from = format!("file:{}?loop&fps=20", shipped("pendulum", "image.png").display());
     let mut child = Command::new(env!("CARGO_BIN_EXE_sdg"))
         .args(["detect", "--grasp-model", &model, "--from", &from, "--frames", "200", "--draw", "0", "--json"])
@@ -193,7 +190,7 @@ fn drawn_frames_are_served_to_browsers() {
 #[test]
 fn what_cannot_be_is_refused() {
     let folder = tempfile::tempdir().unwrap();
-    let model = taught(&folder, &[]);
+    let model = taught(&folder, None);
     let refused = |arguments: &[&str], code: i32, part: &str| {
         let output = sdg(&[&["detect", "--grasp-model", &model], arguments].concat());
         let stderr = String::from_utf8_lossy(&output.stderr).into_owned();

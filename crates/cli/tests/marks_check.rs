@@ -5,7 +5,7 @@ use std::fs;
 use serde_json::{Value, json};
 
 use crate::picture_kinds::{stored_for, with_orientation};
-use crate::support::{Folder, sdg, shipped, stdout};
+use crate::support::{Folder, sdg, shipped, stdout, taught_pendulum};
 
 fn photo() -> image::RgbImage {
     image::open(shipped("pendulum", "image.png")).unwrap().into_rgb8()
@@ -40,9 +40,7 @@ fn run(arguments: &[&str]) -> (Option<i32>, String) {
 fn converting_and_evaluating_tell_marks_on_unturned_pixels() {
     let folder = Folder::new();
     let model = folder.path("model.sdg");
-    let demonstration =
-        format!("{}:{}", shipped("pendulum", "image.png").display(), shipped("pendulum", "annotation.json").display());
-    stdout(&["teach", "--model", "S", "--demo", &demonstration, "--out", &model]);
+    taught_pendulum(&model, None);
     let pictures = folder.path("pictures");
     fs::create_dir(&pictures).unwrap();
     let at = |name: &str| format!("{pictures}/{name}");
@@ -133,10 +131,8 @@ fn an_opening_that_is_the_box_s_is_said() {
 #[test]
 fn one_picture_that_cannot_be_read_is_one_line() {
     let folder = Folder::new();
-    let demonstration =
-        format!("{}:{}", shipped("pendulum", "image.png").display(), shipped("pendulum", "annotation.json").display());
     let model = folder.path("model.sdg");
-    stdout(&["teach", "--model", "S", "--demo", &demonstration, "--out", &model]);
+    taught_pendulum(&model, None);
     let broken = folder.text("broken.png", "no picture");
     for arguments in
         [&["detect", "--grasp-model", &model, &broken][..], &["detect", "--json", "--grasp-model", &model, &broken]]

@@ -1,13 +1,12 @@
 //! `sdg rehearse` on the part that a model was taught from.
 
-use crate::support::{Folder, sdg, shipped, stdout};
+use crate::support::{Folder, sdg, taught_pendulum};
 use serde_json::Value;
 
 /// Model S of the lever, 166 mm long and 16 mm high, which knows neither.
 fn taught(folder: &Folder) -> String {
     let model = folder.path("model.sdg");
-    let [photo, marks] = ["image.png", "annotation.json"].map(|name| shipped("pendulum", name).display().to_string());
-    stdout(&["teach", "--model", "S", "--demo", &format!("{photo}:{marks}"), "--out", &model]);
+    taught_pendulum(&model, None);
     model
 }
 

@@ -6,7 +6,7 @@ use std::io::Cursor;
 use image::{DynamicImage, GrayImage, ImageBuffer, ImageFormat, Luma, RgbImage, Rgba, RgbaImage};
 use serde_json::Value;
 
-use crate::support::{Folder, sdg, shipped};
+use crate::support::{Folder, sdg, shipped, taught_pendulum};
 
 /// Between two ways of storing the same picture.
 const SAME_PX: f64 = 0.5;
@@ -18,11 +18,8 @@ fn photo() -> RgbImage {
 }
 
 fn taught(folder: &Folder) -> String {
-    let demonstration =
-        format!("{}:{}", shipped("pendulum", "image.png").display(), shipped("pendulum", "annotation.json").display());
     let model = folder.path("part.sdg");
-    let done = sdg(&["teach", "--model", "S", "--demo", &demonstration, "--out", &model]);
-    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    taught_pendulum(&model, None);
     model
 }
 

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use crate::support::{Folder, sdg, shipped};
+use crate::support::{Folder, sdg, taught_pendulum};
 use serde_json::Value;
 
 /// A wall between where parts lie and where they are put.
@@ -40,12 +40,7 @@ fn workcell(folder: &Folder, name: &str, further: &str) -> String {
 fn taught(folder: &Folder) -> String {
     workcell(folder, "cell.toml", PLACES);
     let out = folder.path("model.sdg");
-    let [image, marks] = ["image.png", "annotation.json"].map(|name| shipped("pendulum", name));
-    let demonstration = format!("{}:{}", image.display(), marks.display());
-    let camera = folder.path("camera.yaml");
-    let lengths = ["--camera", &camera, "--mark-height-mm", "16", "--grasp-height-mm", "9"];
-    let call = ["teach", "--model", "S", "--demo", &demonstration, "--out", &out];
-    assert!(sdg(&[&call[..], &lengths].concat()).status.success());
+    taught_pendulum(&out, Some(Path::new(&folder.path("camera.yaml"))));
     out
 }
 

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use crate::simulated_arm::Simulated;
-use crate::support::sdg;
+use crate::support::{sdg, taught_pendulum};
 use sdg_calibration::{CalibratedCamera, Frame, TablePose};
 use sdg_cell::CameraPose;
 use sdg_geometry::PinholeCamera;
@@ -27,14 +27,8 @@ fn text(path: &Path) -> &str {
 /// The pendulum taught with the shipped camera, whose marks lie 16 mm above the table.
 fn taught(folder: &Path, with_camera: bool) -> PathBuf {
     let out = folder.join("model.sdg");
-    let photo = shipped("demonstrations/pendulum");
-    let demonstration = format!("{}:{}", photo.join("image.png").display(), photo.join("annotation.json").display());
     let camera = shipped("workcell/camera.yaml");
-    let mut arguments = vec!["teach", "--model", "S", "--demo", &demonstration, "--out", text(&out)];
-    if with_camera {
-        arguments.extend(["--camera", text(&camera), "--mark-height-mm", "16", "--grasp-height-mm", "9"]);
-    }
-    assert!(sdg(&arguments).status.success());
+    taught_pendulum(&out, with_camera.then_some(&*camera));
     out
 }
 

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use crate::support::{Folder, sdg, shipped, stdout};
+use crate::support::{Folder, sdg, shipped, stdout, taught_pendulum};
 use serde_json::{Value, json};
 
 /// Samples: enough that some with each difference of [`write_set`] are accepted, and some that are left as they are.
@@ -115,7 +115,7 @@ fn counted_naively(set: &str, model: &str) -> [u64; 6] {
 fn the_tuned_side_is_counted_by_the_rule_and_nothing_else_is_read() {
     let folder = Folder::new();
     let (set, split, model) = (write_set(&folder, "lever"), write_split(&folder), folder.path("model.sdg"));
-    stdout(&["teach", "--model", "S", "--demo", &format!("{set}/demo.png"), "--out", &model]);
+    taught_pendulum(&model, None);
     let expected = counted_naively(&set, &model);
     let [parts, found, accepted, wrong, negatives, false_alarms] = expected;
     assert!(found > 1 && wrong > 0 && parts >= found + 2 && negatives == 2 && false_alarms == 1, "{expected:?}");

@@ -118,6 +118,9 @@ pub fn render_with(
             (false, false) => 0.5 * (exposure.ink + exposure.paper),
         }
     };
+    // Four pixels share a corner.
+    let places: Vec<Option<(Point2<f64>, f64)>> =
+        places.into_iter().map(|place| place.map(|place| (place, brightness(&place)))).collect();
     let mut values = vec![0.5 * (exposure.ink + exposure.paper); width * height];
     for y in 0..height {
         for x in 0..width {
@@ -136,16 +139,17 @@ pub fn render_with(
     })
 }
 
-/// The mean over a pixel with these corners; 16 × 16 places where it is not the same all over.
-fn mean_over([a, b, c, d]: [Point2<f64>; 4], brightness: &dyn Fn(&Point2<f64>) -> f64) -> f64 {
+/// The mean over a pixel with these corners and their brightness; 16 × 16 places where it is not the same all over.
+fn mean_over(corners: [(Point2<f64>, f64); 4], brightness: &dyn Fn(&Point2<f64>) -> f64) -> f64 {
     const SIDE: usize = 16;
+    let [a, b, c, d] = corners.map(|(place, _)| place);
     let at = |u: f64, v: f64| {
         let upper = a.coords * (1.0 - u) + b.coords * u;
         let lower = c.coords * (1.0 - u) + d.coords * u;
         Point2::from(upper * (1.0 - v) + lower * v)
     };
     let middle = brightness(&at(0.5, 0.5));
-    if [a, b, c, d].iter().all(|corner| brightness(corner) == middle) {
+    if corners.iter().all(|(_, brightness)| *brightness == middle) {
         return middle;
     }
     let part = |k: usize| (k as f64 + 0.5) / SIDE as f64;

@@ -2,7 +2,9 @@
 #![allow(missing_docs)]
 
 use std::ffi::OsStr;
-use std::fs;
+use std::fs::{self, File};
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::io::{Read, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -21,6 +23,46 @@ pub fn stdout(arguments: &[&str]) -> String {
 /// A file of a part's shipped demonstration.
 pub fn shipped(part: &str, name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets/demonstrations").join(part).join(name)
+}
+
+/// Writes model S of the shipped pendulum, taught with seed 1: with a camera, 16 mm of its marks and 9 mm of the grasp, or without.
+///
+/// Thirty tests need one of the two, each in a process of its own, and a teaching takes five seconds of a core. So the first that asks for
+/// a file teaches it, for this program and these inputs, and the others copy it.
+pub fn taught_pendulum(out: impl AsRef<Path>, camera: Option<&Path>) {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("taught");
+    fs::create_dir_all(&folder).unwrap();
+    let [photo, marks] = ["image.png", "annotation.json"].map(|name| shipped("pendulum", name));
+    let mut made_of = String::new();
+    for file in [Path::new(env!("CARGO_BIN_EXE_sdg")), &photo, &marks] {
+        let found = fs::metadata(file).unwrap();
+        made_of += &format!("{} {} {:?}\n", file.display(), found.len(), found.modified().unwrap());
+    }
+    let camera_file = camera.map(|camera| fs::read_to_string(camera).unwrap()).unwrap_or_default();
+    made_of += &camera_file;
+    let mut hasher = DefaultHasher::new();
+    camera_file.hash(&mut hasher);
+    let model = folder.join(format!("pendulum-{:016x}.sdg", hasher.finish()));
+
+    // What the model was made of stands in the file that is locked, from when the model is whole.
+    let mut lock =
+        File::options().read(true).write(true).create(true).truncate(false).open(model.with_extension("lock")).unwrap();
+    lock.lock().unwrap();
+    let mut found = String::new();
+    lock.read_to_string(&mut found).unwrap();
+    if found != made_of {
+        lock.set_len(0).unwrap();
+        let (demonstration, model) = (format!("{}:{}", photo.display(), marks.display()), model.to_str().unwrap());
+        let mut arguments = vec!["teach", "--model", "S", "--demo", &demonstration, "--out", model];
+        if let Some(camera) = camera {
+            let camera = camera.to_str().unwrap();
+            arguments.extend(["--camera", camera, "--mark-height-mm", "16", "--grasp-height-mm", "9"]);
+        }
+        stdout(&arguments);
+        lock.rewind().unwrap();
+        lock.write_all(made_of.as_bytes()).unwrap();
+    }
+    fs::copy(&model, out).unwrap();
 }
 
 /// A folder that is deleted at the end.
