@@ -78,11 +78,11 @@ def difference(a, b, picture_a, picture_b):
 
 def main():
     args = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    args.add_argument("group", choices=["tune", "untuned"])
+    args.add_argument("group", choices=["tune", "roll", "untuned"])
     args.add_argument("parts", nargs="?")
     args.add_argument("--sheet")
     args = args.parse_args()
-    table = dict(tune=parts_tune, untuned=parts_untuned)[args.group].PARTS
+    table = dict(tune=parts_tune, roll=parts_roll, untuned=parts_untuned)[args.group].PARTS
     rows = []
     for name in args.parts.split(",") if args.parts else table:
         spec = table[name]

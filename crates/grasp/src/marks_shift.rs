@@ -8,7 +8,7 @@
 //! η is unknown. The marks' surroundings, edges and colours, are laid over the picture along that line and, since no camera
 //! looks quite straight down, some way beside it; a shift is taken where they agree clearly better than where the outline has
 //! them. Fitted on the tuned sets of datasets/split.toml and base-weights/physical/split.toml: the marks of 304 of 312 parts
-//! come to lie within 4 % of the diagonal, of 268 without any shift (docs/decisions/027-marks-at-a-height.md).
+//! come to lie within 4 % of the diagonal, of 268 without any shift (docs/decisions/027-heights-and-slants.md).
 
 use image::RgbImage;
 use image::imageops::interpolate_bilinear;
