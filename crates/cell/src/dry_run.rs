@@ -34,7 +34,7 @@ impl DryRun {
         config: &GraspConfig,
         place: Option<&(PlaceGoal, PlacingConfig)>,
     ) -> Result<Self> {
-        let mut arm = PlannedArm::new(start.q_commanded, opening_m);
+        let mut arm = PlannedArm::new(limits.geometry.clone(), start.q_commanded, opening_m);
         let mut robot = Robot::new(&mut arm, limits, Watch::default());
         let mut finder = KnownTarget::new(target, mount, config);
         let Ended { failed, .. } = run_sequence(&mut robot, &mut finder, mount, config, place)?;

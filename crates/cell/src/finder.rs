@@ -13,7 +13,6 @@ use nalgebra::{Isometry3, Point2, Point3};
 use sdg_camera::LatestFrame;
 use sdg_geometry::Polygon;
 use sdg_grasp::{CameraOverTable, Circumstances, ErrorLength, GraspModel, Verification};
-use sdg_kinematics::Panda;
 use sdg_robot::height::{MeasuredHeight, Sighting};
 use sdg_robot::{Arm, GraspTarget, PartFinder, Place, RobotError};
 
@@ -210,7 +209,7 @@ impl<P> ModelFinder<P> {
         let state = arm.state()?;
         let TakenPicture { picture, taken } = self.pictures.take(arm)?;
         self.taken = taken;
-        let mut place = self.camera.over_table(&Panda::new().base_from_flange(&state.q));
+        let mut place = self.camera.over_table(&arm.geometry().base_from_flange(&state.q));
         place.table_height_m += higher_m;
         self.perception.move_to(&place)?;
         let distance_m = place.camera.world_from_camera.translation.z - self.marks_z_m(&place);

@@ -4,7 +4,7 @@ use nalgebra::Isometry3;
 use sdg_calibration::{CalibratedCamera, Frame};
 use sdg_geometry::{PinholeCamera, PosedCamera};
 use sdg_grasp::CameraOverTable;
-use sdg_kinematics::Panda;
+use sdg_kinematics::ArmGeometry;
 use sdg_robot::workcell::Mounting;
 use sdg_robot::{CameraMount, CameraPose};
 
@@ -46,9 +46,9 @@ impl PlacedCamera {
     /// The camera's mount, as the grasp sequence takes it.
     pub fn mount(&self) -> CameraMount {
         match self.pose {
-            CameraPose::OnFlange(flange_from_camera) => {
-                CameraMount::Hand { tcp_from_camera: Panda::new().flange_from_tcp().inverse() * flange_from_camera }
-            }
+            CameraPose::OnFlange(flange_from_camera) => CameraMount::Hand {
+                tcp_from_camera: ArmGeometry::panda().flange_from_tcp().inverse() * flange_from_camera,
+            },
             CameraPose::InBase(_) => CameraMount::Base,
         }
     }

@@ -1,7 +1,6 @@
 //! Perception for an arm that moves nothing: the part is where it was seen, wherever the arm is.
 
 use nalgebra::{Isometry3, Point3};
-use sdg_kinematics::Panda;
 
 use crate::Arm;
 use crate::error::Result;
@@ -43,7 +42,8 @@ impl PartFinder<PlannedArm> for KnownTarget {
 
     fn sight(&mut self, arm: &mut PlannedArm, _expected: &GraspTarget) -> Result<Vec<Sighting>> {
         let CameraMount::Hand { tcp_from_camera } = self.mount else { return Ok(Vec::new()) };
-        let base_from_camera = Panda::new().forward(&arm.state()?.q) * tcp_from_camera;
+        let q = arm.state()?.q;
+        let base_from_camera = arm.geometry().forward(&q) * tcp_from_camera;
         let sighting = |target: GraspTarget| {
             let p = target.base_from_tcp.translation;
             Sighting {

@@ -18,7 +18,7 @@
 //!
 //! let mut folded = ready_pose();
 //! (folded[1], folded[3], folded[5]) = (-1.7, -3.0, 0.5);
-//! let slow = JointLimits::franka().scaled(0.1, 0.1, 0.1)?;
+//! let slow = JointLimits::panda().scaled(0.1, 0.1, 0.1)?;
 //! let motion = Trajectory::point_to_point(&ready_pose(), &folded, &slow)?;
 //! let refused = SafetyLimits::default().check(motion);
 //! assert!(matches!(refused, Err(Violation::SelfCollision { .. })), "{refused:?}");
@@ -73,7 +73,7 @@ pub use planned_arm::{PlannedAction, PlannedArm};
 pub use playback::{JointReference, Playback, STOP_SECS};
 pub use robot::Robot;
 pub use robot_address::RobotAddress;
-pub use safety::{CheckedMotion, LinkCapsules, SafetyLimits, SelfCollision, Violation, WorkspaceBox};
+pub use safety::{CheckedMotion, SafetyLimits, SelfCollision, Violation, WorkspaceBox};
 pub use sequence::{
     CONFIRMED, CameraMount, FREE_CLEARANCE_M, GraspConfig, GraspOutcome, GraspReport, LOOK_AT_M, LOOK_HEIGHT_M,
     LookOut, PlaceOutcome, PlaceReport, PlacingConfig, SURE, camera_looking_down, grasp, grasp_and_place, grasp_softly,

@@ -7,7 +7,7 @@
 //! What is felt is the robot's own estimate of the external force; the height that counts is the measured one.
 
 use nalgebra::{Isometry3, Vector6};
-use sdg_kinematics::{JointVector, Panda};
+use sdg_kinematics::{ArmGeometry, JointVector};
 
 use crate::arm_state::PERIOD_SECS;
 use crate::error::{Result, RobotError};
@@ -132,7 +132,7 @@ pub struct Descent {
 
 impl Descent {
     /// Begins where the arm stands (rad), after this torque (N·m, without gravity).
-    pub fn new(touch_down: TouchDown, panda: &Panda, q: JointVector, torque: JointVector) -> Self {
+    pub fn new(touch_down: TouchDown, panda: &ArmGeometry, q: JointVector, torque: JointVector) -> Self {
         Self {
             touch_down,
             control: ImpedanceControl::new(touch_down.free_air, q, torque),
@@ -155,7 +155,13 @@ impl Descent {
     ///
     /// `force_n` is the vertical external force, upwards, as the robot estimates it. Only its change against free air counts, so that a
     /// part of unknown weight, or a robot that counts the other way round, makes no difference.
-    pub fn next(&mut self, panda: &Panda, q: &JointVector, dq: &JointVector, force_n: f64) -> (JointVector, bool) {
+    pub fn next(
+        &mut self,
+        panda: &ArmGeometry,
+        q: &JointVector,
+        dq: &JointVector,
+        force_n: f64,
+    ) -> (JointVector, bool) {
         let pressed_n = (force_n - self.free_air_n).abs();
         let base_from_tcp = panda.forward(q);
         let height_m = base_from_tcp.translation.z;

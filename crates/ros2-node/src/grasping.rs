@@ -201,7 +201,7 @@ fn planned(
         Ok(_) => return refused("the part was not found".to_owned()),
         Err(error) => return refused(error.to_string()),
     };
-    let mut planned = PlannedArm::new(state.q, hand.opening_m);
+    let mut planned = PlannedArm::new(settings.workcell.robot.geometry(), state.q, hand.opening_m);
     let mut robot = Robot::new(&mut planned, settings.workcell.safety_limits(), Default::default());
     let mut step = LastStep(GraspStep::Detect);
     let mount = settings.camera.mount();

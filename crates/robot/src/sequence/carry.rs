@@ -113,7 +113,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         for (index, pose) in poses.iter().enumerate() {
             let (ik, line) = (IkOptions::default(), LineOptions::default());
             let planned =
-                self.robot.panda().approach(&above(pose, height_m), pose, GraspSymmetry::Fixed, &seed, &ik, &line);
+                self.robot.geometry().approach(&above(pose, height_m), pose, GraspSymmetry::Fixed, &seed, &ik, &line);
             match planned {
                 Ok(approach) if best.as_ref().is_none_or(|(_, best)| approach.pregrasp.cost < best.pregrasp.cost) => {
                     best = Some((index, approach));
@@ -127,7 +127,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
 
     /// Whether the arm can come down from a configuration as far as a place may be felt; why not.
     fn goes_on_down(&self, from: &JointVector) -> Result<(), String> {
-        let panda = self.robot.panda();
+        let panda = self.robot.geometry();
         let lowest = above(&panda.forward(from), -(SOFT_WAY_M + BELOW_M));
         let line = panda.straight_path(from, &lowest, &LineOptions::default());
         line.map(|_| ()).map_err(|error| error.to_string())
@@ -146,7 +146,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         let hand = self.robot.hand()?;
         self.judge(GraspStep::Carry, &hand)?;
         self.robot.set_contact_sensitivity(ContactSensitivity::Contact)?;
-        let planned = self.robot.plan_along(&path, &self.config.pace.approach_limits());
+        let planned = self.robot.plan_along(&path, &self.config.pace.approach_limits(self.robot.geometry()));
         let motion = fails_at(GraspStep::PutDown, planned)?;
         self.follow(motion, GraspStep::PutDown)
     }

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use sdg_kinematics::collision::Obstacle;
-use sdg_kinematics::{IkOptions, JointVector, Panda, ready_pose};
+use sdg_kinematics::{ArmGeometry, IkOptions, JointVector};
 
 use crate::arm_state::Load;
 use crate::error::{Result, RobotError};
@@ -118,7 +118,7 @@ impl LookOut {
     ///
     /// # Errors
     /// [`RobotError::Configuration`] for a place out of reach, or a camera that is to be moved and does not stand on the hand.
-    pub fn configuration(&self, panda: &Panda, mount: &CameraMount, table_height_m: f64) -> Result<JointVector> {
+    pub fn configuration(&self, arm: &ArmGeometry, mount: &CameraMount, table_height_m: f64) -> Result<JointVector> {
         let (at_m, height_m, yaw_rad) = match (*self, mount) {
             (Self::Joints(q), _) => return Ok(q),
             (Self::CameraAt { at_m, height_m, yaw_rad }, CameraMount::Hand { .. }) => (at_m, height_m, yaw_rad),
@@ -132,13 +132,13 @@ impl LookOut {
         };
         let base_from_camera = camera_looking_down(at_m[0], at_m[1], table_height_m + height_m, yaw_rad);
         let base_from_tcp = mount.base_from_tcp(&base_from_camera);
-        panda.inverse(&base_from_tcp, &ready_pose(), &IkOptions::default()).map(|solution| solution.q).map_err(
-            |error| RobotError::Configuration {
+        arm.inverse(&base_from_tcp, &arm.ready, &IkOptions::default()).map(|solution| solution.q).map_err(|error| {
+            RobotError::Configuration {
                 what: format!("look-out pose at ({}, {}) m, {height_m} m above the table", at_m[0], at_m[1]),
                 expected: "a camera pose within the arm's reach".into(),
                 found: error.to_string(),
-            },
-        )
+            }
+        })
     }
 }
 
@@ -168,7 +168,7 @@ mod tests {
 
     #[test]
     fn a_look_out_puts_the_camera_where_it_is_told() {
-        let panda = Panda::new();
+        let panda = ArmGeometry::panda();
         let mount = CameraMount::Hand { tcp_from_camera: Isometry3::translation(0.072, 0.0, -0.0534) };
         let look_out = LookOut::CameraAt { at_m: [0.5, 0.1], height_m: 0.5, yaw_rad: 0.3 };
         let q = look_out.configuration(&panda, &mount, 0.05).unwrap();
@@ -179,7 +179,7 @@ mod tests {
 
     #[test]
     fn places_that_cannot_be_are_said() {
-        let (panda, mount) = (Panda::new(), CameraMount::Hand { tcp_from_camera: Isometry3::identity() });
+        let (panda, mount) = (ArmGeometry::panda(), CameraMount::Hand { tcp_from_camera: Isometry3::identity() });
         let far = LookOut::CameraAt { at_m: [1.5, 0.0], height_m: 0.5, yaw_rad: 0.0 };
         let found = far.configuration(&panda, &mount, 0.0).unwrap_err().to_string();
         assert!(

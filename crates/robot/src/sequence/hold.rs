@@ -39,7 +39,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
             self.robot.set_load(load)?;
         }
         let q = self.robot.state()?.q;
-        let base_from_tcp = self.robot.panda().forward(&q);
+        let base_from_tcp = self.robot.geometry().forward(&q);
         self.held = Some(HeldPart::new(target, &base_from_tcp, self.surface_height_m(), self.config));
         Ok(())
     }
@@ -47,7 +47,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
     /// Lifts the part, as high as the arm reaches.
     pub(super) fn lift(&mut self) -> Steps<()> {
         let start = self.robot.commanded()?;
-        let base_from_tcp = self.robot.panda().forward(&start);
+        let base_from_tcp = self.robot.geometry().forward(&start);
         let mut lift_m = self.config.lift_m;
         let path = loop {
             let lifted = above(&base_from_tcp, lift_m);
@@ -57,7 +57,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
                 Err(why) => return Err(Stop::Failed(GraspStep::Lift, why)),
             }
         };
-        let planned = self.robot.plan_along(&path, &self.config.pace.lift_limits());
+        let planned = self.robot.plan_along(&path, &self.config.pace.lift_limits(self.robot.geometry()));
         let motion = fails_at(GraspStep::Lift, planned)?;
         self.follow(motion, GraspStep::Lift)?;
         let hand = self.robot.hand()?;
@@ -70,12 +70,12 @@ impl<A: Arm> Sequence<'_, '_, A> {
         start: &JointVector,
         base_from_tcp: &Isometry3<f64>,
     ) -> Steps<Result<JointPath, String>> {
-        let panda = self.robot.panda();
+        let panda = self.robot.geometry();
         if !self.is_surrounded() {
             let line = panda.straight_path(start, base_from_tcp, &LineOptions::default());
             return Ok(line.map_err(|error| error.to_string()));
         }
-        let model = self.surroundings().contact_model(self.robot.limits().table_height_m)?;
+        let model = self.surroundings().contact_model(self.robot.geometry(), self.robot.limits().table_height_m)?;
         let mut checker = Checker::new(&model, LINE_MARGIN_M);
         let line = checked_line(panda, &mut checker, start, base_from_tcp).map_err(RobotError::Planning)?;
         let CheckedLine { share, path, blocked_by } = line;

@@ -1,7 +1,7 @@
 //! Looking: from afar, and from above what was found.
 
 use nalgebra::{Isometry3, Vector3};
-use sdg_kinematics::{HAND_OPENING_MAX_M, IkOptions, IkSolution, KinematicsError, with_fingers_exchanged};
+use sdg_kinematics::{IkOptions, IkSolution, KinematicsError, with_fingers_exchanged};
 
 use super::held_part::shape_of;
 use super::{SETTLE_SECS, Sequence, Steps, Stop, camera_looking_down};
@@ -27,7 +27,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         let table_height_m = self.robot.limits().table_height_m;
         let mut looks = 0;
         for look_out in &config.look_outs {
-            let arrived = match look_out.configuration(self.robot.panda(), &self.mount, table_height_m) {
+            let arrived = match look_out.configuration(self.robot.geometry(), &self.mount, table_height_m) {
                 Ok(q) => self.move_freely(&q, GraspStep::Detect),
                 Err(error) => Err(Stop::Error(error)),
             };
@@ -75,11 +75,12 @@ impl<A: Arm> Sequence<'_, '_, A> {
         if !(p.iter().all(|value| value.is_finite()) && found.jaw_width_m.is_finite()) {
             return Err(failed("the grasp that was found is not finite".into()));
         }
-        if found.jaw_width_m > HAND_OPENING_MAX_M {
+        let opening_max_m = self.robot.geometry().hand.opening_max_m;
+        if found.jaw_width_m > opening_max_m {
             return Err(failed(format!(
                 "the part is {:.0} mm wide, the hand opens {:.0} mm",
                 found.jaw_width_m * 1e3,
-                HAND_OPENING_MAX_M * 1e3
+                opening_max_m * 1e3
             )));
         }
         Ok(Some(found))
@@ -149,7 +150,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         let mut best: Option<IkSolution> = None;
         let mut first_error = None;
         for base_from_tcp in poses {
-            match self.robot.panda().inverse(&base_from_tcp, &seed, &IkOptions::default()) {
+            match self.robot.geometry().inverse(&base_from_tcp, &seed, &IkOptions::default()) {
                 Ok(solution) if best.as_ref().is_none_or(|best| solution.cost < best.cost) => best = Some(solution),
                 Ok(_) => {}
                 Err(error) => {

@@ -23,7 +23,7 @@ mod travel;
 
 use std::time::Instant;
 
-use sdg_kinematics::{HAND_OPENING_MAX_M, Trajectory};
+use sdg_kinematics::Trajectory;
 
 use crate::arm::{Arm, CompliantArm};
 use crate::arm_state::HandState;
@@ -184,6 +184,7 @@ impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
         mount: CameraMount,
         config: &'s GraspConfig,
     ) -> Self {
+        let opening_m = robot.geometry().hand.opening_max_m;
         Self {
             robot,
             finder,
@@ -201,7 +202,7 @@ impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
             height: None,
             surface_m: None,
             lying: LyingParts::new(&config.lying),
-            opening_m: HAND_OPENING_MAX_M,
+            opening_m,
             opening_margin_m: config.opening_margin_m,
         }
     }

@@ -172,7 +172,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
             let aim = self.carry(goal, placing.symmetry, self.release_opening_m(placing), &slid)?;
             self.put_down(&aim, placing)?;
             let q = self.robot.state()?.q;
-            let base_from_tcp = self.robot.panda().forward(&q);
+            let base_from_tcp = self.robot.geometry().forward(&q);
             let shape = self.held.as_ref().and_then(|held| held.shape.clone());
             let part_from_tcp = self.release(placing)?;
             let lies = shape.map(|shape| LyingPart { base_from_part: aim.base_from_part, shape });
@@ -255,7 +255,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         self.passed(GraspStep::Release)?;
         let start = self.robot.commanded()?;
         let path = self.way_up(&start, placing.retreat_m)?;
-        let planned = self.robot.plan_along(&path, &self.config.pace.approach_limits());
+        let planned = self.robot.plan_along(&path, &self.config.pace.approach_limits(self.robot.geometry()));
         let motion = fails_at(GraspStep::Release, planned)?;
         self.follow(motion, GraspStep::Release)?;
         Ok(part_from_tcp)
@@ -267,7 +267,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
     }
 
     fn way_up(&self, start: &JointVector, retreat_m: f64) -> Steps<JointPath> {
-        let base_from_tcp = self.robot.panda().forward(start);
+        let base_from_tcp = self.robot.geometry().forward(start);
         let mut up_m = retreat_m;
         loop {
             match self.free_line(start, &above(&base_from_tcp, up_m))? {
@@ -298,7 +298,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
             let arrived = match (&self.mount, self.config.look_outs.first()) {
                 (CameraMount::Hand { .. }, _) => self.hover(&grasps, shift_m, GraspStep::Check),
                 (CameraMount::Base, Some(look_out)) if look == 0 => {
-                    let q = look_out.configuration(self.robot.panda(), &self.mount, table_height_m)?;
+                    let q = look_out.configuration(self.robot.geometry(), &self.mount, table_height_m)?;
                     self.move_freely(&q, GraspStep::Check)?;
                     Ok(self.robot.wait(SETTLE_SECS)?)
                 }

@@ -33,8 +33,8 @@ impl<A: Arm> Sequence<'_, '_, A> {
     /// Joint limits of free motions, with a part in the hand and without.
     fn free_limits(&self) -> JointLimits {
         match self.held {
-            Some(_) => self.config.pace.carry_limits(),
-            None => self.config.pace.free_limits(),
+            Some(_) => self.config.pace.carry_limits(self.robot.geometry()),
+            None => self.config.pace.free_limits(self.robot.geometry()),
         }
     }
 
@@ -57,7 +57,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         let limits = self.free_limits();
         let planned = self.robot.plan_free(q, &limits);
         let motion = fails_at(step, planned)?;
-        let (panda, table_height_m) = (self.robot.panda(), self.robot.limits().table_height_m);
+        let (panda, table_height_m) = (self.robot.geometry(), self.robot.limits().table_height_m);
         let clearance = motion.clearance(panda, table_height_m);
         // What is held hangs lower than the fingers.
         let held_m = self.held.as_ref().map_or(0.0, |held| held.hang_m);

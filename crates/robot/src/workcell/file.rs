@@ -182,6 +182,7 @@ fn read(text: &str) -> Result<Workcell, WorkcellError> {
     let workspace = WorkspaceBox { min_m: Vector3::new(x[0], y[0], z[0]), max_m: Vector3::new(x[1], y[1], z[1]) };
     let room = Room { table_height_m, table_m, workspace: &workspace };
     let places = places(&source, &file.place, &file.tray, &file.bin, &room)?;
+    let limits = robot.geometry().limits;
     Ok(Workcell {
         robot,
         address: file.robot.address.map(Spanned::into_inner),
@@ -197,7 +198,10 @@ fn read(text: &str) -> Result<Workcell, WorkcellError> {
         workspace,
         places,
         obstacles: obstacles(&source, &file.obstacle)?,
-        look_outs: look_outs.iter().map(|section| look_out(&source, section, mounting)).collect::<Result<_, _>>()?,
+        look_outs: look_outs
+            .iter()
+            .map(|section| look_out(&source, section, mounting, &limits))
+            .collect::<Result<_, _>>()?,
     })
 }
 
@@ -205,6 +209,7 @@ fn look_out(
     source: &Source<'_>,
     section: &Spanned<LookOutSection>,
     mounting: Mounting,
+    limits: &JointLimits,
 ) -> Result<LookOut, WorkcellError> {
     let LookOutSection { camera_at_mm, yaw_deg, joints_deg } = section.get_ref();
     match (camera_at_mm, joints_deg) {
@@ -231,7 +236,7 @@ fn look_out(
                 return Err(source.error(yaw.span().start, "yaw_deg: expected with camera_at_mm only"));
             }
             let q = JointVector::from(joints.get_ref().0.map(f64::to_radians));
-            match JointLimits::franka().worst_violation(&q, 0.0) {
+            match limits.worst_violation(&q, 0.0) {
                 None if q.iter().all(|value| value.is_finite()) => Ok(LookOut::Joints(q)),
                 None => Err(source.expected(
                     joints,
@@ -242,7 +247,7 @@ fn look_out(
                 Some(violation) => {
                     let [min, max] = [violation.min_rad, violation.max_rad].map(f64::to_degrees);
                     let expected = format!("joint {} from {min:.1} to {max:.1} degrees", violation.joint);
-                    let hint = match JointLimits::franka().are_radians_given_as_degrees(&q) {
+                    let hint = match limits.are_radians_given_as_degrees(&q) {
                         true => ": radians given as degrees?",
                         false => "",
                     };

@@ -51,7 +51,7 @@ impl Workcell {
     /// What every motion in the workcell keeps to: Franka's limits over the table, but for the hand's turning, since joint motions
     /// go at the pace of rehearsals.
     pub fn safety_limits() -> SafetyLimits {
-        let mut cartesian = CartesianLimits::franka();
+        let mut cartesian = CartesianLimits::panda();
         cartesian.angular_velocity_rad_s = REHEARSED_ANGULAR_VELOCITY_RAD_S;
         cartesian.angular_acceleration_rad_s2 = REHEARSED_ANGULAR_ACCELERATION_RAD_S2;
         SafetyLimits { cartesian, fingertip_beyond_tcp_m: FINGERTIP_BEYOND_TCP_M, ..SafetyLimits::default() }
@@ -155,10 +155,10 @@ impl Workcell {
         let mut rng = Pcg64Mcg::seed_from_u64(seed ^ 0x5354_4152_545f_5144);
         let first = config.look_outs.first().copied().unwrap_or(LookOut::Joints(ready_pose()));
         let look = first.configuration(&self.panda, &self.wrist_mount(), 0.0)?;
-        let limits = config.pace.free_limits();
+        let limits = config.pace.free_limits(&self.panda);
         for _ in 0..NUM_TRIES {
             let offset = JointVector::from_fn(|joint, _| rng.random_range(-SPREAD_RAD[joint]..SPREAD_RAD[joint]));
-            let q = self.panda.limits().clamp(&(ready_pose() + offset));
+            let q = self.panda.limits.clamp(&(ready_pose() + offset));
             let safe = self.panda.clearance(&q, 0.0).lowest_m > 0.2
                 && Trajectory::point_to_point(&q, &look, &limits)
                     .is_ok_and(|motion| motion.clearance(&self.panda, 0.0).lowest_m > FREE_CLEARANCE_M);

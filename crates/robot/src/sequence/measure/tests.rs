@@ -1,7 +1,7 @@
 //! The sequence with an arm that moves nothing and a part that is shown in some pictures and not in others.
 
 use nalgebra::UnitQuaternion;
-use sdg_kinematics::{Panda, ready_pose};
+use sdg_kinematics::{ArmGeometry, ready_pose};
 
 use super::*;
 use crate::height::ToldHeight;
@@ -65,7 +65,7 @@ fn part(higher_m: f64) -> GraspTarget {
 
 /// Grasps a part that lies 20 mm higher than the table and is seen 5 mm higher than it lies; the camera's places for the height.
 fn grasped(config: &GraspConfig, shows: &[bool], sees_surface: bool) -> (GraspReport, Vec<Vector3<f64>>, usize) {
-    let mut arm = PlannedArm::new(ready_pose(), 0.08);
+    let mut arm = PlannedArm::new(ArmGeometry::panda(), ready_pose(), 0.08);
     let mut robot = Robot::new(&mut arm, SafetyLimits::default(), Watch::default());
     let known = KnownTarget::new(Some(part(0.020)), mount(), config);
     let mut finder = Shown { known, seen: part(0.025), shows: shows.to_vec(), num_sights: 0, sees_surface };
@@ -74,7 +74,7 @@ fn grasped(config: &GraspConfig, shows: &[bool], sees_surface: bool) -> (GraspRe
     let CameraMount::Hand { tcp_from_camera } = mount() else { unreachable!() };
     let places = arm.actions().iter().filter_map(|action| match action {
         PlannedAction::Motion(motion) => {
-            Some((Panda::new().forward(motion.end()) * tcp_from_camera).translation.vector)
+            Some((ArmGeometry::panda().forward(motion.end()) * tcp_from_camera).translation.vector)
         }
         _ => None,
     });
@@ -151,7 +151,7 @@ fn parts_near_the_camera_are_told() {
 
 #[test]
 fn a_camera_beside_the_robot_measures_nothing() {
-    let mut arm = PlannedArm::new(ready_pose(), 0.08);
+    let mut arm = PlannedArm::new(ArmGeometry::panda(), ready_pose(), 0.08);
     let mut robot = Robot::new(&mut arm, SafetyLimits::default(), Watch::default());
     let look_outs = vec![crate::LookOut::Joints(ready_pose())];
     let config = GraspConfig { look_outs, ..config(None) };

@@ -8,7 +8,7 @@ use crate::safety::{CheckedMotion, SafetyLimits};
 use crate::sequence::LookOut;
 use crate::watch::Watch;
 use sdg_kinematics::collision::{Obstacle, Shape};
-use sdg_kinematics::{Panda, ready_pose};
+use sdg_kinematics::{ArmGeometry, ready_pose};
 
 /// A planned arm whose part slides by so much in its own frame when the hand closes on it, and stays where it is let go.
 struct Cell {
@@ -22,11 +22,15 @@ struct Cell {
 
 impl Cell {
     fn tcp(&mut self) -> Isometry3<f64> {
-        Panda::new().forward(&self.arm.state().unwrap().q)
+        ArmGeometry::panda().forward(&self.arm.state().unwrap().q)
     }
 }
 
 impl Arm for Cell {
+    fn geometry(&self) -> &ArmGeometry {
+        self.arm.geometry()
+    }
+
     fn state(&mut self) -> Result<ArmState> {
         self.arm.state()
     }
@@ -93,7 +97,7 @@ fn lying(x: f64, y: f64, yaw_rad: f64) -> Isometry3<f64> {
 
 fn cell(slide: Isometry3<f64>) -> Cell {
     Cell {
-        arm: PlannedArm::new(ready_pose(), 0.08),
+        arm: PlannedArm::new(ArmGeometry::panda(), ready_pose(), 0.08),
         base_from_part: lying(0.5, 0.1, 0.4),
         slide,
         tcp_from_part: None,
@@ -213,7 +217,8 @@ fn the_whole_sequence_goes_around_what_stands_in_the_cell() {
     let goal = tray().goal(1).unwrap();
     let report = run(&mut cell, &surrounded, &goal, &PlacingConfig::default());
     assert_eq!(report.outcome, PlaceOutcome::Placed, "{report:?}");
-    let model = crate::surroundings::collision_model(-1.0, std::slice::from_ref(&wall), 0.08).unwrap();
+    let model =
+        crate::surroundings::collision_model(&ArmGeometry::panda(), -1.0, std::slice::from_ref(&wall), 0.08).unwrap();
     let mut checker = sdg_kinematics::collision::Checker::new(&model, 1e-3);
     let motions = cell.arm.actions().iter().filter_map(|action| match action {
         PlannedAction::Motion(motion) => Some(motion),
