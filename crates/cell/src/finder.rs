@@ -16,8 +16,8 @@ use sdg_grasp::{CameraOverTable, Circumstances, ErrorLength, GraspModel, Verific
 use sdg_robot::height::{MeasuredHeight, Sighting};
 use sdg_robot::{Arm, GraspTarget, PartFinder, Place, RobotError};
 
+use crate::mounted_camera::MountedCamera;
 use crate::perception::{Found, Perception};
-use crate::placed_camera::PlacedCamera;
 use crate::surface::{PartOnSurface, PosedPicture, surface_height};
 
 /// How long a picture that was taken after the arm stopped is waited for.
@@ -85,7 +85,7 @@ pub struct SeenOutline {
 #[derive(Debug)]
 pub struct ModelFinder<P> {
     pictures: P,
-    camera: PlacedCamera,
+    camera: MountedCamera,
     perception: Perception,
     taken: Option<Instant>,
     /// Whether detections are checked against the demonstration.
@@ -131,7 +131,7 @@ const SIGMAS_OF_RADIUS: f64 = 1.51;
 
 impl<P> ModelFinder<P> {
     /// Looks for the model's part through the camera.
-    pub fn new(model: GraspModel, camera: PlacedCamera, pictures: P) -> Self {
+    pub fn new(model: GraspModel, camera: MountedCamera, pictures: P) -> Self {
         let perception = Perception::of_any_camera(model);
         Self {
             pictures,
@@ -277,7 +277,7 @@ impl<P> ModelFinder<P> {
 
     /// Keeps the last picture and the outlines of what it shows.
     fn keep_sights(&mut self, sightings: &[Sighting]) {
-        let (Some((picture, found)), Some(place)) = (&self.last, self.perception.place()) else { return };
+        let (Some((picture, found)), Some(place)) = (&self.last, self.perception.camera_over_table()) else { return };
         let outlines = found.iter().filter(|found| found.pose.is_some()).map(|found| found.detection.outline.as_ref());
         let parts = sightings.iter().zip(outlines).filter_map(|(sighting, outline)| {
             let on_plane = |pixel| place.camera.at_height(pixel, sighting.middle_m.z).map(|p_in_base| p_in_base.xy());

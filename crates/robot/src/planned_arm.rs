@@ -175,11 +175,12 @@ impl CompliantArm for PlannedArm {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::camera_pose::CameraPose;
     use crate::grasp_target::GraspTarget;
     use crate::perception::PartFinder;
     use crate::robot::Robot;
     use crate::safety::SafetyLimits;
-    use crate::sequence::{CameraMount, GraspConfig, GraspOutcome, grasp};
+    use crate::sequence::{GraspConfig, GraspOutcome, grasp};
     use nalgebra::{Isometry3, UnitQuaternion, Vector3};
     use sdg_kinematics::{ArmGeometry, ready_pose};
 
@@ -197,8 +198,6 @@ mod tests {
         GraspTarget { base_from_tcp, jaw_width_m: 0.02, score: 0.9 }
     }
 
-    const MOUNT: CameraMount = CameraMount::Base;
-
     fn config() -> GraspConfig {
         let look_outs = vec![crate::sequence::LookOut::Joints(ready_pose())];
         GraspConfig { look_outs, pace: crate::pace::Pace::at_speed(0.1).unwrap(), ..GraspConfig::default() }
@@ -210,7 +209,14 @@ mod tests {
         start[0] = 0.6;
         let mut arm = PlannedArm::new(ArmGeometry::panda(), start, 0.08);
         let mut robot = Robot::new(&mut arm, SafetyLimits::default(), Watch::default());
-        let report = grasp(&mut robot, &mut FixedTarget(Some(target())), &mut (), MOUNT, &config()).unwrap();
+        let report = grasp(
+            &mut robot,
+            &mut FixedTarget(Some(target())),
+            &mut (),
+            CameraPose::InBase(Isometry3::identity()),
+            &config(),
+        )
+        .unwrap();
         assert_eq!(report.outcome, GraspOutcome::Held);
         let motions: Vec<_> = arm
             .actions()
@@ -239,7 +245,9 @@ mod tests {
     fn a_part_that_is_not_seen_ends_the_plan_at_the_look_out() {
         let mut arm = PlannedArm::new(ArmGeometry::panda(), ready_pose(), 0.08);
         let mut robot = Robot::new(&mut arm, SafetyLimits::default(), Watch::default());
-        let report = grasp(&mut robot, &mut FixedTarget(None), &mut (), MOUNT, &config()).unwrap();
+        let report =
+            grasp(&mut robot, &mut FixedTarget(None), &mut (), CameraPose::InBase(Isometry3::identity()), &config())
+                .unwrap();
         assert!(matches!(report.outcome, GraspOutcome::Failed { step: crate::GraspStep::Detect, .. }));
     }
 }

@@ -136,7 +136,7 @@ fn no_motion_begins_on_a_detection_that_is_older_than_a_second() {
     let cell = cell("pendulum", 101);
     let (server, positions) = serve(&cell, Pace::LOCKSTEP);
     let mut arm = connect(&server).unwrap();
-    let mount = cell.wrist_mount();
+    let mount = cell.wrist_camera();
     let mut finder = OldPicture(Twin { cell, positions: positions.clone() }, Duration::from_millis(1200));
     let mut robot = Robot::new(&mut arm, Workcell::safety_limits(), Watch::default());
     let report = grasp(&mut robot, &mut finder, &mut (), mount, &GraspConfig::default()).unwrap();
@@ -151,7 +151,7 @@ fn a_part_that_slips_is_told_by_the_hand() {
     let cell = cell("pendulum", 101);
     let (server, positions) = serve(&cell, Pace::LOCKSTEP);
     let mut arm = connect(&server).unwrap();
-    let mount = cell.wrist_mount();
+    let mount = cell.wrist_camera();
     let mut twin = Twin { cell, positions: positions.clone() };
     let mut robot = Robot::new(&mut arm, Workcell::safety_limits(), Watch::default());
     // A force that does not hold what weighs so much.
@@ -223,7 +223,7 @@ fn a_hand_that_fails_ends_the_grasp() {
     let cell = cell("pendulum", 101);
     let (server, positions) = serve(&cell, Pace::LOCKSTEP);
     let mut arm = connect(&server).unwrap();
-    let mount = cell.wrist_mount();
+    let mount = cell.wrist_camera();
     let mut twin = Twin { cell, positions };
     server.set_hand_failing(true);
     let mut robot = Robot::new(&mut arm, Workcell::safety_limits(), Watch::default());

@@ -31,7 +31,7 @@ fn cell(arm_fault: Option<ArmFault>) -> Workcell {
 }
 
 fn run(robot: &mut Robot<'_, Workcell>) -> sdg_robot::Result<GraspReport> {
-    let mount = robot.arm().wrist_mount();
+    let mount = robot.arm().wrist_camera();
     grasp(robot, &mut Truth, &mut (), mount, &GraspConfig::default())
 }
 
@@ -139,7 +139,7 @@ fn a_part_that_slips_is_felt_by_the_hand() {
     let mut robot = Robot::new(&mut cell, Workcell::safety_limits(), Watch::default());
     // A force that does not hold what weighs so much.
     let config = GraspConfig { grasp_force_n: 0.3, ..GraspConfig::default() };
-    let mount = robot.arm().wrist_mount();
+    let mount = robot.arm().wrist_camera();
     let report = grasp(&mut robot, &mut Truth, &mut (), mount, &config).unwrap();
     let GraspOutcome::Failed { step, why } = report.outcome else { panic!("0.3 N hold nothing") };
     assert!(matches!(step, GraspStep::Lift | GraspStep::Hold), "{step}: {why}");

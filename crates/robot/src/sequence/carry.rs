@@ -42,9 +42,10 @@ impl<A: Arm> Sequence<'_, '_, A> {
         opening_m: f64,
         slip: &Isometry3<f64>,
     ) -> Steps<Aim> {
-        let held = self.held.clone().ok_or_else(|| Stop::Failed(GraspStep::Carry, "nothing is held".to_owned()))?;
+        let held =
+            self.known.held.clone().ok_or_else(|| Stop::Failed(GraspStep::Carry, "nothing is held".to_owned()))?;
         // Where the hand cannot open it need not come down.
-        self.opening_m = opening_m;
+        self.known.opening_m = opening_m;
         let mut aims: Vec<Aim> = same_turns_rad(symmetry)
             .into_iter()
             .map(|turn_rad| {
@@ -146,7 +147,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         let hand = self.robot.hand()?;
         self.judge(GraspStep::Carry, &hand)?;
         self.robot.set_contact_sensitivity(ContactSensitivity::Contact)?;
-        let planned = self.robot.plan_along(&path, &self.config.pace.approach_limits(self.robot.geometry()));
+        let planned = self.robot.plan_along(&path, &self.cell.config.pace.approach_limits(self.robot.geometry()));
         let motion = fails_at(GraspStep::PutDown, planned)?;
         self.follow(motion, GraspStep::PutDown)
     }

@@ -44,13 +44,13 @@ impl<A: Arm> Sequence<'_, '_, A> {
         base_from_grasp.translation.z = base_from_grasp.translation.z.max(lowest);
 
         let opening_max_m = self.robot.geometry().hand.opening_max_m;
-        let mut openings_m = vec![(target.jaw_width_m + self.opening_margin_m).min(opening_max_m)];
-        if !self.lying.all().is_empty() && NARROW_MARGIN_M < self.opening_margin_m {
+        let mut openings_m = vec![(target.jaw_width_m + self.known.opening_margin_m).min(opening_max_m)];
+        if !self.known.lying.all().is_empty() && NARROW_MARGIN_M < self.known.opening_margin_m {
             openings_m.push((target.jaw_width_m + NARROW_MARGIN_M).min(opening_max_m));
         }
         let mut first_error = None;
         for opening_m in openings_m {
-            self.opening_m = opening_m;
+            self.known.opening_m = opening_m;
             let reach = match self.reach(&base_from_grasp)? {
                 Ok(reach) => reach,
                 Err(why) => {
@@ -116,10 +116,11 @@ impl<A: Arm> Sequence<'_, '_, A> {
     pub(super) fn descend(&mut self, path: JointPath) -> Steps<()> {
         self.robot.finish_hand()?;
         self.robot.set_contact_sensitivity(ContactSensitivity::Contact)?;
-        match self.config.soft_approach.filter(|_| self.touch.is_some()) {
+        match self.cell.config.soft_approach.filter(|_| self.cell.touch.is_some()) {
             Some(touch_down) => self.descend_softly(&path, &touch_down)?,
             None => {
-                let planned = self.robot.plan_along(&path, &self.config.pace.approach_limits(self.robot.geometry()));
+                let planned =
+                    self.robot.plan_along(&path, &self.cell.config.pace.approach_limits(self.robot.geometry()));
                 let motion = fails_at(GraspStep::Approach, planned)?;
                 self.follow(motion, GraspStep::Approach)?;
             }
@@ -152,7 +153,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
     ) -> Steps<()> {
         let line = self.robot.geometry().straight_path(start, base_from_tcp, &LineOptions::default());
         let path = fails_at(step, line.map_err(RobotError::Planning))?;
-        let planned = self.robot.plan_along(&path, &self.config.pace.approach_limits(self.robot.geometry()));
+        let planned = self.robot.plan_along(&path, &self.cell.config.pace.approach_limits(self.robot.geometry()));
         let motion = fails_at(step, planned)?;
         self.follow(motion, step)
     }

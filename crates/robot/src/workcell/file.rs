@@ -7,9 +7,9 @@ use toml::Spanned;
 
 use super::error::WorkcellError;
 use super::obstacle::{ObstacleSection, obstacles};
-use super::place::{BinSection, PlaceSection, Room, TraySection, places};
+use super::place_sections::{BinSection, PlaceSection, Room, TraySection, places};
 use super::source::{MAX_REACH_MM, Numbers, Source};
-use super::{Mounting, RobotModel, Workcell};
+use super::{Mount, RobotModel, Workcell};
 use crate::robot_address::RobotAddress;
 use crate::safety::WorkspaceBox;
 use crate::sequence::LookOut;
@@ -134,9 +134,9 @@ fn read(text: &str) -> Result<Workcell, WorkcellError> {
     {
         return Err(source.error(address.span().start, format!("address: {why}")));
     }
-    let mounting = match file.camera.mounting.get_ref().as_str() {
-        "hand" => Mounting::Hand,
-        "base" => Mounting::Base,
+    let mount = match file.camera.mounting.get_ref().as_str() {
+        "hand" => Mount::Hand,
+        "base" => Mount::Base,
         other => {
             return Err(source.expected(
                 &file.camera.mounting,
@@ -192,7 +192,7 @@ fn read(text: &str) -> Result<Workcell, WorkcellError> {
         part_radius_m: option(&tool.part_radius_mm, "part_radius_mm", [1.0, MAX_PART_MM])?.unwrap_or(PART_RADIUS_MM)
             * 1e-3,
         camera_file: file.camera.file.map(Spanned::into_inner),
-        mounting,
+        mount,
         table_height_m,
         table_m,
         workspace,
@@ -200,7 +200,7 @@ fn read(text: &str) -> Result<Workcell, WorkcellError> {
         obstacles: obstacles(&source, &file.obstacle)?,
         look_outs: look_outs
             .iter()
-            .map(|section| look_out(&source, section, mounting, &limits))
+            .map(|section| look_out(&source, section, mount, &limits))
             .collect::<Result<_, _>>()?,
     })
 }
@@ -208,12 +208,12 @@ fn read(text: &str) -> Result<Workcell, WorkcellError> {
 fn look_out(
     source: &Source<'_>,
     section: &Spanned<LookOutSection>,
-    mounting: Mounting,
+    mount: Mount,
     limits: &JointLimits,
 ) -> Result<LookOut, WorkcellError> {
     let LookOutSection { camera_at_mm, yaw_deg, joints_deg } = section.get_ref();
     match (camera_at_mm, joints_deg) {
-        (Some(at), None) if mounting == Mounting::Hand => {
+        (Some(at), None) if mount == Mount::Hand => {
             let Numbers([x, y, height]) = *at.get_ref();
             if ![x, y].iter().all(|value| value.abs() <= MAX_REACH_MM) {
                 let expected = format!("x and y within {MAX_REACH_MM} mm of the base");

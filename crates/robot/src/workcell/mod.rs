@@ -61,7 +61,7 @@
 mod error;
 mod file;
 mod obstacle;
-mod place;
+mod place_sections;
 mod source;
 
 use sdg_kinematics::collision::{CollisionError, CollisionModel, Obstacle};
@@ -104,14 +104,14 @@ impl RobotModel {
 
 /// Where the camera is mounted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Mounting {
+pub enum Mount {
     /// On the robot's hand: the camera's file has `hand_eye:`.
     Hand,
     /// Beside the robot: the camera's file has `table:` in the base frame.
     Base,
 }
 
-impl Mounting {
+impl Mount {
     /// The name in the file.
     pub fn name(self) -> &'static str {
         match self {
@@ -139,7 +139,7 @@ pub struct Workcell {
     /// The camera's file, as it is written.
     pub camera_file: Option<String>,
     /// How the camera is mounted.
-    pub mounting: Mounting,
+    pub mount: Mount,
     /// The table's z in the base frame, m.
     pub table_height_m: f64,
     /// Where the table is along x and y of the base frame, m, where that is told.

@@ -11,8 +11,8 @@
 use std::time::{Duration, Instant};
 
 use sdg_robot::{
-    Arm, ArmGeometry, ArmMode, ArmState, CheckedMotion, ContactSensitivity, HandCommand, HandState, Load, MIN_HELD_WIDTH_M,
-    MotionEnd, RobotError, StopReason, Watch,
+    Arm, ArmGeometry, ArmMode, ArmState, CheckedMotion, ContactSensitivity, HandCommand, HandState, Load,
+    MIN_HELD_WIDTH_M, MotionEnd, RobotError, StopReason, Watch,
 };
 
 use super::action::{ActionClient, ActionType, Goal, GoalEnd};
