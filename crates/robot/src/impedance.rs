@@ -101,13 +101,13 @@ impl ImpedanceControl {
     /// robot does not tell it, which at the speeds of contact is less than friction.
     pub fn torque(
         &mut self,
-        panda: &ArmGeometry,
+        arm: &ArmGeometry,
         q: &JointVector,
         dq: &JointVector,
         reference: &TcpReference,
         coriolis: &JointVector,
     ) -> JointVector {
-        let (base_from_tcp, jacobian) = panda.forward_and_jacobian(q);
+        let (base_from_tcp, jacobian) = arm.forward_and_jacobian(q);
         let Impedance { stiffness, mass, integral_per_sec, null_stiffness, max_torque_step_nm } = self.impedance;
         let spring = stiffness.component_mul(&pose_error(&base_from_tcp, &reference.base_from_tcp));
         self.integral += spring.component_mul(&integral_per_sec) * PERIOD_SECS;

@@ -128,9 +128,9 @@ impl<A: Arm> Sequence<'_, '_, A> {
 
     /// Whether the arm can come down from a configuration as far as a place may be felt; why not.
     fn goes_on_down(&self, from: &JointVector) -> Result<(), String> {
-        let panda = self.robot.geometry();
-        let lowest = above(&panda.forward(from), -(SOFT_WAY_M + BELOW_M));
-        let line = panda.straight_path(from, &lowest, &LineOptions::default());
+        let arm = self.robot.geometry();
+        let lowest = above(&arm.forward(from), -(SOFT_WAY_M + BELOW_M));
+        let line = arm.straight_path(from, &lowest, &LineOptions::default());
         line.map(|_| ()).map_err(|error| error.to_string())
     }
 

@@ -70,14 +70,14 @@ impl<A: Arm> Sequence<'_, '_, A> {
         start: &JointVector,
         base_from_tcp: &Isometry3<f64>,
     ) -> Steps<Result<JointPath, String>> {
-        let panda = self.robot.geometry();
+        let arm = self.robot.geometry();
         if !self.is_surrounded() {
-            let line = panda.straight_path(start, base_from_tcp, &LineOptions::default());
+            let line = arm.straight_path(start, base_from_tcp, &LineOptions::default());
             return Ok(line.map_err(|error| error.to_string()));
         }
         let model = self.surroundings().contact_model(self.robot.geometry(), self.robot.limits().table_height_m)?;
         let mut checker = Checker::new(&model, LINE_MARGIN_M);
-        let line = checked_line(panda, &mut checker, start, base_from_tcp).map_err(RobotError::Planning)?;
+        let line = checked_line(arm, &mut checker, start, base_from_tcp).map_err(RobotError::Planning)?;
         let CheckedLine { share, path, blocked_by } = line;
         Ok(path.ok_or_else(|| {
             let why = blocked_by.unwrap_or_default();

@@ -57,12 +57,12 @@ impl<A: Arm> Sequence<'_, '_, A> {
         let limits = self.free_limits();
         let planned = self.robot.plan_free(q, &limits);
         let motion = fails_at(step, planned)?;
-        let (panda, table_height_m) = (self.robot.geometry(), self.robot.limits().table_height_m);
-        let clearance = motion.clearance(panda, table_height_m);
+        let (arm, table_height_m) = (self.robot.geometry(), self.robot.limits().table_height_m);
+        let clearance = motion.clearance(arm, table_height_m);
         // What is held hangs lower than the fingers.
         let held_m = self.known.held.as_ref().map_or(0.0, |held| held.hang_m);
         // The end is wanted, whatever its height; on the way the arm must not come lower.
-        let allowed = (FREE_CLEARANCE_M + held_m).min(panda.clearance(q, table_height_m).lowest_m - 1e-3);
+        let allowed = (FREE_CLEARANCE_M + held_m).min(arm.clearance(q, table_height_m).lowest_m - 1e-3);
         if clearance.lowest_m < allowed {
             return Err(Stop::Failed(
                 step,
