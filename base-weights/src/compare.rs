@@ -206,7 +206,7 @@ fn cpu_seconds() -> Option<f64> {
 }
 
 /// Which parts are taught, how, and where outcomes go.
-pub struct Comparison<'a> {
+pub struct Trials<'a> {
     /// The name of the weights in the outcomes.
     pub name: &'a str,
     /// The weights; `None` to teach from nothing.
@@ -223,7 +223,7 @@ pub struct Comparison<'a> {
     pub fine_tuning: Option<FineTuning>,
 }
 
-impl Comparison<'_> {
+impl Trials<'_> {
     /// The file's text; none where there is no file yet.
     fn text(&self) -> Result<String> {
         if !self.out.exists() {
@@ -321,7 +321,7 @@ mod tests {
         };
         let line = serde_json::to_string(&outcome).unwrap();
         std::fs::write(&out, format!("{line}\n{}", &line[..20])).unwrap();
-        let comparison = |part: u64| Comparison {
+        let comparison = |part: u64| Trials {
             name: "some",
             weights: None,
             parts: part..part + 1,

@@ -7,7 +7,7 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use sdg_base_weights::checkpoint::Checkpoint;
-use sdg_base_weights::compare::Comparison;
+use sdg_base_weights::compare::Trials;
 use sdg_base_weights::comparison::ComparisonTask;
 use sdg_base_weights::detector::DetectorTask;
 use sdg_base_weights::export::{export, with_comparison};
@@ -183,7 +183,7 @@ fn main() -> Result<()> {
             let weights = weights.map(|path| read_weights(&path)).transpose()?;
             let fine_tuning = changed(FineTuning::new(seed), &fine_tuning).context("--fine-tuning")?;
             let (steps, out, name) = (&steps[..], &out, &name);
-            let comparison = Comparison { name, weights, parts: first..first + parts, steps, seed, out, fine_tuning };
+            let comparison = Trials { name, weights, parts: first..first + parts, steps, seed, out, fine_tuning };
             comparison.run(&mut |outcome: &Outcome| println!("{}", serde_json::json!(outcome)))
         }
     }

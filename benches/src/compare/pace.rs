@@ -15,7 +15,7 @@ pub struct Pace {
 
 /// What a work's warm-ups say about how to measure it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Plan {
+pub struct Rounds {
     pub rounds: usize,
     /// Runs of each side in its turn.
     pub repeats: Vec<usize>,
@@ -28,7 +28,7 @@ impl Pace {
     pub const QUICK: Self = Self { rounds: 3, min_rounds: 1, turn_secs: 0.3, budget_secs: 10.0 };
 
     /// Plans from the seconds of one run of each side.
-    pub fn plan(&self, warm_ups: &[Option<f64>]) -> Plan {
+    pub fn plan(&self, warm_ups: &[Option<f64>]) -> Rounds {
         let repeats: Vec<usize> = warm_ups
             .iter()
             .map(|seconds| seconds.map_or(1, |seconds| (self.turn_secs / seconds.max(1e-6)).ceil().min(500.0) as usize))
@@ -37,12 +37,12 @@ impl Pace {
         let fit = (self.budget_secs / round.max(1e-6)) as usize;
         // An order from outside for fewer rounds counts.
         let least = self.min_rounds.min(self.rounds);
-        Plan { rounds: fit.clamp(least, self.rounds), repeats }
+        Rounds { rounds: fit.clamp(least, self.rounds), repeats }
     }
 
     /// One run of each.
-    pub fn once(&self, warm_ups: &[Option<f64>]) -> Plan {
-        Plan { rounds: 1, repeats: vec![1; warm_ups.len()] }
+    pub fn once(&self, warm_ups: &[Option<f64>]) -> Rounds {
+        Rounds { rounds: 1, repeats: vec![1; warm_ups.len()] }
     }
 }
 
@@ -54,9 +54,9 @@ mod tests {
 
     #[test]
     fn fast_works_fill_their_turn_and_slow_ones_have_few_rounds() {
-        assert_eq!(PACE.plan(&[Some(0.01), Some(0.2)]), Plan { rounds: 7, repeats: vec![50, 3] });
+        assert_eq!(PACE.plan(&[Some(0.01), Some(0.2)]), Rounds { rounds: 7, repeats: vec![50, 3] });
         // 2 + 4 s a round: five fit into 30 s.
-        assert_eq!(PACE.plan(&[Some(2.0), Some(4.0)]), Plan { rounds: 5, repeats: vec![1, 1] });
+        assert_eq!(PACE.plan(&[Some(2.0), Some(4.0)]), Rounds { rounds: 5, repeats: vec![1, 1] });
         assert_eq!(PACE.plan(&[Some(40.0), Some(60.0)]).rounds, 3);
         assert_eq!(PACE.plan(&[Some(0.0)]).repeats, [500]);
     }

@@ -48,7 +48,7 @@ pub enum Error {
     #[error("{}: expected a project's file as `sdg annotate` writes it, found {found}", path.display())]
     Project { path: PathBuf, found: String },
     /// A project without a photo.
-    #[error("{}: expected a photo of the part in this folder (PNG, JPEG, WebP, BMP, TIFF), or a camera (--from), found neither", path.display())]
+    #[error("{}: expected a photo of the part in this folder (PNG, JPEG, WebP, BMP, TIFF), or a camera to take it with, found neither", path.display())]
     EmptyProject { path: PathBuf },
     /// A file of the page's key that holds something else.
     #[error(
@@ -64,7 +64,7 @@ pub enum Error {
     #[error("expected at most {most} pictures to try, found one more")]
     TooManyPictures { most: usize },
     /// The page was opened without a camera.
-    #[error("expected a page with a camera, found none: open it with --from")]
+    #[error("expected a page with a camera, found none")]
     NoCamera,
     /// A frame that was not shown, or so long ago that it is not kept any more.
     #[error("expected a frame that was shown lately, found frame {number}")]

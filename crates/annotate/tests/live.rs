@@ -138,7 +138,7 @@ fn without_a_camera_there_are_no_live_pictures() {
     for (method, path) in [("GET", "/api/live"), ("GET", "/api/live/0/picture"), ("POST", "/api/live/0/photo")] {
         let answer = served.ask(method, path, b"");
         assert_eq!(answer.status, 404, "{method} {path}");
-        assert!(answer.text().contains("--from"), "{}", answer.text());
+        assert!(answer.text().contains("expected a page with a camera"), "{}", answer.text());
     }
     for path in ["/api/live/x/photo", "/api/live/0/nothing", "/api/live/0"] {
         assert_eq!(post(&served, path).status, 404, "{path}");

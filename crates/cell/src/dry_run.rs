@@ -1,7 +1,7 @@
 //! A grasp as it would go from where the arm stands: planned with the same sequence and limits; nothing moves.
 
 use sdg_robot::{
-    ArmState, CameraMount, GraspConfig, GraspStep, GraspTarget, KnownTarget, PlaceGoal, PlacingConfig, PlannedArm,
+    ArmState, CameraPose, GraspConfig, GraspStep, GraspTarget, KnownTarget, PlaceGoal, PlacingConfig, PlannedArm,
     Result, Robot, SafetyLimits, Watch,
 };
 
@@ -30,14 +30,14 @@ impl DryRun {
         opening_m: f64,
         target: Option<GraspTarget>,
         limits: SafetyLimits,
-        mount: CameraMount,
+        camera: CameraPose,
         config: &GraspConfig,
         place: Option<&(PlaceGoal, PlacingConfig)>,
     ) -> Result<Self> {
-        let mut arm = PlannedArm::new(start.q_commanded, opening_m);
+        let mut arm = PlannedArm::new(limits.geometry.clone(), start.q_commanded, opening_m);
         let mut robot = Robot::new(&mut arm, limits, Watch::default());
-        let mut finder = KnownTarget::new(target, mount, config);
-        let Ended { failed, .. } = run_sequence(&mut robot, &mut finder, mount, config, place)?;
+        let mut finder = KnownTarget::new(target, camera, config);
+        let Ended { failed, .. } = run_sequence(&mut robot, &mut finder, camera, config, place)?;
         Ok(Self { start, opening_m, arm, failed })
     }
 }

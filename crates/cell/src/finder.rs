@@ -13,12 +13,11 @@ use nalgebra::{Isometry3, Point2, Point3};
 use sdg_camera::LatestFrame;
 use sdg_geometry::Polygon;
 use sdg_grasp::{CameraOverTable, Circumstances, ErrorLength, GraspModel, Verification};
-use sdg_kinematics::Panda;
 use sdg_robot::height::{MeasuredHeight, Sighting};
 use sdg_robot::{Arm, GraspTarget, PartFinder, Place, RobotError};
 
+use crate::mounted_camera::MountedCamera;
 use crate::perception::{Found, Perception};
-use crate::placed_camera::PlacedCamera;
 use crate::surface::{PartOnSurface, PosedPicture, surface_height};
 
 /// How long a picture that was taken after the arm stopped is waited for.
@@ -86,7 +85,7 @@ pub struct SeenOutline {
 #[derive(Debug)]
 pub struct ModelFinder<P> {
     pictures: P,
-    camera: PlacedCamera,
+    camera: MountedCamera,
     perception: Perception,
     taken: Option<Instant>,
     /// Whether detections are checked against the demonstration.
@@ -132,7 +131,7 @@ const SIGMAS_OF_RADIUS: f64 = 1.51;
 
 impl<P> ModelFinder<P> {
     /// Looks for the model's part through the camera.
-    pub fn new(model: GraspModel, camera: PlacedCamera, pictures: P) -> Self {
+    pub fn new(model: GraspModel, camera: MountedCamera, pictures: P) -> Self {
         let perception = Perception::of_any_camera(model);
         Self {
             pictures,
@@ -210,7 +209,7 @@ impl<P> ModelFinder<P> {
         let state = arm.state()?;
         let TakenPicture { picture, taken } = self.pictures.take(arm)?;
         self.taken = taken;
-        let mut place = self.camera.over_table(&Panda::new().base_from_flange(&state.q));
+        let mut place = self.camera.over_table(&arm.geometry().base_from_flange(&state.q));
         place.table_height_m += higher_m;
         self.perception.move_to(&place)?;
         let distance_m = place.camera.world_from_camera.translation.z - self.marks_z_m(&place);
@@ -278,7 +277,7 @@ impl<P> ModelFinder<P> {
 
     /// Keeps the last picture and the outlines of what it shows.
     fn keep_sights(&mut self, sightings: &[Sighting]) {
-        let (Some((picture, found)), Some(place)) = (&self.last, self.perception.place()) else { return };
+        let (Some((picture, found)), Some(place)) = (&self.last, self.perception.camera_over_table()) else { return };
         let outlines = found.iter().filter(|found| found.pose.is_some()).map(|found| found.detection.outline.as_ref());
         let parts = sightings.iter().zip(outlines).filter_map(|(sighting, outline)| {
             let on_plane = |pixel| place.camera.at_height(pixel, sighting.middle_m.z).map(|p_in_base| p_in_base.xy());

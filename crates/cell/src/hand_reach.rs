@@ -3,8 +3,8 @@
 use std::f64::consts::PI;
 
 use nalgebra::{Isometry3, Point2, Translation3, UnitQuaternion, Vector3};
+use sdg_kinematics::IkOptions;
 use sdg_kinematics::collision::{Body, Checker, CollisionError};
-use sdg_kinematics::{HAND_OPENING_MAX_M, IkOptions, Panda, ready_pose};
 use sdg_robot::workcell::Workcell;
 
 /// Turns of the hand that are tried, over half a turn: with exchanged fingers the others are the same.
@@ -35,7 +35,7 @@ impl Reach {
     /// # Errors
     /// None for a workcell that was read.
     pub fn of(workcell: &Workcell, [x, y]: [[f64; 2]; 2], grid_m: f64, height_m: f64) -> Result<Self, CollisionError> {
-        let mut model = workcell.collision_model(HAND_OPENING_MAX_M)?;
+        let mut model = workcell.collision_model(workcell.robot.geometry().hand.opening_max_m)?;
         model.allow(Body::HAND, "table")?;
         let mut checker = Checker::new(&model, MARGIN_M);
         let count = |[low, high]: [f64; 2]| ((high - low) / grid_m).floor().max(1.0) as usize;
@@ -61,7 +61,9 @@ impl Reach {
             area_m2(1),
             area_m2(NUM_TURNS)
         )];
-        let Ok(mut model) = workcell.collision_model(HAND_OPENING_MAX_M) else { return lines };
+        let Ok(mut model) = workcell.collision_model(workcell.robot.geometry().hand.opening_max_m) else {
+            return lines;
+        };
         if model.allow(Body::HAND, "table").is_err() {
             return lines;
         }
@@ -103,7 +105,7 @@ fn num_turns(workcell: &Workcell, checker: &mut Checker<'_>, at_m: Point2<f64>, 
 
 /// Whether some configuration reaches a pose with either finger on either side, free of obstacles and within the workspace.
 fn is_reached(workcell: &Workcell, checker: &mut Checker<'_>, pose: &Isometry3<f64>) -> bool {
-    let panda = Panda::new();
+    let arm = workcell.robot.geometry();
     let within = |p: Vector3<f64>| {
         let (min, max) = (workcell.workspace.min_m, workcell.workspace.max_m);
         (0..3).all(|axis| (min[axis]..=max[axis]).contains(&p[axis]))
@@ -112,9 +114,9 @@ fn is_reached(workcell: &Workcell, checker: &mut Checker<'_>, pose: &Isometry3<f
         return false;
     }
     [*pose, sdg_kinematics::with_fingers_exchanged(pose)].iter().any(|pose| {
-        panda.inverse_all(pose, &ready_pose(), &IkOptions::default()).is_ok_and(|solutions| {
+        arm.inverse_all(pose, &arm.ready, &IkOptions::default()).is_ok_and(|solutions| {
             solutions.iter().any(|solution| {
-                within(panda.base_from_flange(&solution.q).translation.vector) && checker.is_free(&solution.q)
+                within(arm.base_from_flange(&solution.q).translation.vector) && checker.is_free(&solution.q)
             })
         })
     })

@@ -4,12 +4,12 @@ use sdg_grasp::GraspModel;
 use sdg_robot::CameraPose;
 use sdg_robot::height::{HeightMeasurement, ToldHeight};
 
-use crate::placed_camera::PlacedCamera;
+use crate::mounted_camera::MountedCamera;
 
 /// How the height of a model's part is measured, with a camera on the hand and a model that knows lengths; `told` is z of the base, m.
 pub fn height_measurement(
     model: &GraspModel,
-    camera: &PlacedCamera,
+    camera: &MountedCamera,
     told: Option<ToldHeight>,
 ) -> Option<HeightMeasurement> {
     let lengths = model.facts().lengths?;
@@ -17,7 +17,7 @@ pub fn height_measurement(
     matches!(camera.pose, CameraPose::OnFlange(_)).then_some(HeightMeasurement { told, ..measurement })
 }
 
-impl PlacedCamera {
+impl MountedCamera {
     /// A camera beside the robot, for parts whose marks are as high as told (z of the base, m) instead of as high over the table as the model
     /// knows. A camera on the hand measures.
     pub fn with_marks_at(self, model: &GraspModel, told: Option<&ToldHeight>) -> Self {

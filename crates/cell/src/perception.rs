@@ -40,6 +40,16 @@ pub struct Found {
     pub pose: Option<PlanarPose>,
 }
 
+/// A camera over its table as its file says, and the frame of that.
+///
+/// # Errors
+/// A file without the camera's pose.
+pub fn camera_over_table(camera: &CalibratedCamera) -> std::result::Result<(CameraOverTable, Frame), CameraFileError> {
+    let (posed, table) = camera.posed()?;
+    let place = CameraOverTable { camera: posed, table_height_m: table.height_m, workspace: table.workspace };
+    Ok((place, table.frame))
+}
+
 impl Perception {
     /// Looks at pictures of any camera: grasps are in pixels.
     pub fn of_any_camera(model: GraspModel) -> Self {
@@ -59,9 +69,8 @@ impl Perception {
     /// # Errors
     /// As [`Self::over_table`]; a file without the camera's pose.
     pub fn calibrated(model: GraspModel, camera: &CalibratedCamera) -> Result<Self> {
-        let (posed, table) = camera.posed()?;
-        let place = CameraOverTable { camera: posed, table_height_m: table.height_m, workspace: table.workspace };
-        Ok(Self { frame: Some(table.frame), ..Self::over_table(model, &place)? })
+        let (place, frame) = camera_over_table(camera)?;
+        Ok(Self { frame: Some(frame), ..Self::over_table(model, &place)? })
     }
 
     /// Goes on from another place of the camera, or with another camera.
@@ -124,7 +133,7 @@ impl Perception {
     }
 
     /// Where the camera is; `None` for pictures of any camera.
-    pub fn place(&self) -> Option<&CameraOverTable> {
+    pub fn camera_over_table(&self) -> Option<&CameraOverTable> {
         match &self.view {
             View::AnyCamera(_) => None,
             View::OverTable(_, place) => Some(place),
@@ -133,7 +142,7 @@ impl Perception {
 
     /// Width and height of the calibrated camera's pictures.
     pub fn picture_size(&self) -> Option<[u32; 2]> {
-        self.place().map(|place| [place.camera.intrinsics.width, place.camera.intrinsics.height])
+        self.camera_over_table().map(|place| [place.camera.intrinsics.width, place.camera.intrinsics.height])
     }
 
     /// Which way up its pictures are: a calibration knows the sensor's pixels.

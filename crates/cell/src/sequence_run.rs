@@ -1,8 +1,8 @@
 //! A grasp, or a grasp and a place, as one call.
 
 use sdg_robot::{
-    CameraMount, CompliantArm, GraspConfig, GraspOutcome, GraspReport, GraspStep, PartFinder, PlaceError, PlaceGoal,
-    PlaceOutcome, PlacingConfig, Robot, Touched, grasp_and_place, grasp_softly,
+    CameraPose, CompliantArm, GraspConfig, GraspOutcome, GraspReport, GraspStep, PartFinder, PlaceGoal, PlaceOffset,
+    PlacingConfig, PlacingOutcome, Robot, Touched, grasp_and_place, grasp_softly,
 };
 
 /// How a sequence ended.
@@ -12,7 +12,7 @@ pub struct Ended {
     /// The step that failed, and why; `None` where all is as it was asked for.
     pub failed: Option<(GraspStep, String)>,
     /// How far the part lay beside its place at the last look, where one was asked for.
-    pub beside: Option<PlaceError>,
+    pub beside: Option<PlaceOffset>,
     /// What was felt each time it was put down.
     pub touched: Vec<Touched>,
 }
@@ -24,22 +24,22 @@ pub struct Ended {
 pub fn run_sequence<A: CompliantArm>(
     robot: &mut Robot<'_, A>,
     finder: &mut dyn PartFinder<A>,
-    mount: CameraMount,
+    camera: CameraPose,
     config: &GraspConfig,
     place: Option<&(PlaceGoal, PlacingConfig)>,
 ) -> sdg_robot::Result<Ended> {
     let Some((goal, placing)) = place else {
-        let grasp = grasp_softly(robot, finder, &mut (), mount, config)?;
+        let grasp = grasp_softly(robot, finder, &mut (), camera, config)?;
         let failed = match &grasp.outcome {
             GraspOutcome::Held => None,
             GraspOutcome::Failed { step, why } => Some((*step, why.clone())),
         };
         return Ok(Ended { grasp, failed, beside: None, touched: Vec::new() });
     };
-    let report = grasp_and_place(robot, finder, &mut (), mount, config, goal, placing)?;
+    let report = grasp_and_place(robot, finder, &mut (), camera, config, goal, placing)?;
     let failed = match report.outcome {
-        PlaceOutcome::Placed => None,
-        PlaceOutcome::Failed { step, why } => Some((step, why)),
+        PlacingOutcome::Placed => None,
+        PlacingOutcome::Failed { step, why } => Some((step, why)),
     };
     let beside = report.errors.last().copied();
     Ok(Ended { grasp: report.grasp, failed, beside, touched: report.touched })

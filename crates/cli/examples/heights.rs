@@ -16,7 +16,7 @@ use std::ops::ControlFlow;
 use nalgebra::{Isometry3, Point2, Translation3};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
-use sdg_cell::{CameraPose, ModelFinder, Pictures, PlacedCamera, TakenPicture, UNKNOWN_HEIGHTS_M, height_measurement};
+use sdg_cell::{CameraPose, ModelFinder, MountedCamera, Pictures, TakenPicture, UNKNOWN_HEIGHTS_M, height_measurement};
 use sdg_evaluation::shipped;
 use sdg_geometry::{PinholeCamera, PosedCamera, median};
 use sdg_grasp::{GraspModel, Lengths, ModelKind, TeachOptions, teach};
@@ -158,7 +158,7 @@ impl Case {
             obstacles: self.block.iter().cloned().collect(),
             ..WorkcellConfig::new(self.scene.clone())
         })?;
-        let camera = PlacedCamera {
+        let camera = MountedCamera {
             intrinsics: PinholeCamera::WRIST,
             pose: CameraPose::OnFlange(cell.told_flange_from_camera()),
             table_height_m: told_table_m,
@@ -174,7 +174,7 @@ impl Case {
         };
         cell.reset_for_attempt(&config, self.seed)?;
         let limits = SafetyLimits { table_height_m: told_table_m, ..Workcell::safety_limits() };
-        let mount = cell.wrist_mount();
+        let mount = cell.wrist_camera();
         let before_m = cell.object_height_m().unwrap_or(0.0);
         let mut robot = Robot::new(&mut cell, limits, Watch::default());
         let report = grasp(&mut robot, &mut finder, &mut Until { is_grasping: how.is_grasping() }, mount, &config)?;

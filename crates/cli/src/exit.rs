@@ -126,6 +126,10 @@ fn remedy(cause: &(dyn std::error::Error + 'static)) -> Option<String> {
             _ => None,
         };
     }
+    #[cfg(feature = "annotate")]
+    if let Some(sdg_annotate::Error::EmptyProject { .. } | sdg_annotate::Error::NoCamera) = cause.downcast_ref() {
+        return Some("--from takes pictures with a camera".to_owned());
+    }
     if let Some(ConfigError::BothHeads) = cause.downcast_ref() {
         return Some("describe it with --config".to_owned());
     }

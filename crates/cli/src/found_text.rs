@@ -143,7 +143,7 @@ impl Wording<'_> {
 
     /// Where the picture has another number of pixels than the photo: that the part may have a size that is not looked for.
     fn of_other_size(&self) -> Option<String> {
-        if self.detector.place().is_some() {
+        if self.detector.camera_over_table().is_some() {
             return None;
         }
         let model = self.detector.model();

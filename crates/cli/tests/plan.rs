@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use crate::support::{Folder, sdg};
-use sdg_kinematics::{JointVector, NUM_JOINTS, Panda};
+use sdg_kinematics::{ArmGeometry, JointVector, NUM_JOINTS};
 use sdg_robot::workcell::Workcell;
 use sdg_simulation::CollisionWorld;
 use serde_json::Value;
@@ -48,7 +48,7 @@ fn a_path_leads_around_the_wall_and_is_told_and_drawn() {
     let mut waypoints = vec![joints(&plan["start_deg"])];
     waypoints.extend(plan["motions"].as_array().unwrap().iter().map(|motion| joints(&motion["joints_deg"])));
     assert!(waypoints.len() > 2);
-    let tcp = Panda::new().forward(&waypoints[waypoints.len() - 1]).translation.vector;
+    let tcp = ArmGeometry::panda().forward(&waypoints[waypoints.len() - 1]).translation.vector;
     assert!((tcp - nalgebra::Vector3::new(0.5, -0.3, 0.15)).norm() < 1e-6, "{tcp}");
     let obstacles = Workcell::from_toml(&fs::read_to_string(&cell).unwrap()).unwrap().obstacles;
     let mut world = CollisionWorld::new(&obstacles, 0.08).unwrap();

@@ -49,7 +49,7 @@ pub enum Tolerance {
 
 /// One tensor compared.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct StageComparison {
+pub struct StageDifference {
     /// Name in the reference.
     pub name: String,
     /// Values compared.
@@ -70,7 +70,7 @@ pub struct StageComparison {
 #[derive(Debug, Clone, PartialEq, Serialize, Default)]
 pub struct GoldenReport {
     /// One comparison for each tensor.
-    pub stages: Vec<StageComparison>,
+    pub stages: Vec<StageDifference>,
 }
 
 impl GoldenReport {
@@ -144,7 +144,7 @@ pub fn record(detector: &GeneralizedRcnn, image: &RgbImage, targets: &StateDict)
 
 struct Comparer<'a> {
     reference: &'a StateDict,
-    stages: Vec<StageComparison>,
+    stages: Vec<StageDifference>,
     /// Where there is one, what is found is put there and not compared.
     recorded: Option<StateDict>,
 }
@@ -163,7 +163,7 @@ impl<'a> Comparer<'a> {
         let Some(expected) = self.reference.get(name) else {
             return;
         };
-        let stage = |max_absolute: f64, scale: f64, measured: f64, bound: f64, remark| StageComparison {
+        let stage = |max_absolute: f64, scale: f64, measured: f64, bound: f64, remark| StageDifference {
             name: name.to_owned(),
             count: values.len(),
             max_absolute,

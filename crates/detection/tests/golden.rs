@@ -8,7 +8,7 @@ use std::process::Command;
 
 use burn::tensor::Device;
 use safetensors::{Dtype, SafeTensors};
-use sdg_detection::golden::{GoldenReport, StageComparison, record, verify};
+use sdg_detection::golden::{GoldenReport, StageDifference, record, verify};
 use sdg_detection::{GeneralizedRcnn, RcnnConfig};
 use sdg_layers::state_dict::{self, StateDict, WeightTensor};
 
@@ -100,7 +100,7 @@ fn agrees(folder: &Path) {
 }
 
 /// As `agrees`; a stage that is outside its tolerance may be excused.
-fn agrees_but_for(folder: &Path, excused: &dyn Fn(&StageComparison) -> bool) {
+fn agrees_but_for(folder: &Path, excused: &dyn Fn(&StageDifference) -> bool) {
     let report = compared(&detector(folder), folder);
     println!("{}\n{report}", folder.display());
     assert!(!report.stages.is_empty() && report.stages.iter().all(|s| s.passed || excused(s)), "{report}");

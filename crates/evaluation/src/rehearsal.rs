@@ -10,7 +10,7 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use image::RgbImage;
 use nalgebra::{Isometry3, Point2};
-use sdg_cell::{CameraPose, ModelFinder, PlacedCamera};
+use sdg_cell::{CameraPose, ModelFinder, MountedCamera};
 use sdg_geometry::{PinholeCamera, PosedCamera};
 use sdg_grasp::{GraspModel, Lengths, Verification};
 use sdg_kinematics::collision::Obstacle;
@@ -210,7 +210,7 @@ impl Rehearsal<'_> {
             obstacles,
             ..WorkcellConfig::new(scene)
         })?;
-        let camera = PlacedCamera {
+        let camera = MountedCamera {
             intrinsics: self.camera.unwrap_or(PinholeCamera::WRIST),
             pose: CameraPose::OnFlange(workcell.told_flange_from_camera()),
             table_height_m: 0.0,

@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::{Context, Result, bail};
 use image::RgbImage;
 use sdg_calibration::CalibratedCamera;
-use sdg_cell::{CellError, Perception, PlacedCamera};
+use sdg_cell::{CellError, MountedCamera, Perception, camera_over_table};
 use sdg_demonstration::Demonstration;
 use sdg_geometry::PinholeCamera;
 use sdg_grasp::{CameraOverTable, GraspError, GraspModel, Lengths, pictures_from_above, seen_from_above};
@@ -37,8 +37,7 @@ impl CameraFile {
     /// A file that cannot be read or has no pose.
     pub fn read(path: &Path) -> Result<Self> {
         let (camera, _) = read(path)?;
-        let (posed, table) = camera.posed().with_context(|| path.display().to_string())?;
-        let over_table = CameraOverTable { camera: posed, table_height_m: table.height_m, workspace: table.workspace };
+        let (over_table, _) = camera_over_table(&camera).with_context(|| path.display().to_string())?;
         Ok(Self { over_table, camera })
     }
 
@@ -114,8 +113,8 @@ pub fn perception(model: GraspModel, model_file: &Path, camera: Option<&Path>) -
 ///
 /// # Errors
 /// A file without the pose that the mounting needs.
-pub fn placed(camera: &CalibratedCamera, workcell: &Workcell, path: &Path) -> Result<PlacedCamera> {
-    PlacedCamera::new(camera, workcell.mounting, workcell.table_height_m).with_context(|| path.display().to_string())
+pub fn mounted(camera: &CalibratedCamera, workcell: &Workcell, path: &Path) -> Result<MountedCamera> {
+    MountedCamera::new(camera, workcell.mount, workcell.table_height_m).with_context(|| path.display().to_string())
 }
 
 /// Reads a camera's file, with or without the camera's pose: the camera, and the text for whom writes it again.

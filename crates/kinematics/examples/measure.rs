@@ -7,15 +7,15 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use sdg_kinematics::{
-    Approach, CartesianLimits, GraspSymmetry, IkOptions, JointLimits, JointVector, LineOptions, Panda, Trajectory,
-    ready_pose,
+    Approach, ArmGeometry, CartesianLimits, GraspSymmetry, IkOptions, JointLimits, JointVector, LineOptions,
+    Trajectory, ready_pose,
 };
 
 const NUM: usize = 2000;
 
 fn main() {
-    let panda = Panda::new();
-    let limits = JointLimits::franka();
+    let panda = ArmGeometry::panda();
+    let limits = JointLimits::panda();
     let mut rng = Pcg64Mcg::seed_from_u64(1);
     let mut random_configuration =
         || JointVector::from_fn(|i, _| rng.random_range(limits.position_min[i]..limits.position_max[i]));
@@ -66,7 +66,7 @@ fn top_grasp([x, y, z]: [f64; 3], yaw_rad: f64) -> Isometry3<f64> {
     )
 }
 
-fn measure_inverse(name: &str, panda: &Panda, poses: &[Isometry3<f64>]) {
+fn measure_inverse(name: &str, panda: &ArmGeometry, poses: &[Isometry3<f64>]) {
     let options = IkOptions::default();
     let started = Instant::now();
     let solutions: Vec<_> = poses.iter().map(|pose| panda.inverse(pose, &ready_pose(), &options)).collect();
@@ -80,7 +80,7 @@ fn measure_inverse(name: &str, panda: &Panda, poses: &[Isometry3<f64>]) {
     );
 }
 
-fn measure_approaches(panda: &Panda, grasps: &[Isometry3<f64>]) {
+fn measure_approaches(panda: &ArmGeometry, grasps: &[Isometry3<f64>]) {
     let mut paths = Vec::new();
     let started = Instant::now();
     let mut num_possible = 0;
@@ -109,7 +109,7 @@ fn measure_approaches(panda: &Panda, grasps: &[Isometry3<f64>]) {
     let num = paths.len();
     let mut seconds = 0.0;
     for path in paths {
-        match Trajectory::along_path(path, panda.limits(), &CartesianLimits::franka()) {
+        match Trajectory::along_path(path, &panda.limits, &CartesianLimits::panda()) {
             Ok(trajectory) => seconds += trajectory.duration_secs(),
             Err(error) => println!("along path: {error}"),
         }

@@ -1,4 +1,4 @@
-//! Every configuration that reaches a flange pose with joint 7 at a given angle, in closed form.
+//! Every configuration of a Franka that reaches a flange pose with joint 7 at a given angle, in closed form (`ClosedForm::Franka`).
 //!
 //! With q7 fixed the arm has six joints and at most eight solutions. Joint 7 takes the flange to the wrist centre W (the
 //! common origin of links 5 and 6) and the axis of joint 6. Shoulder S, elbow axis E and W then form a triangle of known
@@ -12,8 +12,8 @@ use std::f64::consts::{PI, TAU};
 
 use nalgebra::{Isometry3, Vector3};
 
+use crate::geometry::ArmGeometry;
 use crate::joints::JointVector;
-use crate::panda::{DH_A_M, DH_D_M, FLANGE_OFFSET_M};
 
 /// Number of ways the arm can take for one q7: elbow (2) × turn of the arm plane (2) × shoulder (2).
 pub(crate) const NUM_BRANCHES: usize = 8;
@@ -31,20 +31,23 @@ pub(crate) struct AnalyticSolution {
 /// `q1_if_free` is used where the upper arm points along the axis of joint 1, and only q1 + q3 matters.
 /// Joint 6, whose range is not centred, is returned in [-π + 1.87, π + 1.87), centred on the middle of its range.
 pub(crate) fn analytic_solutions(
+    arm: &ArmGeometry,
     base_from_flange: &Isometry3<f64>,
     q7: f64,
     q1_if_free: f64,
 ) -> [Option<AnalyticSolution>; NUM_BRANCHES] {
     let mut found = [None; NUM_BRANCHES];
+    let (shoulder_m, upper_m, fore_m) = (arm.joints[0].d_m, arm.joints[2].d_m, arm.joints[4].d_m);
+    let (elbow_m, after_elbow_m, wrist_m) = (arm.joints[3].a_m, arm.joints[4].a_m, arm.joints[6].a_m);
 
     let flange = base_from_flange.rotation.to_rotation_matrix();
     let (x7, y7, z7) = columns(flange.matrix());
     let (sin_q7, cos_q7) = q7.sin_cos();
     let x6 = x7 * cos_q7 - y7 * sin_q7;
     let z6 = x7 * sin_q7 + y7 * cos_q7;
-    let wrist = base_from_flange.translation.vector - z7 * FLANGE_OFFSET_M - x6 * DH_A_M[6];
+    let wrist = base_from_flange.translation.vector - z7 * arm.flange_offset_m - x6 * wrist_m;
 
-    let shoulder = Vector3::new(0.0, 0.0, DH_D_M[0]);
+    let shoulder = Vector3::new(0.0, 0.0, shoulder_m);
     let shoulder_to_wrist = wrist - shoulder;
     let reach = shoulder_to_wrist.norm();
     if reach < MIN_REACH_M {
@@ -55,24 +58,24 @@ pub(crate) fn analytic_solutions(
     let a = perpendicular(&u);
     let b = u.cross(&a);
 
-    let upper_arm = DH_D_M[2].hypot(DH_A_M[3]);
-    let forearm = DH_D_M[4].hypot(DH_A_M[4]);
+    let upper_arm = upper_m.hypot(elbow_m);
+    let forearm = fore_m.hypot(after_elbow_m);
     let cos_elbow = (upper_arm * upper_arm + forearm * forearm - reach * reach) / (2.0 * upper_arm * forearm);
     let elbow = cos_elbow.clamp(-1.0, 1.0).acos();
     let excess_elbow = (cos_elbow.abs() - 1.0).max(0.0);
 
     // Angle about z4 from shoulder to wrist, seen from E, at q4 = 0.
-    let wrist_direction = DH_D_M[4].atan2(DH_A_M[4]);
-    let shoulder_direction = (-DH_D_M[2]).atan2(-DH_A_M[3]);
+    let wrist_direction = fore_m.atan2(after_elbow_m);
+    let shoulder_direction = (-upper_m).atan2(-elbow_m);
     let elbow_at_zero = wrist_direction - shoulder_direction;
 
     for (elbow_idx, elbow_angle) in [elbow, TAU - elbow].into_iter().enumerate() {
         let q4 = elbow_angle - elbow_at_zero;
         let (sin_q4, cos_q4) = q4.sin_cos();
         // Shoulder and wrist in link 4, whose origin is E.
-        let s_x = -DH_A_M[3] * cos_q4 - DH_D_M[2] * sin_q4;
-        let s_y = DH_A_M[3] * sin_q4 - DH_D_M[2] * cos_q4;
-        let (u_x, u_y) = (DH_A_M[4] - s_x, DH_D_M[4] - s_y);
+        let s_x = -elbow_m * cos_q4 - upper_m * sin_q4;
+        let s_y = elbow_m * sin_q4 - upper_m * cos_q4;
+        let (u_x, u_y) = (after_elbow_m - s_x, fore_m - s_y);
         let length = u_x.hypot(u_y);
         let (u_x, u_y) = (u_x / length, u_y / length);
 
@@ -148,8 +151,8 @@ fn wrap(angle_rad: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::{ArmGeometry, pose_error};
     use crate::limits::JointLimits;
-    use crate::panda::{Panda, pose_error};
     use rand::{Rng, SeedableRng};
     use rand_pcg::Pcg64Mcg;
 
@@ -157,15 +160,15 @@ mod tests {
     fn every_solution_reaches_and_the_original_is_among_them() {
         // Cosines near ±1 lose half of the digits: 1e-7 rad is what acos leaves there.
         const TOLERANCE: f64 = 1e-6;
-        let panda = Panda::new();
-        let limits = JointLimits::franka();
+        let panda = ArmGeometry::panda();
+        let limits = JointLimits::panda();
         let mut rng = Pcg64Mcg::seed_from_u64(3);
         for _ in 0..500 {
             let q = JointVector::from_fn(|i, _| rng.random_range(limits.position_min[i]..limits.position_max[i]));
             let target = panda.base_from_flange(&q);
             let mut original_distance = f64::INFINITY;
             let mut num_exact = 0;
-            for solution in analytic_solutions(&target, q[6], q[0]).into_iter().flatten() {
+            for solution in analytic_solutions(&panda, &target, q[6], q[0]).into_iter().flatten() {
                 if solution.infeasibility > 0.0 {
                     continue;
                 }

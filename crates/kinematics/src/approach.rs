@@ -8,9 +8,9 @@ use std::f64::consts::PI;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 use crate::error::KinematicsError;
+use crate::geometry::ArmGeometry;
 use crate::ik::{IkOptions, IkSolution};
 use crate::joints::JointVector;
-use crate::panda::Panda;
 use crate::path::{JointPath, LineOptions};
 
 /// Whether a grasp stays the same when the hand is turned by half a turn about its own axis.
@@ -39,14 +39,14 @@ pub fn with_fingers_exchanged(base_from_tcp: &Isometry3<f64>) -> Isometry3<f64> 
     base_from_tcp * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), PI)
 }
 
-impl Panda {
+impl ArmGeometry {
     /// Finds the configuration of least cost at the pregrasp from which the straight line to the grasp can be followed.
     ///
-    /// Both poses in m in the base frame; turned together where `symmetry` allows it. `seed` as for [`Panda::inverse`].
+    /// Both poses in m in the base frame; turned together where `symmetry` allows it. `seed` as for [`ArmGeometry::inverse`].
     ///
     /// # Errors
-    /// Where no approach exists, the reason of the one that seemed best; see [`Panda::inverse`] and
-    /// [`Panda::straight_path`].
+    /// Where no approach exists, the reason of the one that seemed best; see [`ArmGeometry::inverse`] and
+    /// [`ArmGeometry::straight_path`].
     pub fn approach(
         &self,
         base_from_pregrasp: &Isometry3<f64>,
@@ -100,8 +100,8 @@ mod tests {
     use rand_pcg::Pcg64Mcg;
 
     use super::*;
+    use crate::geometry::pose_error;
     use crate::joints::ready_pose;
-    use crate::panda::pose_error;
     use crate::test_poses::top_grasp;
 
     fn approach(
@@ -109,12 +109,12 @@ mod tests {
         to: &Isometry3<f64>,
         symmetry: GraspSymmetry,
     ) -> Result<Approach, KinematicsError> {
-        Panda::new().approach(from, to, symmetry, &ready_pose(), &IkOptions::default(), &LineOptions::default())
+        ArmGeometry::panda().approach(from, to, symmetry, &ready_pose(), &IkOptions::default(), &LineOptions::default())
     }
 
     #[test]
     fn top_grasps_are_approached_from_above_at_any_yaw() {
-        let panda = Panda::new();
+        let panda = ArmGeometry::panda();
         let mut rng = Pcg64Mcg::seed_from_u64(41);
         for symmetry in [GraspSymmetry::Fixed, GraspSymmetry::HalfTurn] {
             let mut num_found = 0;

@@ -33,7 +33,9 @@ pub(crate) fn check_joints(what: &'static str, q: &JointVector) -> Result<(), Ki
 }
 
 pub(crate) fn check_options(options: &IkOptions) -> Result<(), KinematicsError> {
-    check_joints("posture", &options.posture)?;
+    if let Some(posture) = &options.posture {
+        check_joints("posture", posture)?;
+    }
     check_not_negative("seed_weight", options.seed_weight)?;
     check_not_negative("posture_weight", options.posture_weight)?;
     check_not_negative("limit_weight", options.limit_weight)?;

@@ -2,22 +2,9 @@
 
 use nalgebra::{Isometry3, Point3};
 
+use crate::geometry::{ArmGeometry, ArmPart};
 use crate::joints::JointVector;
-use crate::panda::{HAND_OPENING_MAX_M, Panda};
 use crate::trajectory::Trajectory;
-
-/// A part of the robot that could touch the table.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ArmPart {
-    /// The ends of the fingers, opened wide, and the tcp between them.
-    FingerTips,
-    /// The hand's body.
-    Hand,
-    /// Links 5 to 7, around the wrist centre and joint 7.
-    Wrist,
-    /// Links 3 and 4, around the elbow.
-    Elbow,
-}
 
 /// Where an arm comes nearest to a table.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,31 +17,10 @@ pub struct Clearance {
     pub time_secs: f64,
 }
 
-/// Half the width of the hand's body along the fingers' motion, m.
-const HAND_HALF_WIDTH_M: f64 = 0.102;
-/// Half the depth of the hand's body, m.
-const HAND_HALF_DEPTH_M: f64 = 0.033;
-/// Length of the hand's body from the flange, m.
-const HAND_LENGTH_M: f64 = 0.066;
-/// Half the width of a finger across its motion, m.
-pub const FINGER_HALF_WIDTH_M: f64 = 0.011;
-/// Thickness of a finger along its motion, m: of its tip, and of its root, which begins so far above the tcp.
-const FINGER_THICKNESS_M: f64 = 0.015;
-const FINGER_ROOT_THICKNESS_M: f64 = 0.026;
-const FINGER_ROOT_ABOVE_TCP_M: f64 = 0.015;
-/// Radius of a ball around link 6's and link 7's origins that holds the wrist, m.
-const WRIST_RADIUS_M: f64 = 0.075;
-/// Radius of a ball around link 4's origin that holds the elbow, m.
-const ELBOW_RADIUS_M: f64 = 0.09;
 /// Time between two looks, s: at most 5 mm of travel at 2 m/s.
 const LOOK_SECS: f64 = 0.0025;
 
-/// How thick a finger is along its motion, m, up to a height above the tcp, m.
-pub fn finger_thickness_m(above_tcp_m: f64) -> f64 {
-    if above_tcp_m <= FINGER_ROOT_ABOVE_TCP_M { FINGER_THICKNESS_M } else { FINGER_ROOT_THICKNESS_M }
-}
-
-impl Panda {
+impl ArmGeometry {
     /// The lowest point of hand, wrist and elbow above a level table at `table_height_m` in the base frame.
     ///
     /// The hand is a box with open fingers, wrist and elbow are balls; the balls are somewhat larger than the links.
@@ -67,30 +33,30 @@ impl Panda {
                 lowest = Clearance { lowest_m, part, time_secs: 0.0 };
             }
         };
-        let finger_reach = HAND_OPENING_MAX_M * 0.5 + FINGER_THICKNESS_M;
-        for height in box_heights(&frames.base_from_tcp, FINGER_HALF_WIDTH_M, finger_reach, 0.0, 0.0) {
+        let hand = &self.hand;
+        let finger_reach = hand.opening_max_m * 0.5 + hand.finger.thickness_m;
+        for height in box_heights(&frames.base_from_tcp, hand.finger.half_width_m, finger_reach, 0.0, 0.0) {
             consider(ArmPart::FingerTips, height);
         }
-        for height in box_heights(&frames.base_from_hand, HAND_HALF_DEPTH_M, HAND_HALF_WIDTH_M, 0.0, HAND_LENGTH_M) {
+        for height in box_heights(&frames.base_from_hand, hand.half_depth_m, hand.half_width_m, 0.0, hand.length_m) {
             consider(ArmPart::Hand, height);
         }
-        let height_of_link = |number: usize| frames.base_from_link[number - 1].translation.z;
-        consider(ArmPart::Wrist, height_of_link(6) - WRIST_RADIUS_M);
-        consider(ArmPart::Wrist, height_of_link(7) - WRIST_RADIUS_M);
-        consider(ArmPart::Elbow, height_of_link(4) - ELBOW_RADIUS_M);
+        for &(part, number, radius_m) in &self.balls {
+            consider(part, frames.base_from_link[number - 1].translation.z - radius_m);
+        }
         lowest
     }
 }
 
 impl Trajectory {
-    /// Where the motion comes nearest to a level table at `table_height_m` in the base frame; see [`Panda::clearance`].
-    pub fn clearance(&self, panda: &Panda, table_height_m: f64) -> Clearance {
+    /// Where the motion comes nearest to a level table at `table_height_m` in the base frame; see [`ArmGeometry::clearance`].
+    pub fn clearance(&self, arm: &ArmGeometry, table_height_m: f64) -> Clearance {
         let num_looks = (self.duration_secs() / LOOK_SECS).ceil().max(1.0) as usize;
         (0..=num_looks)
             .map(|i| {
                 let time_secs = self.duration_secs() * i as f64 / num_looks as f64;
                 let (q, _, _) = self.sample(time_secs);
-                Clearance { time_secs, ..panda.clearance(&q, table_height_m) }
+                Clearance { time_secs, ..arm.clearance(&q, table_height_m) }
             })
             .min_by(|a, b| a.lowest_m.total_cmp(&b.lowest_m))
             .expect("there are at least two looks")
@@ -121,7 +87,7 @@ mod tests {
     #[test]
     fn in_the_ready_pose_the_finger_tips_are_lowest() {
         // The tcp is at 0.4869 m with the hand level, see the forward kinematics.
-        let clearance = Panda::new().clearance(&ready_pose(), 0.1);
+        let clearance = ArmGeometry::panda().clearance(&ready_pose(), 0.1);
         assert_eq!(clearance.part, ArmPart::FingerTips);
         assert!((clearance.lowest_m - 0.3869).abs() < 1e-4);
     }
@@ -133,7 +99,7 @@ mod tests {
         let mut q = ready_pose();
         q[5] = 0.0;
         q[6] += std::f64::consts::FRAC_PI_2;
-        let clearance = Panda::new().clearance(&q, 0.0);
+        let clearance = ArmGeometry::panda().clearance(&q, 0.0);
         assert_eq!(clearance.part, ArmPart::Hand);
         assert!((clearance.lowest_m - (0.6973 - 0.088 - 0.102)).abs() < 1e-4);
     }
@@ -142,11 +108,11 @@ mod tests {
     fn a_motion_through_the_table_is_seen_in_the_middle() {
         // Joint 6 swings the hand from back to front about the wrist centre at 0.6973 m. Lowest is an edge of the finger tips,
         // 0.088 + 0.011 across and 0.107 + 0.1034 along from the wrist centre, when it is straight below.
-        let panda = Panda::new();
+        let panda = ArmGeometry::panda();
         let (mut start, mut end) = (ready_pose(), ready_pose());
         start[5] = 0.3;
         end[5] = 2.9;
-        let trajectory = Trajectory::point_to_point(&start, &end, &JointLimits::franka()).unwrap();
+        let trajectory = Trajectory::point_to_point(&start, &end, &JointLimits::panda()).unwrap();
         let clearance = trajectory.clearance(&panda, 0.4);
         assert_eq!(clearance.part, ArmPart::FingerTips);
         assert!((clearance.lowest_m - (0.6973 - 0.099f64.hypot(0.2104) - 0.4)).abs() < 1e-4);

@@ -2,9 +2,9 @@
 
 use nalgebra::Isometry3;
 
-use crate::joints::{JointVector, ready_pose};
+use crate::joints::JointVector;
 
-/// What [`Panda::inverse`](crate::Panda::inverse) prefers among the configurations that reach a pose.
+/// What [`ArmGeometry::inverse`](crate::ArmGeometry::inverse) prefers among the configurations that reach a pose.
 ///
 /// The cost to be minimised is `seed_weight · |q - seed|² + posture_weight · |q - posture|² +
 /// limit_weight · Σ max(0, 1 - margin / comfortable_margin_rad)²`, angles in rad.
@@ -13,8 +13,8 @@ use crate::joints::{JointVector, ready_pose};
 pub struct IkOptions {
     /// Weight of the distance to the seed configuration: short motions.
     pub seed_weight: f64,
-    /// The preferred posture.
-    pub posture: JointVector,
+    /// The preferred posture, rad; the arm's own where `None`.
+    pub posture: Option<JointVector>,
     /// Weight of the distance to the preferred posture.
     pub posture_weight: f64,
     /// Weight of closeness to joint limits.
@@ -37,7 +37,7 @@ impl Default for IkOptions {
     fn default() -> Self {
         Self {
             seed_weight: 1.0,
-            posture: ready_pose(),
+            posture: None,
             posture_weight: 0.3,
             limit_weight: 2.0,
             comfortable_margin_rad: 0.3,

@@ -1,23 +1,28 @@
 //! Inverse kinematics: the best configuration that reaches a tcp pose within the joint limits.
 //!
-//! The arm has one joint more than a pose needs. For each angle of joint 7 on a grid, [`crate::analytic`] gives every
+//! A Franka has one joint more than a pose needs. For each angle of joint 7 on a grid, [`crate::analytic`] gives every
 //! configuration; those inside the limits are compared by [`IkOptions`]' cost, and the best is refined over q7. So the
 //! search covers all branches of solutions, needs no random restarts and is the same on every call. Where the grid finds nothing, the
 //! branches that break limits least are refined over q7, which finds poses that only a sliver of angles reaches; if that
 //! fails as well, damped least squares within the limits gives the nearest pose and the error names the reason.
+//!
+//! An arm without a closed form is solved by damped least squares from many starts, always the same ones: slower, and of the redundant
+//! joint's angles only those are compared that the starts lead to.
 
 use nalgebra::Isometry3;
+use rand::{Rng, SeedableRng};
+use rand_pcg::Pcg64Mcg;
 
 use crate::analytic::{AnalyticSolution, NUM_BRANCHES, analytic_solutions};
 use crate::check::{check_joints, check_options, check_pose};
 use crate::error::KinematicsError;
+use crate::geometry::{ArmGeometry, pose_error};
 use crate::ik::{IkOptions, IkSolution};
 use crate::joints::JointVector;
 use crate::limits::JointLimits;
 use crate::nearest::descend;
-use crate::panda::{Panda, pose_error};
 
-impl Panda {
+impl ArmGeometry {
     /// Finds the configuration that reaches `base_from_tcp` at the least cost of `options`.
     ///
     /// # Units and frames
@@ -35,6 +40,9 @@ impl Panda {
         options: &IkOptions,
     ) -> Result<IkSolution, KinematicsError> {
         let search = Search::new(self, base_from_tcp, seed, options)?;
+        if self.closed_form.is_none() {
+            return search.by_descent().map(|mut solutions| solutions.swap_remove(0));
+        }
         let mut best: Option<Branch> = None;
         for branch in search.branches() {
             if best.as_ref().is_none_or(|b| branch.cost < b.cost) {
@@ -49,7 +57,7 @@ impl Panda {
     /// For a caller with further conditions, such as a straight path that begins there.
     ///
     /// # Errors
-    /// As [`Panda::inverse`]; the list is never empty.
+    /// As [`ArmGeometry::inverse`]; the list is never empty.
     pub fn inverse_all(
         &self,
         base_from_tcp: &Isometry3<f64>,
@@ -57,6 +65,9 @@ impl Panda {
         options: &IkOptions,
     ) -> Result<Vec<IkSolution>, KinematicsError> {
         let search = Search::new(self, base_from_tcp, seed, options)?;
+        if self.closed_form.is_none() {
+            return search.by_descent();
+        }
         let mut solutions: Vec<IkSolution> =
             search.branches().into_iter().filter_map(|branch| search.accept(&search.refine(branch))).collect();
         if solutions.is_empty() {
@@ -77,10 +88,11 @@ struct Branch {
 }
 
 struct Search<'a> {
-    panda: &'a Panda,
+    arm: &'a ArmGeometry,
     base_from_tcp: &'a Isometry3<f64>,
     base_from_flange: Isometry3<f64>,
     seed: JointVector,
+    posture: JointVector,
     limits: JointLimits,
     options: &'a IkOptions,
     /// Angles of joint 7 that are tried, ascending.
@@ -95,10 +107,13 @@ const NUM_REFINEMENTS: usize = 24;
 const NUM_BISECTIONS: usize = 12;
 /// Branches tried when nothing on the grid is feasible.
 const NUM_RESCUES: usize = 8;
+/// Random starts for an arm without a closed form; of configurations nearer to each other than this only the best is kept, rad.
+const NUM_STARTS: usize = 60;
+const MIN_APART_RAD: f64 = 0.1;
 
 impl<'a> Search<'a> {
     fn new(
-        panda: &'a Panda,
+        arm: &'a ArmGeometry,
         base_from_tcp: &'a Isometry3<f64>,
         seed: &JointVector,
         options: &'a IkOptions,
@@ -107,21 +122,23 @@ impl<'a> Search<'a> {
         check_joints("seed", seed)?;
         check_options(options)?;
         let margin = JointVector::repeat(options.required_margin_rad);
-        let mut limits = panda.limits.clone();
+        let mut limits = arm.limits.clone();
         limits.position_min += margin;
         limits.position_max -= margin;
+        let posture = options.posture.unwrap_or(arm.ready);
         let (low, high) = (limits.position_min[6], limits.position_max[6]);
         let num = options.num_redundancy_samples;
         let mut grid: Vec<f64> = (0..num)
             .map(|i| low + (high - low) * i as f64 / (num - 1) as f64)
-            .chain([seed[6].clamp(low, high), options.posture[6].clamp(low, high)])
+            .chain([seed[6].clamp(low, high), posture[6].clamp(low, high)])
             .collect();
         grid.sort_by(f64::total_cmp);
         Ok(Self {
-            panda,
+            arm,
             base_from_tcp,
-            base_from_flange: base_from_tcp * panda.flange_from_tcp.inverse(),
+            base_from_flange: base_from_tcp * arm.flange_from_tcp().inverse(),
             seed: *seed,
+            posture,
             limits,
             options,
             grid,
@@ -129,7 +146,7 @@ impl<'a> Search<'a> {
     }
 
     fn analytic_solutions(&self, q7: f64) -> [Option<AnalyticSolution>; NUM_BRANCHES] {
-        analytic_solutions(&self.base_from_flange, q7, self.seed[0])
+        analytic_solutions(self.arm, &self.base_from_flange, q7, self.seed[0])
     }
 
     /// The best grid point of every feasible stretch of every branch.
@@ -170,7 +187,7 @@ impl<'a> Search<'a> {
             .map(|margin| (1.0 - margin / options.comfortable_margin_rad).max(0.0).powi(2))
             .sum();
         options.seed_weight * (q - self.seed).norm_squared()
-            + options.posture_weight * (q - options.posture).norm_squared()
+            + options.posture_weight * (q - self.posture).norm_squared()
             + options.limit_weight * crowding
     }
 
@@ -208,35 +225,36 @@ impl<'a> Search<'a> {
 
     fn solution(&self, q: &JointVector) -> IkSolution {
         let q = self.limits.clamp(q);
-        let reached = self.panda.forward(&q);
+        let reached = self.arm.forward(&q);
         let error = pose_error(&reached, self.base_from_tcp);
         IkSolution {
             q,
             base_from_tcp: reached,
             position_residual_m: error.fixed_rows::<3>(0).norm(),
             angle_residual_rad: error.fixed_rows::<3>(3).norm(),
-            limit_margin_rad: self.panda.limits.margins(&q).min(),
+            limit_margin_rad: self.arm.limits.margins(&q).min(),
             cost: self.cost(&q),
         }
     }
 
     /// The solution at `q`, polished where the closed form lost digits, if it meets the tolerances.
     fn accept(&self, q: &JointVector) -> Option<IkSolution> {
-        let meets = |solution: &IkSolution| {
-            solution.position_residual_m <= self.options.position_tolerance_m
-                && solution.angle_residual_rad <= self.options.angle_tolerance_rad
-        };
         let solution = self.solution(q);
-        if meets(&solution) {
+        if self.meets(&solution) {
             return Some(solution);
         }
         let polished = self.solution(&self.descend(q));
-        meets(&polished).then_some(polished)
+        self.meets(&polished).then_some(polished)
+    }
+
+    fn meets(&self, solution: &IkSolution) -> bool {
+        solution.position_residual_m <= self.options.position_tolerance_m
+            && solution.angle_residual_rad <= self.options.angle_tolerance_rad
     }
 
     fn descend(&self, start: &JointVector) -> JointVector {
         let metres_per_rad = self.options.metres_per_rad;
-        descend(self.panda, &self.limits, self.base_from_tcp, start, metres_per_rad)
+        descend(self.arm, &self.limits, self.base_from_tcp, start, metres_per_rad)
     }
 
     /// Looks between the grid points, then for the nearest pose and the reason of the failure.
@@ -251,28 +269,59 @@ impl<'a> Search<'a> {
             }
         }
 
-        let starts = least_infeasible.iter().map(|c| c.q).chain([self.seed, self.options.posture]);
-        let miss = |s: &IkSolution| s.position_residual_m.hypot(self.options.metres_per_rad * s.angle_residual_rad);
-        let nearest = starts
-            .map(|start| self.solution(&self.descend(&start)))
-            .min_by(|a, b| miss(a).total_cmp(&miss(b)))
-            .expect("the seed is always a start");
+        let starts = least_infeasible.iter().map(|c| c.q).chain([self.seed, self.posture]);
+        let nearest = self.nearest(starts.map(|start| self.solution(&self.descend(&start))));
         if let Some(solution) = self.accept(&nearest.q) {
             return Ok(solution);
         }
-        let nearest = Box::new(nearest);
         let reaches_without_limits = least_infeasible.iter().find(|c| c.infeasibility <= 0.0);
         Err(match reaches_without_limits {
             Some(solution) => KinematicsError::JointLimit {
                 violation: self.limits.violation_at(&solution.q, self.limits.margins(&solution.q).argmin().0),
-                nearest,
+                nearest: Box::new(nearest),
             },
-            None => KinematicsError::OutOfReach {
-                target_m: self.base_from_tcp.translation.vector.into(),
-                nearest_at_limit: joints_at_limit(&self.limits, &nearest.q),
-                nearest,
-            },
+            None => self.out_of_reach(nearest),
         })
+    }
+
+    /// Of solutions that miss the pose the one that misses it least.
+    fn nearest(&self, missed: impl Iterator<Item = IkSolution>) -> IkSolution {
+        let miss = |s: &IkSolution| s.position_residual_m.hypot(self.options.metres_per_rad * s.angle_residual_rad);
+        missed.min_by(|a, b| miss(a).total_cmp(&miss(b))).expect("the seed is always a start")
+    }
+
+    fn out_of_reach(&self, nearest: IkSolution) -> KinematicsError {
+        KinematicsError::OutOfReach {
+            target_m: self.base_from_tcp.translation.vector.into(),
+            nearest_at_limit: joints_at_limit(&self.limits, &nearest.q),
+            nearest: Box::new(nearest),
+        }
+    }
+
+    /// The configurations to which descents from the seed, the posture and random configurations lead, best first.
+    fn by_descent(&self) -> Result<Vec<IkSolution>, KinematicsError> {
+        let mut rng = Pcg64Mcg::seed_from_u64(0);
+        let random = (0..NUM_STARTS).map(|_| {
+            let JointLimits { position_min, position_max, .. } = &self.limits;
+            JointVector::from_fn(|joint, _| rng.random_range(position_min[joint]..=position_max[joint]))
+        });
+        let reached: Vec<IkSolution> = [self.seed, self.posture]
+            .into_iter()
+            .chain(random)
+            .map(|start| self.solution(&self.descend(&start)))
+            .collect();
+        let mut solutions: Vec<IkSolution> = reached.iter().filter(|solution| self.meets(solution)).cloned().collect();
+        if solutions.is_empty() {
+            return Err(self.out_of_reach(self.nearest(reached.into_iter())));
+        }
+        solutions.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        let mut apart: Vec<IkSolution> = Vec::new();
+        for solution in solutions {
+            if apart.iter().all(|other| (other.q - solution.q).norm() > MIN_APART_RAD) {
+                apart.push(solution);
+            }
+        }
+        Ok(apart)
     }
 
     /// How much a solution breaks limits and geometry: 0 where it is a solution.

@@ -1,4 +1,5 @@
-//! Franka Panda: where the hand is, how to get it somewhere, and how fast it may go there.
+//! An arm: where its hand is, how to get it somewhere, and how fast it may go there. Its geometry is data: [`ArmGeometry::panda`],
+//! [`ArmGeometry::fr3`].
 //!
 //! ```text
 //! base_from_tcp ──► inverse ──► q ──► point-to-point trajectory ─┐
@@ -12,9 +13,9 @@
 //!
 //! ```
 //! use nalgebra::{Isometry3, UnitQuaternion, Vector3};
-//! use sdg_kinematics::{IkOptions, Panda, ready_pose};
+//! use sdg_kinematics::{ArmGeometry, IkOptions, ready_pose};
 //!
-//! let panda = Panda::new();
+//! let panda = ArmGeometry::panda();
 //! let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
 //! let base_from_tcp = Isometry3::from_parts(Vector3::new(0.5, 0.1, 0.2).into(), down);
 //! let solution = panda.inverse(&base_from_tcp, &ready_pose(), &IkOptions::default())?;
@@ -27,17 +28,20 @@
 
 mod analytic;
 mod approach;
+mod arms;
+mod capsule;
 mod check;
 mod clearance;
 pub mod collision;
 pub mod dynamics;
 mod error;
+mod geometry;
 mod ik;
+mod inertia;
 mod inverse;
 mod joints;
 mod limits;
 mod nearest;
-mod panda;
 mod path;
 pub mod planning;
 mod rounded_path;
@@ -47,19 +51,16 @@ mod timing;
 mod trajectory;
 
 pub use approach::{Approach, GraspSymmetry, with_fingers_exchanged};
-pub use clearance::{ArmPart, Clearance, FINGER_HALF_WIDTH_M, finger_thickness_m};
+pub use arms::{FINGER_HALF_WIDTH_M, HAND_OPENING_MAX_M, TCP_OFFSET_M, finger_thickness_m};
+pub use clearance::Clearance;
 pub use error::KinematicsError;
+pub use geometry::{
+    ArmGeometry, ArmPart, ClosedForm, DhJoint, FingerCapsule, FingerGeometry, Frames, HandGeometry, Jacobian,
+};
 pub use ik::{IkOptions, IkSolution};
 pub use joints::{JointVector, LimitViolation, NUM_JOINTS, READY_RAD, ready_pose};
-pub use limits::{
-    ACCELERATION_MAX_RAD_S2, CartesianLimits, JERK_MAX_RAD_S3, JointLimits, POSITION_MAX_RAD, POSITION_MIN_RAD,
-    TORQUE_MAX_NM, VELOCITY_MAX_RAD_S,
-};
+pub use limits::{CartesianLimits, JointLimits};
 pub use nalgebra;
-pub use panda::{
-    DH_A_M, DH_ALPHA_RAD, DH_D_M, FLANGE_OFFSET_M, Frames, HAND_OPENING_MAX_M, HAND_TURN_RAD, Jacobian, Panda,
-    TCP_OFFSET_M,
-};
 pub use path::{JointPath, LineOptions, PathPoint};
 pub use rounded_path::RoundedPath;
 pub use trajectory::Trajectory;

@@ -1,23 +1,7 @@
 //! What the robot may do: positions, velocities, accelerations, jerks and torques, in joint and Cartesian space.
-//!
-//! # Source
-//! Franka Control Interface documentation, "Robot and interface specifications", Franka Emika Robot ("Panda").
 
 use crate::error::KinematicsError;
-use crate::joints::{JointVector, LimitViolation, NUM_JOINTS};
-
-/// Smallest joint positions, rad.
-pub const POSITION_MIN_RAD: [f64; NUM_JOINTS] = [-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8973];
-/// Largest joint positions, rad.
-pub const POSITION_MAX_RAD: [f64; NUM_JOINTS] = [2.8973, 1.7628, 2.8973, -0.0698, 2.8973, 3.7525, 2.8973];
-/// Joint velocity limits, rad/s.
-pub const VELOCITY_MAX_RAD_S: [f64; NUM_JOINTS] = [2.1750, 2.1750, 2.1750, 2.1750, 2.6100, 2.6100, 2.6100];
-/// Joint acceleration limits, rad/s².
-pub const ACCELERATION_MAX_RAD_S2: [f64; NUM_JOINTS] = [15.0, 7.5, 10.0, 12.5, 15.0, 20.0, 20.0];
-/// Joint jerk limits, rad/s³.
-pub const JERK_MAX_RAD_S3: [f64; NUM_JOINTS] = [7500.0, 3750.0, 5000.0, 6250.0, 7500.0, 10000.0, 10000.0];
-/// Joint torque limits, N·m.
-pub const TORQUE_MAX_NM: [f64; NUM_JOINTS] = [87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0];
+use crate::joints::{JointVector, LimitViolation};
 
 /// Limits of every joint.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,18 +22,6 @@ pub struct JointLimits {
 }
 
 impl JointLimits {
-    /// The limits that Franka publishes.
-    pub fn franka() -> Self {
-        Self {
-            position_min: POSITION_MIN_RAD.into(),
-            position_max: POSITION_MAX_RAD.into(),
-            velocity_max: VELOCITY_MAX_RAD_S.into(),
-            acceleration_max: ACCELERATION_MAX_RAD_S2.into(),
-            jerk_max: JERK_MAX_RAD_S3.into(),
-            torque_max: TORQUE_MAX_NM.into(),
-        }
-    }
-
     /// The same ranges with velocity, acceleration and jerk multiplied by the given factors.
     ///
     /// # Errors
@@ -100,12 +72,6 @@ impl JointLimits {
     }
 }
 
-impl Default for JointLimits {
-    fn default() -> Self {
-        Self::franka()
-    }
-}
-
 /// Limits of the tcp's motion along a Cartesian path.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
@@ -125,18 +91,6 @@ pub struct CartesianLimits {
 }
 
 impl CartesianLimits {
-    /// The limits that Franka publishes.
-    pub const fn franka() -> Self {
-        Self {
-            velocity_m_s: 1.7,
-            acceleration_m_s2: 13.0,
-            jerk_m_s3: 6500.0,
-            angular_velocity_rad_s: 2.5,
-            angular_acceleration_rad_s2: 25.0,
-            angular_jerk_rad_s3: 12500.0,
-        }
-    }
-
     /// The same limits multiplied by the given factors, linear and angular alike.
     ///
     /// # Errors
@@ -151,12 +105,6 @@ impl CartesianLimits {
             angular_acceleration_rad_s2: self.angular_acceleration_rad_s2 * acceleration,
             angular_jerk_rad_s3: self.angular_jerk_rad_s3 * jerk,
         })
-    }
-}
-
-impl Default for CartesianLimits {
-    fn default() -> Self {
-        Self::franka()
     }
 }
 
@@ -178,7 +126,7 @@ mod tests {
 
     #[test]
     fn the_ready_pose_is_inside_and_margins_are_hand_checkable() {
-        let limits = JointLimits::franka();
+        let limits = JointLimits::panda();
         let margins = limits.margins(&ready_pose());
         assert!((margins[0] - 2.8973).abs() < 1e-12);
         assert!((margins[3] - (3.0718 - 3.0 * std::f64::consts::FRAC_PI_4)).abs() < 1e-12);
@@ -187,7 +135,7 @@ mod tests {
 
     #[test]
     fn the_worst_joint_is_named_as_franka_counts() {
-        let limits = JointLimits::franka();
+        let limits = JointLimits::panda();
         let mut q = ready_pose();
         q[3] = 0.0; // 0.0698 too high
         q[5] = -0.1175; // 0.1 too low
@@ -200,10 +148,10 @@ mod tests {
     #[test]
     fn scaling_refuses_what_is_no_share() {
         for bad in [0.0, -0.5, 1.5, f64::NAN] {
-            assert!(JointLimits::franka().scaled(1.0, bad, 1.0).is_err());
-            assert!(CartesianLimits::franka().scaled(bad, 1.0, 1.0).is_err());
+            assert!(JointLimits::panda().scaled(1.0, bad, 1.0).is_err());
+            assert!(CartesianLimits::panda().scaled(bad, 1.0, 1.0).is_err());
         }
-        let half = JointLimits::franka().scaled(0.5, 0.25, 0.125).unwrap();
+        let half = JointLimits::panda().scaled(0.5, 0.25, 0.125).unwrap();
         assert_eq!(half.velocity_max[0], 1.0875);
         assert_eq!(half.acceleration_max[1], 1.875);
         assert_eq!(half.jerk_max[6], 1250.0);

@@ -2,9 +2,9 @@
 
 use nalgebra::{Isometry3, SMatrix, Vector6};
 
+use crate::geometry::{ArmGeometry, pose_error};
 use crate::joints::{JointVector, NUM_JOINTS};
 use crate::limits::JointLimits;
-use crate::panda::{Panda, pose_error};
 
 const MAX_ITERATIONS: usize = 300;
 const INITIAL_DAMPING: f64 = 1e-3;
@@ -19,7 +19,7 @@ const NEGLIGIBLE_COST: f64 = 1e-26;
 /// Minimises |Δposition|² + (`metres_per_rad` · Δangle)². A joint at its limit whose step points outwards is left out of the
 /// step, so the others slide along the limit instead of stopping there.
 pub(crate) fn descend(
-    panda: &Panda,
+    arm: &ArmGeometry,
     limits: &JointLimits,
     target: &Isometry3<f64>,
     start: &JointVector,
@@ -28,7 +28,7 @@ pub(crate) fn descend(
     let weights = Vector6::new(1.0, 1.0, 1.0, metres_per_rad, metres_per_rad, metres_per_rad);
     let mut q = limits.clamp(start);
     let mut damping = INITIAL_DAMPING;
-    let (mut pose, mut jacobian) = panda.forward_and_jacobian(&q);
+    let (mut pose, mut jacobian) = arm.forward_and_jacobian(&q);
     let mut error = pose_error(&pose, target).component_mul(&weights);
 
     for _ in 0..MAX_ITERATIONS {
@@ -50,7 +50,7 @@ pub(crate) fn descend(
         while damping < MAX_DAMPING {
             let step = damped_step(&normal, &gradient, &is_free, damping);
             let q_next = limits.clamp(&(q + step));
-            let (pose_next, jacobian_next) = panda.forward_and_jacobian(&q_next);
+            let (pose_next, jacobian_next) = arm.forward_and_jacobian(&q_next);
             let error_next = pose_error(&pose_next, target).component_mul(&weights);
             if error_next.norm_squared() < cost {
                 damping = (damping * 0.2).max(MIN_DAMPING);
@@ -103,21 +103,21 @@ mod tests {
 
     #[test]
     fn descent_recovers_a_pose_close_by() {
-        let panda = Panda::new();
+        let panda = ArmGeometry::panda();
         let target = panda.forward(&ready_pose().add_scalar(0.1));
-        let q = descend(&panda, panda.limits(), &target, &ready_pose(), 0.3);
+        let q = descend(&panda, &panda.limits, &target, &ready_pose(), 0.3);
         assert!(pose_error(&panda.forward(&q), &target).norm() < 1e-9);
     }
 
     #[test]
     fn descent_stops_inside_the_limits_and_slides_along_them() {
         // So close to the base joint 4 would have to fold beyond its limit.
-        let panda = Panda::new();
+        let panda = ArmGeometry::panda();
         let mut target = panda.forward(&ready_pose());
         target.translation.vector = nalgebra::Vector3::new(0.1, 0.0, 0.1);
-        let q = descend(&panda, panda.limits(), &target, &ready_pose().add_scalar(0.2), 0.3);
-        assert_eq!(panda.limits().worst_violation(&q, 0.0), None);
-        assert_eq!(q[3], panda.limits().position_min[3]);
+        let q = descend(&panda, &panda.limits, &target, &ready_pose().add_scalar(0.2), 0.3);
+        assert_eq!(panda.limits.worst_violation(&q, 0.0), None);
+        assert_eq!(q[3], panda.limits.position_min[3]);
         // It rests where no joint can lower the cost by a small move inside the limits: the others did not stop with joint 4.
         let cost = |q: &JointVector| {
             let error = pose_error(&panda.forward(q), &target);
@@ -127,7 +127,7 @@ mod tests {
             for step in [-1e-3, 1e-3] {
                 let mut moved = q;
                 moved[joint_idx] += step;
-                let moved = panda.limits().clamp(&moved);
+                let moved = panda.limits.clamp(&moved);
                 assert!(cost(&moved) >= cost(&q) - 1e-9, "joint {}", joint_idx + 1);
             }
         }

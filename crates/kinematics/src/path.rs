@@ -12,8 +12,8 @@ use nalgebra::{Isometry3, SMatrix, Translation3, UnitQuaternion, Vector3, Vector
 
 use crate::check::{check_joints, check_not_negative, check_pose, check_positive};
 use crate::error::KinematicsError;
+use crate::geometry::{ArmGeometry, Jacobian, pose_error};
 use crate::joints::{JointVector, NUM_JOINTS};
-use crate::panda::{Jacobian, Panda, pose_error};
 
 /// How a straight path is followed.
 #[derive(Debug, Clone, PartialEq)]
@@ -154,7 +154,7 @@ impl JointPath {
     }
 }
 
-impl Panda {
+impl ArmGeometry {
     /// Follows the straight line from the tcp's pose at `start` to `base_from_tcp_end`.
     ///
     /// # Units and frames
@@ -194,7 +194,7 @@ impl Panda {
             });
         }
         let step_m = line.length_m / num_pieces as f64;
-        let follower = Follower { panda: self, line: &line, options };
+        let follower = Follower { arm: self, line: &line, options };
 
         let mut knots = Vec::with_capacity(num_pieces + 1);
         let mut q = *start;
@@ -222,7 +222,7 @@ const MAX_CORRECTIONS: usize = 8;
 const CORRECTED: f64 = 1e-11;
 
 struct Follower<'a> {
-    panda: &'a Panda,
+    arm: &'a ArmGeometry,
     line: &'a Line,
     options: &'a LineOptions,
 }
@@ -230,7 +230,7 @@ struct Follower<'a> {
 impl Follower<'_> {
     /// dq/ds at `s`.
     fn rate(&self, s: f64, q: &JointVector) -> Result<JointVector, KinematicsError> {
-        let jacobian = self.panda.jacobian(q);
+        let jacobian = self.arm.jacobian(q);
         let inverse = self.pseudo_inverse(s, &jacobian)?;
         let away = self.away_from_limits(q);
         let rate = inverse * self.line.twist() + away - inverse * (jacobian * away);
@@ -248,10 +248,12 @@ impl Follower<'_> {
     }
 
     fn away_from_limits(&self, q: &JointVector) -> JointVector {
-        let limits = self.panda.limits();
+        let limits = &self.arm.limits;
         let half_range = (limits.position_max - limits.position_min) * 0.5;
         let place = (q - limits.middle()).component_div(&half_range);
-        -place.map(|u| u.powi(3)).component_div(&half_range) * self.options.limit_avoidance
+        let away = -place.map(|u| u.powi(3)).component_div(&half_range) * self.options.limit_avoidance;
+        // A joint that an arm lacks has no range.
+        away.zip_map(&half_range, |rate, half| if half > 0.0 { rate } else { 0.0 })
     }
 
     /// One step of Runge and Kutta's fourth order, then Newton's onto the exact pose.
@@ -265,7 +267,7 @@ impl Follower<'_> {
         let target = self.line.at(s + step_m);
         let mut is_corrected = false;
         for _ in 0..MAX_CORRECTIONS {
-            let (pose, jacobian) = self.panda.forward_and_jacobian(&next);
+            let (pose, jacobian) = self.arm.forward_and_jacobian(&next);
             let error = pose_error(&pose, &target);
             if error.amax() < CORRECTED {
                 is_corrected = true;
@@ -276,7 +278,7 @@ impl Follower<'_> {
         if !is_corrected {
             return Err(self.blocked(s + step_m, "the arm does not reach further"));
         }
-        if let Some(violation) = self.panda.limits().worst_violation(&next, LIMIT_ROUNDING_RAD) {
+        if let Some(violation) = self.arm.limits.worst_violation(&next, LIMIT_ROUNDING_RAD) {
             return Err(KinematicsError::PathJointLimit { at_share: (s + step_m) / self.line.length_m, violation });
         }
         if (next - q).amax() > 2.0 * self.options.max_rate_rad_m * step_m {

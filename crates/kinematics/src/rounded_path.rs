@@ -4,10 +4,9 @@
 //! `q' = u₀ + (u₁ - u₀) (3x² - 2x³)`, x from 0 to 1 over a length 2d, d before the waypoint and d after it. So the path is twice continuously
 //! differentiable, its third derivative is bounded, and each joint's q' lies between those of the two parts.
 //!
-//! Lengths are the time, in seconds, that the slowest joint takes at Franka's full speed: max |Δq| / velocity.
+//! Lengths are the time, in seconds, that the slowest joint takes at the Panda's full speed, whichever arm it is: max |Δq| / velocity.
 
-use crate::joints::JointVector;
-use crate::limits::VELOCITY_MAX_RAD_S;
+use crate::joints::{JointVector, NUM_JOINTS};
 use crate::path::PathPoint;
 
 /// A way through waypoints that does not stop between its ends.
@@ -38,9 +37,12 @@ pub(crate) struct Corner {
     pub(crate) after: JointVector,
 }
 
-/// How long the slowest joint takes at Franka's full speed, s.
+/// The speeds by which lengths are measured, rad/s.
+const SPEEDS_RAD_S: [f64; NUM_JOINTS] = [2.1750, 2.1750, 2.1750, 2.1750, 2.6100, 2.6100, 2.6100];
+
+/// How long the slowest joint takes at those speeds, s.
 pub(crate) fn length_secs(from: &JointVector, to: &JointVector) -> f64 {
-    (to - from).abs().component_div(&JointVector::from(VELOCITY_MAX_RAD_S)).max()
+    (to - from).abs().component_div(&JointVector::from(SPEEDS_RAD_S)).max()
 }
 
 fn direction(from: &JointVector, to: &JointVector) -> JointVector {

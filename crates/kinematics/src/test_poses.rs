@@ -11,7 +11,7 @@ use crate::limits::JointLimits;
 
 /// Anywhere within Franka's joint ranges.
 pub fn random_configuration(rng: &mut Pcg64Mcg) -> JointVector {
-    let limits = JointLimits::franka();
+    let limits = JointLimits::panda();
     JointVector::from_fn(|i, _| rng.random_range(limits.position_min[i]..limits.position_max[i]))
 }
 

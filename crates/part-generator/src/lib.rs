@@ -34,12 +34,12 @@
 #![forbid(unsafe_code)]
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
-mod comparison;
 mod error;
 mod grasp;
 mod look_alike;
 mod part;
 mod part_kind;
+mod part_pair;
 mod random;
 mod recipe;
 mod relief;

@@ -6,8 +6,8 @@ use nalgebra::Point2;
 use sdg_geometry::Polygon;
 
 use crate::Part;
-use crate::comparison::Comparison;
 use crate::grasp::MAX_JAW_WIDTH_MM;
+use crate::part_pair::PartPair;
 use crate::random::{Draw, Stream, generator};
 use crate::recipe::{Operation, Recipe, Shape};
 
@@ -47,7 +47,7 @@ impl Part {
 
     fn mirrored(&self) -> Option<Part> {
         let made = Part::from_recipe(self.kind, self.recipe.mirrored())?;
-        let comparison = Comparison::new(&self.relief, self.center, &made.relief, made.center);
+        let comparison = PartPair::new(&self.relief, self.center, &made.relief, made.center);
         (!comparison.is_same_at_some_turn()).then_some(made)
     }
 
@@ -59,8 +59,8 @@ impl Part {
             let recipe = moved(&self.recipe, shift, rng.angle(), rng.random_group(&self.recipe))?;
             let made = Part::from_recipe(self.kind, recipe)?;
             // Held in place, a visible share must differ; under any other turn it must not look the same.
-            let in_place = Comparison::new(&self.relief, self.center, &made.relief, self.center);
-            let turned = Comparison::new(&self.relief, self.center, &made.relief, made.center);
+            let in_place = PartPair::new(&self.relief, self.center, &made.relief, self.center);
+            let turned = PartPair::new(&self.relief, self.center, &made.relief, made.center);
             let differs = in_place.difference(0.0, MIN_CHANGED_SHARE) > MIN_CHANGED_SHARE;
             (differs && !turned.is_same_at_some_turn()).then_some(made)
         })
@@ -157,7 +157,7 @@ mod tests {
     const NUM_TURNS: usize = 720;
 
     fn is_same_at_some_turn(one: &Part, other: &Part) -> bool {
-        let comparison = Comparison::new(&one.relief, one.center, &other.relief, other.center);
+        let comparison = PartPair::new(&one.relief, one.center, &other.relief, other.center);
         (0..NUM_TURNS).any(|k| comparison.is_same(std::f32::consts::TAU * k as f32 / NUM_TURNS as f32))
     }
 

@@ -5,9 +5,9 @@ use std::sync::Arc;
 use nalgebra::Point2;
 use sdg_geometry::{Mask, Polygon, RotationalSymmetry, outer_outline};
 
-use crate::comparison::{centroid, symmetry};
 use crate::grasp::{self, PartGrasp};
 use crate::part_kind::PartKind;
+use crate::part_pair::{centroid, symmetry};
 use crate::random::{Draw, Stream, generator};
 use crate::recipe::{self, Recipe};
 use crate::relief::Relief;

@@ -1,5 +1,7 @@
 //! The trait of all arms: state, checked motions, hand, stop.
 
+use sdg_kinematics::ArmGeometry;
+
 use crate::arm_state::{ArmState, ContactSensitivity, HandCommand, HandState, Load, MotionEnd};
 use crate::error::RobotError;
 use crate::safety::CheckedMotion;
@@ -10,6 +12,9 @@ use crate::watch::Watch;
 ///
 /// Calls block until what they ask for is done. An error leaves the arm at rest, or coming to rest by the robot's own means.
 pub trait Arm {
+    /// Its links, limits and hand.
+    fn geometry(&self) -> &ArmGeometry;
+
     /// The present state of the arm.
     ///
     /// # Errors

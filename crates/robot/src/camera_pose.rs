@@ -1,6 +1,7 @@
 //! Where a camera is fixed.
 
 use nalgebra::Isometry3;
+use sdg_kinematics::ArmGeometry;
 
 /// Where a camera is fixed (optical frame); lengths in metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -9,4 +10,20 @@ pub enum CameraPose {
     OnFlange(Isometry3<f64>),
     /// Beside the robot: `base_from_camera`.
     InBase(Isometry3<f64>),
+}
+
+impl CameraPose {
+    /// `tcp_from_camera` of a camera on the hand.
+    pub(crate) fn tcp_from_camera(&self, arm: &ArmGeometry) -> Option<Isometry3<f64>> {
+        match self {
+            Self::OnFlange(flange_from_camera) => Some(arm.flange_from_tcp().inverse() * flange_from_camera),
+            Self::InBase(_) => None,
+        }
+    }
+
+    /// The tcp's pose for the camera to be at a pose; that pose itself for one beside the robot.
+    pub(crate) fn base_from_tcp(&self, arm: &ArmGeometry, base_from_camera: &Isometry3<f64>) -> Isometry3<f64> {
+        let tcp_from_camera = self.tcp_from_camera(arm);
+        tcp_from_camera.map_or(*base_from_camera, |tcp_from_camera| base_from_camera * tcp_from_camera.inverse())
+    }
 }

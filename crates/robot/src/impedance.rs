@@ -14,7 +14,7 @@
 //! `cartesian_impedance_control.cpp` of libfranka's examples; the null space and the limit of the torque's rate as franka_ros has them.
 
 use nalgebra::{Isometry3, SMatrix, Vector6};
-use sdg_kinematics::{JointVector, Panda};
+use sdg_kinematics::{ArmGeometry, JointVector};
 
 use crate::arm_state::PERIOD_SECS;
 
@@ -101,13 +101,13 @@ impl ImpedanceControl {
     /// robot does not tell it, which at the speeds of contact is less than friction.
     pub fn torque(
         &mut self,
-        panda: &Panda,
+        arm: &ArmGeometry,
         q: &JointVector,
         dq: &JointVector,
         reference: &TcpReference,
         coriolis: &JointVector,
     ) -> JointVector {
-        let (base_from_tcp, jacobian) = panda.forward_and_jacobian(q);
+        let (base_from_tcp, jacobian) = arm.forward_and_jacobian(q);
         let Impedance { stiffness, mass, integral_per_sec, null_stiffness, max_torque_step_nm } = self.impedance;
         let spring = stiffness.component_mul(&pose_error(&base_from_tcp, &reference.base_from_tcp));
         self.integral += spring.component_mul(&integral_per_sec) * PERIOD_SECS;
@@ -157,14 +157,14 @@ mod tests {
         let mut control = ImpedanceControl::new(impedance, q_null, JointVector::zeros());
         let zero = JointVector::zeros();
         for _ in 0..200 {
-            control.torque(&Panda::new(), q, &zero, &still(wanted), &zero);
+            control.torque(&ArmGeometry::panda(), q, &zero, &still(wanted), &zero);
         }
         *control.last_torque()
     }
 
     #[test]
     fn a_tcp_beside_its_place_is_pressed_back_by_its_stiffness() {
-        let (panda, q) = (Panda::new(), ready_pose());
+        let (panda, q) = (ArmGeometry::panda(), ready_pose());
         let (here, jacobian) = panda.forward_and_jacobian(&q);
         assert!(settled(Impedance::SOFT, q, &q, here).amax() < 1e-12);
         // 10 mm too low at 150 N/m: 1.5 N up.
@@ -189,7 +189,7 @@ mod tests {
 
     #[test]
     fn the_integral_grows_with_the_error_up_to_its_limit_and_stays_when_the_stiffness_changes() {
-        let (panda, q, zero) = (Panda::new(), ready_pose(), JointVector::zeros());
+        let (panda, q, zero) = (ArmGeometry::panda(), ready_pose(), JointVector::zeros());
         let (here, jacobian) = panda.forward_and_jacobian(&q);
         let mut wanted = here;
         wanted.translation.z -= 0.001;
@@ -213,7 +213,7 @@ mod tests {
 
     #[test]
     fn the_elbows_spring_does_not_press_with_the_tcp() {
-        let (panda, q) = (Panda::new(), ready_pose());
+        let (panda, q) = (ArmGeometry::panda(), ready_pose());
         let (here, jacobian) = panda.forward_and_jacobian(&q);
         let mut q_null = q;
         q_null[2] += 0.5;
@@ -227,7 +227,7 @@ mod tests {
 
     #[test]
     fn velocity_is_damped_and_torques_change_by_steps() {
-        let (panda, q) = (Panda::new(), ready_pose());
+        let (panda, q) = (ArmGeometry::panda(), ready_pose());
         let here = panda.forward(&q);
         let (zero, mut dq) = (JointVector::zeros(), JointVector::zeros());
         dq[3] = 0.5;

@@ -1,15 +1,15 @@
 //! Perception for an arm that moves nothing: the part is where it was seen, wherever the arm is.
 
 use nalgebra::{Isometry3, Point3};
-use sdg_kinematics::Panda;
 
 use crate::Arm;
+use crate::camera_pose::CameraPose;
 use crate::error::Result;
 use crate::grasp_target::GraspTarget;
 use crate::height::{MeasuredHeight, Sighting};
 use crate::perception::PartFinder;
 use crate::planned_arm::PlannedArm;
-use crate::sequence::{CameraMount, GraspConfig};
+use crate::sequence::GraspConfig;
 
 /// Places and sizes are exact to so much, m and as a share.
 const EXACT: f64 = 1e-4;
@@ -18,16 +18,16 @@ const EXACT: f64 = 1e-4;
 #[derive(Debug, Clone, Copy)]
 pub struct KnownTarget {
     target: Option<GraspTarget>,
-    mount: CameraMount,
+    camera: CameraPose,
     /// How far the grasp lies below the marks, m.
     marks_over_grasp_m: f64,
 }
 
 impl KnownTarget {
     /// A target that was seen, for a sequence with this camera and configuration.
-    pub fn new(target: Option<GraspTarget>, mount: CameraMount, config: &GraspConfig) -> Self {
+    pub fn new(target: Option<GraspTarget>, camera: CameraPose, config: &GraspConfig) -> Self {
         let marks_over_grasp_m = config.height.map_or(0.0, |height| height.marks_over_grasp_m());
-        Self { target, mount, marks_over_grasp_m }
+        Self { target, camera, marks_over_grasp_m }
     }
 }
 
@@ -42,8 +42,9 @@ impl PartFinder<PlannedArm> for KnownTarget {
     }
 
     fn sight(&mut self, arm: &mut PlannedArm, _expected: &GraspTarget) -> Result<Vec<Sighting>> {
-        let CameraMount::Hand { tcp_from_camera } = self.mount else { return Ok(Vec::new()) };
-        let base_from_camera = Panda::new().forward(&arm.state()?.q) * tcp_from_camera;
+        let Some(tcp_from_camera) = self.camera.tcp_from_camera(arm.geometry()) else { return Ok(Vec::new()) };
+        let q = arm.state()?.q;
+        let base_from_camera = arm.geometry().forward(&q) * tcp_from_camera;
         let sighting = |target: GraspTarget| {
             let p = target.base_from_tcp.translation;
             Sighting {

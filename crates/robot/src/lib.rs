@@ -18,7 +18,7 @@
 //!
 //! let mut folded = ready_pose();
 //! (folded[1], folded[3], folded[5]) = (-1.7, -3.0, 0.5);
-//! let slow = JointLimits::franka().scaled(0.1, 0.1, 0.1)?;
+//! let slow = JointLimits::panda().scaled(0.1, 0.1, 0.1)?;
 //! let motion = Trajectory::point_to_point(&ready_pose(), &folded, &slow)?;
 //! let refused = SafetyLimits::default().check(motion);
 //! assert!(matches!(refused, Err(Violation::SelfCollision { .. })), "{refused:?}");
@@ -68,15 +68,16 @@ pub use lying_part::LyingPart;
 pub use pace::{DEFAULT_SPEED, MAX_SPEED, Pace};
 pub use part_shape::PartShape;
 pub use perception::{GraspStep, PartFinder, StepObserver};
-pub use place::{Place, PlaceError, PlaceGoal, PlaceKind, TrayCell};
+pub use place::{Place, PlaceGoal, PlaceKind, PlaceOffset, TrayCell};
 pub use planned_arm::{PlannedAction, PlannedArm};
 pub use playback::{JointReference, Playback, STOP_SECS};
 pub use robot::Robot;
 pub use robot_address::RobotAddress;
-pub use safety::{CheckedMotion, LinkCapsules, SafetyLimits, SelfCollision, Violation, WorkspaceBox};
+pub use safety::{CheckedMotion, SafetyLimits, SelfCollision, Violation, WorkspaceBox};
+pub use sdg_kinematics::ArmGeometry;
 pub use sequence::{
-    CONFIRMED, CameraMount, FREE_CLEARANCE_M, GraspConfig, GraspOutcome, GraspReport, LOOK_AT_M, LOOK_HEIGHT_M,
-    LookOut, PlaceOutcome, PlaceReport, PlacingConfig, SURE, camera_looking_down, grasp, grasp_and_place, grasp_softly,
+    CONFIRMED, FREE_CLEARANCE_M, GraspConfig, GraspOutcome, GraspReport, LOOK_AT_M, LOOK_HEIGHT_M, LookOut,
+    PlacingConfig, PlacingOutcome, PlacingReport, SURE, camera_looking_down, grasp, grasp_and_place, grasp_softly,
 };
 pub use surroundings::{Destination, Surroundings, Way};
 pub use touch::{Descent, TouchDown, Touched};

@@ -1,10 +1,10 @@
-//! Speed of the sequence, as shares of Franka's limits.
+//! Speed of the sequence, as shares of an arm's limits.
 
-use sdg_kinematics::{CartesianLimits, JointLimits};
+use sdg_kinematics::{ArmGeometry, CartesianLimits, JointLimits};
 
 use crate::error::{Result, RobotError};
 
-/// Shares of Franka's velocity, acceleration and jerk limits.
+/// Shares of the arm's velocity, acceleration and jerk limits.
 type Shares = [f64; 3];
 
 /// The largest share of the joints' velocity limits, and that of rehearsals: beyond it nothing was ever tried.
@@ -52,32 +52,32 @@ impl Pace {
     }
 
     /// Joint limits of free motions.
-    pub fn free_limits(&self) -> JointLimits {
-        of_joints(self.free)
+    pub fn free_limits(&self, arm: &ArmGeometry) -> JointLimits {
+        of_joints(arm, self.free)
     }
 
     /// Joint limits of free motions with the part.
-    pub fn carry_limits(&self) -> JointLimits {
-        of_joints(self.carry)
+    pub fn carry_limits(&self, arm: &ArmGeometry) -> JointLimits {
+        of_joints(arm, self.carry)
     }
 
     /// Limits of the tcp on the approach.
-    pub fn approach_limits(&self) -> CartesianLimits {
-        scaled(self.approach)
+    pub fn approach_limits(&self, arm: &ArmGeometry) -> CartesianLimits {
+        scaled(arm, self.approach)
     }
 
     /// Limits of the tcp while lifting.
-    pub fn lift_limits(&self) -> CartesianLimits {
-        scaled(self.lift)
+    pub fn lift_limits(&self, arm: &ArmGeometry) -> CartesianLimits {
+        scaled(arm, self.lift)
     }
 }
 
-fn of_joints([velocity, acceleration, jerk]: Shares) -> JointLimits {
-    JointLimits::franka().scaled(velocity, acceleration, jerk).expect("shares are in (0, 1]")
+fn of_joints(arm: &ArmGeometry, [velocity, acceleration, jerk]: Shares) -> JointLimits {
+    arm.limits.scaled(velocity, acceleration, jerk).expect("shares are in (0, 1]")
 }
 
-fn scaled([velocity, acceleration, jerk]: Shares) -> CartesianLimits {
-    CartesianLimits::franka().scaled(velocity, acceleration, jerk).expect("shares are in (0, 1]")
+fn scaled(arm: &ArmGeometry, [velocity, acceleration, jerk]: Shares) -> CartesianLimits {
+    arm.cartesian_limits.scaled(velocity, acceleration, jerk).expect("shares are in (0, 1]")
 }
 
 #[cfg(test)]
@@ -87,9 +87,9 @@ mod tests {
     #[test]
     fn a_tenth_is_a_tenth_of_frankas_velocity() {
         let pace = Pace::at_speed(DEFAULT_SPEED).unwrap();
-        assert!((pace.free_limits().velocity_max[0] - 0.2175).abs() < 1e-12);
+        assert!((pace.free_limits(&ArmGeometry::panda()).velocity_max[0] - 0.2175).abs() < 1e-12);
         // 0.18 of 1.7 m/s at 60 %: a sixth of that.
-        assert!((pace.approach_limits().velocity_m_s - 0.051).abs() < 1e-12);
+        assert!((pace.approach_limits(&ArmGeometry::panda()).velocity_m_s - 0.051).abs() < 1e-12);
         assert_eq!(Pace::at_speed(MAX_SPEED).unwrap(), Pace::REHEARSED);
         for bad in [0.0, -0.1, 0.61, f64::NAN] {
             let message = Pace::at_speed(bad).unwrap_err().to_string();

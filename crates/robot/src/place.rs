@@ -66,14 +66,14 @@ pub struct TrayCell {
 
 /// How far a part lies beside where it was to lie.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PlaceError {
+pub struct PlaceOffset {
     /// Along the marked line and across it, m.
     pub beside_m: [f64; 2],
     /// Turn, without those that the part's symmetry hides, rad.
     pub angle_rad: f64,
 }
 
-impl PlaceError {
+impl PlaceOffset {
     /// Distance over the table, m.
     pub fn distance_m(&self) -> f64 {
         self.beside_m[0].hypot(self.beside_m[1])

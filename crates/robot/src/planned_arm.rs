@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::safety::CheckedMotion;
 use crate::touch::{TouchDown, Touched};
 use crate::watch::Watch;
-use sdg_kinematics::{JointVector, LineOptions, Panda};
+use sdg_kinematics::{ArmGeometry, JointVector, LineOptions};
 
 /// What a planned arm did.
 #[derive(Debug, Clone)]
@@ -29,6 +29,7 @@ pub enum PlannedAction {
 /// Follows every motion exactly and holds after every grasp; records the commands.
 #[derive(Debug, Clone)]
 pub struct PlannedArm {
+    geometry: ArmGeometry,
     state: ArmState,
     hand: HandState,
     actions: Vec<PlannedAction>,
@@ -36,9 +37,10 @@ pub struct PlannedArm {
 
 impl PlannedArm {
     /// Stands where a real arm stands, its hand as open as the real one.
-    pub fn new(q: JointVector, opening_m: f64) -> Self {
+    pub fn new(geometry: ArmGeometry, q: JointVector, opening_m: f64) -> Self {
         let zero = JointVector::zeros();
         Self {
+            geometry,
             state: ArmState { time_secs: 0.0, q, dq: zero, q_commanded: q, tau_external_nm: zero, mode: ArmMode::Idle },
             hand: HandState { opening_m, is_grasping: false, force_n: None },
             actions: Vec::new(),
@@ -97,6 +99,10 @@ impl PlannedArm {
 }
 
 impl Arm for PlannedArm {
+    fn geometry(&self) -> &ArmGeometry {
+        &self.geometry
+    }
+
     fn state(&mut self) -> Result<ArmState> {
         Ok(self.state)
     }
@@ -153,11 +159,10 @@ impl Arm for PlannedArm {
 impl CompliantArm for PlannedArm {
     /// What is felt is where it was expected: above the last part of the way, which is there for what is not known to a millimetre.
     fn touch_down(&mut self, touch_down: &TouchDown, _watch: &mut Watch) -> Result<Touched> {
-        let panda = Panda::new();
         let way_m = (touch_down.max_way_m - touch_down.below_table_m).max(0.0);
-        let mut base_from_tcp = panda.forward(&self.state.q);
+        let mut base_from_tcp = self.geometry.forward(&self.state.q);
         base_from_tcp.translation.z -= way_m;
-        let end = *panda.straight_path(&self.state.q, &base_from_tcp, &LineOptions::default())?.end();
+        let end = *self.geometry.straight_path(&self.state.q, &base_from_tcp, &LineOptions::default())?.end();
         let duration_secs = way_m / touch_down.speed_m_s + touch_down.press_secs;
         self.state.time_secs += duration_secs;
         (self.state.q, self.state.q_commanded) = (end, end);
@@ -170,13 +175,14 @@ impl CompliantArm for PlannedArm {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::camera_pose::CameraPose;
     use crate::grasp_target::GraspTarget;
     use crate::perception::PartFinder;
     use crate::robot::Robot;
     use crate::safety::SafetyLimits;
-    use crate::sequence::{CameraMount, GraspConfig, GraspOutcome, grasp};
+    use crate::sequence::{GraspConfig, GraspOutcome, grasp};
     use nalgebra::{Isometry3, UnitQuaternion, Vector3};
-    use sdg_kinematics::{Panda, ready_pose};
+    use sdg_kinematics::{ArmGeometry, ready_pose};
 
     struct FixedTarget(Option<GraspTarget>);
 
@@ -192,8 +198,6 @@ mod tests {
         GraspTarget { base_from_tcp, jaw_width_m: 0.02, score: 0.9 }
     }
 
-    const MOUNT: CameraMount = CameraMount::Base;
-
     fn config() -> GraspConfig {
         let look_outs = vec![crate::sequence::LookOut::Joints(ready_pose())];
         GraspConfig { look_outs, pace: crate::pace::Pace::at_speed(0.1).unwrap(), ..GraspConfig::default() }
@@ -203,9 +207,16 @@ mod tests {
     fn a_whole_grasp_is_planned_without_an_arm() {
         let mut start = ready_pose();
         start[0] = 0.6;
-        let mut arm = PlannedArm::new(start, 0.08);
+        let mut arm = PlannedArm::new(ArmGeometry::panda(), start, 0.08);
         let mut robot = Robot::new(&mut arm, SafetyLimits::default(), Watch::default());
-        let report = grasp(&mut robot, &mut FixedTarget(Some(target())), &mut (), MOUNT, &config()).unwrap();
+        let report = grasp(
+            &mut robot,
+            &mut FixedTarget(Some(target())),
+            &mut (),
+            CameraPose::InBase(Isometry3::identity()),
+            &config(),
+        )
+        .unwrap();
         assert_eq!(report.outcome, GraspOutcome::Held);
         let motions: Vec<_> = arm
             .actions()
@@ -218,7 +229,7 @@ mod tests {
         // To the look-out pose, above the part, down, and up.
         assert_eq!(motions.len(), 4);
         assert!(motions.windows(2).all(|pair| (pair[0].end() - pair[1].start()).amax() < 1e-9));
-        let tcp = Panda::new().forward(motions[2].end()).translation.vector;
+        let tcp = ArmGeometry::panda().forward(motions[2].end()).translation.vector;
         assert!((tcp - target().base_from_tcp.translation.vector).norm() < 1e-6, "{tcp}");
 
         let frames = PlannedArm::frames(&start, 0.08, arm.actions(), 0.25);
@@ -232,9 +243,11 @@ mod tests {
 
     #[test]
     fn a_part_that_is_not_seen_ends_the_plan_at_the_look_out() {
-        let mut arm = PlannedArm::new(ready_pose(), 0.08);
+        let mut arm = PlannedArm::new(ArmGeometry::panda(), ready_pose(), 0.08);
         let mut robot = Robot::new(&mut arm, SafetyLimits::default(), Watch::default());
-        let report = grasp(&mut robot, &mut FixedTarget(None), &mut (), MOUNT, &config()).unwrap();
+        let report =
+            grasp(&mut robot, &mut FixedTarget(None), &mut (), CameraPose::InBase(Isometry3::identity()), &config())
+                .unwrap();
         assert!(matches!(report.outcome, GraspOutcome::Failed { step: crate::GraspStep::Detect, .. }));
     }
 }

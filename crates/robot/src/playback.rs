@@ -94,14 +94,11 @@ mod tests {
     use super::*;
     use crate::safety::SafetyLimits;
     use sdg_kinematics::dynamics::ArmDynamics;
-    use sdg_kinematics::{
-        ACCELERATION_MAX_RAD_S2, CartesianLimits, JERK_MAX_RAD_S3, JointLimits, RoundedPath, TORQUE_MAX_NM, Trajectory,
-        ready_pose,
-    };
+    use sdg_kinematics::{ArmGeometry, CartesianLimits, JointLimits, RoundedPath, Trajectory, ready_pose};
 
     fn motion() -> CheckedMotion {
         let end = ready_pose() + JointVector::from([0.8, 0.2, -0.3, 0.3, 0.4, -0.2, 0.9]);
-        let limits = JointLimits::franka().scaled(0.6, 0.4, 0.2).unwrap();
+        let limits = JointLimits::panda().scaled(0.6, 0.4, 0.2).unwrap();
         let trajectory = Trajectory::point_to_point(&ready_pose(), &end, &limits).unwrap();
         SafetyLimits::default().check(trajectory).unwrap()
     }
@@ -118,10 +115,10 @@ mod tests {
             waypoints.push(waypoints[waypoints.len() - 1] + JointVector::from(step));
         }
         let path = RoundedPath::new(&waypoints, &[0.12, 0.03]);
-        let limits = JointLimits::franka().scaled(0.6, 0.4, 0.2).unwrap();
-        let dynamics = ArmDynamics::panda(0.08);
+        let limits = JointLimits::panda().scaled(0.6, 0.4, 0.2).unwrap();
+        let dynamics = ArmDynamics::new(&ArmGeometry::panda(), 0.08);
         let trajectory =
-            Trajectory::along_rounded_path(path.clone(), &limits, &CartesianLimits::franka(), &dynamics).unwrap();
+            Trajectory::along_rounded_path(path.clone(), &limits, &CartesianLimits::panda(), &dynamics).unwrap();
         (path, SafetyLimits::default().check(trajectory).unwrap())
     }
 
@@ -130,7 +127,7 @@ mod tests {
         // Half of what lies between the path's places that are compared with.
         const ON_PATH_RAD: f64 = 1e-3;
         let (path, motion) = curved();
-        let dynamics = ArmDynamics::panda(0.08);
+        let dynamics = ArmDynamics::new(&ArmGeometry::panda(), 0.08);
         let places: Vec<JointVector> =
             (0..=4000).map(|place| path.at(path.length_secs() * f64::from(place) / 4000.0).q).collect();
         let num_cycles = (motion.duration_secs() * 1e3) as usize;
@@ -145,12 +142,12 @@ mod tests {
                 let Some(reference) = playback.next_reference() else { break };
                 let torques = dynamics.torques_nm(&reference.q, &reference.dq, &reference.ddq);
                 for joint in 0..7 {
-                    let acceleration = reference.ddq[joint].abs() / ACCELERATION_MAX_RAD_S2[joint];
-                    let torque = torques[joint].abs() / TORQUE_MAX_NM[joint];
+                    let acceleration = reference.ddq[joint].abs() / JointLimits::panda().acceleration_max[joint];
+                    let torque = torques[joint].abs() / JointLimits::panda().torque_max[joint];
                     largest = [largest[0].max(acceleration), largest[1].max(torque)];
                     if let Some(before) = &before {
                         let jerk = (reference.ddq[joint] - before.ddq[joint]) / PERIOD_SECS;
-                        assert!(jerk.abs() <= JERK_MAX_RAD_S3[joint], "stopped at {stop_at}: {jerk}");
+                        assert!(jerk.abs() <= JointLimits::panda().jerk_max[joint], "stopped at {stop_at}: {jerk}");
                     }
                 }
                 before = Some(reference);
@@ -204,9 +201,9 @@ mod tests {
                 for joint in 0..7 {
                     let velocity = (pair[1].q[joint] - pair[0].q[joint]) / PERIOD_SECS;
                     assert!((velocity - pair[1].dq[joint]).abs() < 0.02, "{velocity} {}", pair[1].dq[joint]);
-                    assert!(pair[1].ddq[joint].abs() <= ACCELERATION_MAX_RAD_S2[joint]);
+                    assert!(pair[1].ddq[joint].abs() <= JointLimits::panda().acceleration_max[joint]);
                     let jerk = (pair[1].ddq[joint] - pair[0].ddq[joint]) / PERIOD_SECS;
-                    assert!(jerk.abs() <= JERK_MAX_RAD_S3[joint], "stopped at {stop_at}: {jerk}");
+                    assert!(jerk.abs() <= JointLimits::panda().jerk_max[joint], "stopped at {stop_at}: {jerk}");
                 }
             }
         }

@@ -2,8 +2,7 @@
 
 use sdg_kinematics::dynamics::ArmDynamics;
 use sdg_kinematics::{
-    CartesianLimits, HAND_OPENING_MAX_M, JointLimits, JointPath, JointVector, LineOptions, NUM_JOINTS, Panda,
-    RoundedPath, Trajectory,
+    ArmGeometry, CartesianLimits, JointLimits, JointPath, JointVector, LineOptions, NUM_JOINTS, RoundedPath, Trajectory,
 };
 
 use crate::arm::{Arm, CompliantArm};
@@ -26,7 +25,6 @@ const SLOWDOWN: f64 = 0.8;
 #[derive(Debug)]
 pub struct Robot<'a, A: Arm> {
     arm: &'a mut A,
-    panda: Panda,
     limits: SafetyLimits,
     watch: Watch,
     latched: Option<String>,
@@ -39,7 +37,8 @@ pub struct Robot<'a, A: Arm> {
 impl<'a, A: Arm> Robot<'a, A> {
     /// Puts an arm behind limits; `watch` sees every state and may stop it.
     pub fn new(arm: &'a mut A, limits: SafetyLimits, watch: Watch) -> Self {
-        Self { arm, panda: Panda::new(), limits, watch, latched: None, load: Load::NONE, felt_below: None }
+        let watch = watch.of_arm(&arm.geometry().limits);
+        Self { arm, limits, watch, latched: None, load: Load::NONE, felt_below: None }
     }
 
     /// The arm, to take pictures with it and to read what only it has. It is not for moving it.
@@ -48,8 +47,8 @@ impl<'a, A: Arm> Robot<'a, A> {
     }
 
     /// The arm's geometry.
-    pub fn panda(&self) -> &Panda {
-        &self.panda
+    pub fn geometry(&self) -> &ArmGeometry {
+        self.arm.geometry()
     }
 
     /// What every motion keeps to.
@@ -100,7 +99,8 @@ impl<'a, A: Arm> Robot<'a, A> {
     pub(crate) fn plan_through(&self, way: &RoundedPath, joints: &JointLimits) -> Result<Trajectory> {
         // The fingers' opening shifts 0.12 kg by some centimetres: nothing that a torque shows.
         let Load { mass_kg, center_in_flange_m } = self.load;
-        let dynamics = ArmDynamics::panda(HAND_OPENING_MAX_M).with_load(mass_kg, center_in_flange_m);
+        let dynamics = ArmDynamics::new(self.geometry(), self.geometry().hand.opening_max_m)
+            .with_load(mass_kg, center_in_flange_m);
         self.slowed(|share| {
             let slowed = joints.scaled(share, share, share)?;
             Ok(Trajectory::along_rounded_path(way.clone(), &slowed, &self.limits.cartesian, &dynamics)?)
@@ -137,7 +137,7 @@ impl<'a, A: Arm> Robot<'a, A> {
 
     /// The limits of a motion from a configuration: a hand that came down by contact, lower than the limits allow, may go straight up.
     pub(crate) fn limits_from(&self, start: &JointVector) -> LimitsFrom<'_> {
-        self.limits.starting_at(&self.panda, start, self.felt_below.as_ref())
+        self.limits.starting_at(start, self.felt_below.as_ref())
     }
 
     /// Checks a motion and follows it to its end.
@@ -277,12 +277,12 @@ impl<A: CompliantArm> Robot<'_, A> {
     pub fn touch_down(&mut self, touch_down: &TouchDown) -> Result<Touched> {
         touch_down.validate()?;
         let start = self.ready()?.q_commanded;
-        let base_from_tcp = self.panda.forward(&start);
+        let base_from_tcp = self.geometry().forward(&start);
         let mut lowest = base_from_tcp;
         lowest.translation.z -= touch_down.max_way_m;
-        let path = self.panda.straight_path(&start, &lowest, &LineOptions::default())?;
+        let path = self.geometry().straight_path(&start, &lowest, &LineOptions::default())?;
         let [velocity, acceleration, jerk] = TOUCH_SHARES;
-        let slow = CartesianLimits::franka().scaled(velocity, acceleration, jerk)?;
+        let slow = self.geometry().cartesian_limits.scaled(velocity, acceleration, jerk)?;
         let way = Trajectory::along_path(path, &self.limits.joints, &slow)?;
         let below_m = touch_down.below_table_m;
         self.limits.lowered(below_m, below_m).check(way)?;

@@ -3,7 +3,7 @@
 use nalgebra::Isometry3;
 use sdg_kinematics::collision::{Body, Capsule, CollisionError, CollisionModel, Obstacle, Shape};
 use sdg_kinematics::planning::{Plan, PlanError, PlanOptions, StraightApproach};
-use sdg_kinematics::{HAND_OPENING_MAX_M, JointLimits, JointPath, JointVector, NUM_JOINTS, Panda, Trajectory};
+use sdg_kinematics::{ArmGeometry, JointLimits, JointPath, JointVector, NUM_JOINTS, Trajectory};
 
 use crate::arm::Arm;
 use crate::error::{Result, RobotError};
@@ -23,6 +23,7 @@ const HAND_BELOW_TCP_M: f64 = 0.010;
 
 /// The arm with its fingers at an opening (m), the table and obstacles.
 pub(crate) fn collision_model(
+    arm: &ArmGeometry,
     table_height_m: f64,
     obstacles: &[Obstacle],
     opening_m: f64,
@@ -32,7 +33,7 @@ pub(crate) fn collision_model(
         shape: Shape::Plane,
         base_from_obstacle: Isometry3::translation(0.0, 0.0, table_height_m),
     };
-    let mut model = CollisionModel::new([&[table], obstacles].concat(), opening_m)?;
+    let mut model = CollisionModel::new(arm, [&[table], obstacles].concat(), opening_m)?;
     // Link 1 turns about the vertical only: a table that is higher than the base's foot is around it, not in its way.
     model.allow(Body::link(1), TABLE)?;
     Ok(model)
@@ -76,15 +77,21 @@ pub struct Way {
 }
 
 impl Surroundings<'_> {
-    fn model(&self, table_height_m: f64) -> Result<CollisionModel> {
+    fn model(&self, arm: &ArmGeometry, table_height_m: f64) -> Result<CollisionModel> {
         let lying = self.lying.iter().enumerate().map(|(number, part)| part.obstacle(number));
-        self.model_with(table_height_m, lying.collect(), HAND_OPENING_MAX_M)
+        self.model_with(arm, table_height_m, lying.collect(), arm.hand.opening_max_m)
     }
 
-    fn model_with(&self, table_height_m: f64, lying: Vec<Obstacle>, opening_m: f64) -> Result<CollisionModel> {
+    fn model_with(
+        &self,
+        arm: &ArmGeometry,
+        table_height_m: f64,
+        lying: Vec<Obstacle>,
+        opening_m: f64,
+    ) -> Result<CollisionModel> {
         let device = |error: CollisionError| RobotError::Device(Box::new(error));
         let obstacles = [self.obstacles, &lying].concat();
-        let mut model = collision_model(table_height_m, &obstacles, opening_m).map_err(device)?;
+        let mut model = collision_model(arm, table_height_m, &obstacles, opening_m).map_err(device)?;
         if !self.held.is_empty() {
             model.hold(self.held).map_err(device)?;
         }
@@ -93,10 +100,10 @@ impl Surroundings<'_> {
 
     /// The same where the hand may touch the table, and the held part whatever it is lifted from, put on or comes beside: it is not known as well as
     /// the fingers are, and whether it has room in a tray is judged before.
-    pub(crate) fn contact_model(&self, table_height_m: f64) -> Result<CollisionModel> {
+    pub(crate) fn contact_model(&self, arm: &ArmGeometry, table_height_m: f64) -> Result<CollisionModel> {
         let lying = self.lying.iter().enumerate().map(|(number, part)| part.obstacle_beside_fingers(number));
-        let opening_m = self.opening_m.clamp(0.0, HAND_OPENING_MAX_M);
-        let mut model = self.model_with(table_height_m, lying.collect(), opening_m)?;
+        let opening_m = self.opening_m.clamp(0.0, arm.hand.opening_max_m);
+        let mut model = self.model_with(arm, table_height_m, lying.collect(), opening_m)?;
         let names: Vec<String> = model.obstacles().iter().map(|obstacle| obstacle.name.clone()).collect();
         let device = |error: CollisionError| RobotError::Device(Box::new(error));
         model.allow(Body::HAND, TABLE).map_err(device)?;
@@ -107,28 +114,33 @@ impl Surroundings<'_> {
     }
 
     /// How high the table stands for a free motion: higher than it is by the clearance, as far as both ends let it.
-    fn table_for_motion_m(&self, table_height_m: f64, start: &JointVector, to: &Destination<'_>) -> Result<f64> {
-        let model = self.model(table_height_m)?;
-        let panda = Panda::new();
+    fn table_for_motion_m(
+        &self,
+        arm: &ArmGeometry,
+        table_height_m: f64,
+        start: &JointVector,
+        to: &Destination<'_>,
+    ) -> Result<f64> {
+        let model = self.model(arm, table_height_m)?;
         let hang_m = self.held.iter().map(|capsule| capsule.from.z.max(capsule.to.z) + capsule.radius_m);
         let below_tcp_m = hang_m.fold(HAND_BELOW_TCP_M, f64::max);
         let before_m = |poses: &[Isometry3<f64>], length_m: f64| {
             poses.iter().map(|pose| pose.translation.z + length_m - below_tcp_m).fold(f64::INFINITY, f64::min)
         };
         let end_m = match to {
-            Destination::Configuration(q) => lowest_m(&model, &panda, q),
+            Destination::Configuration(q) => lowest_m(&model, arm, q),
             Destination::Poses(poses) => before_m(poses, 0.0),
             Destination::Approached(poses, length_m) => before_m(poses, *length_m),
         };
         let room_m = PlanOptions::default().margin_m + START_ROOM_M;
-        let lower_m = lowest_m(&model, &panda, start).min(end_m) - room_m;
+        let lower_m = lowest_m(&model, arm, start).min(end_m) - room_m;
         Ok((table_height_m + self.table_clearance_m).min(lower_m))
     }
 }
 
 /// The lowest point of the arm's moving capsules from link 2 on, base frame, m.
-fn lowest_m(model: &CollisionModel, panda: &Panda, q: &JointVector) -> f64 {
-    let frames = panda.frames(q);
+fn lowest_m(model: &CollisionModel, arm: &ArmGeometry, q: &JointVector) -> f64 {
+    let frames = arm.frames(q);
     let links = (2..=NUM_JOINTS).map(|number| (Body::link(number), number));
     // Hand and held part have their capsules in link 7's frame.
     let bodies = links.chain([(Body::HAND, NUM_JOINTS), (Body::HELD_PART, NUM_JOINTS)]);
@@ -156,19 +168,19 @@ impl<A: Arm> Robot<'_, A> {
     ) -> Result<Way> {
         let start = self.commanded()?;
         let table_m = self.limits().table_height_m;
-        let raised_m = surroundings.table_for_motion_m(table_m, &start, to)?;
-        let model = surroundings.model(raised_m)?;
-        let on_approach = surroundings.contact_model(table_m)?;
+        let raised_m = surroundings.table_for_motion_m(self.geometry(), table_m, &start, to)?;
+        let model = surroundings.model(self.geometry(), raised_m)?;
+        let on_approach = surroundings.contact_model(self.geometry(), table_m)?;
         let mut refused = None;
         for seed in 0..NUM_SEEDS {
             let mut options = PlanOptions::default();
             (options.seed, options.max_checks) = (seed, MAX_CHECKS);
             let Plan { ways, approach, goal_idx, .. } = match to {
-                Destination::Configuration(q) => self.panda().plan_to(&model, &start, &[**q], &options),
-                Destination::Poses(poses) => self.panda().plan(&model, &start, poses, None, &options),
+                Destination::Configuration(q) => self.geometry().plan_to(&model, &start, &[**q], &options),
+                Destination::Poses(poses) => self.geometry().plan(&model, &start, poses, None, &options),
                 Destination::Approached(poses, length_m) => {
                     let straight = StraightApproach { length_m: *length_m, model: &on_approach };
-                    self.panda().plan(&model, &start, poses, Some(&straight), &options)
+                    self.geometry().plan(&model, &start, poses, Some(&straight), &options)
                 }
             }?;
             let motions = ways.iter().map(|way| self.plan_through(way, joints)).collect::<Result<Vec<_>>>()?;

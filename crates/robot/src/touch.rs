@@ -7,7 +7,7 @@
 //! What is felt is the robot's own estimate of the external force; the height that counts is the measured one.
 
 use nalgebra::{Isometry3, Vector6};
-use sdg_kinematics::{JointVector, Panda};
+use sdg_kinematics::{ArmGeometry, JointVector};
 
 use crate::arm_state::PERIOD_SECS;
 use crate::error::{Result, RobotError};
@@ -132,11 +132,11 @@ pub struct Descent {
 
 impl Descent {
     /// Begins where the arm stands (rad), after this torque (N·m, without gravity).
-    pub fn new(touch_down: TouchDown, panda: &Panda, q: JointVector, torque: JointVector) -> Self {
+    pub fn new(touch_down: TouchDown, arm: &ArmGeometry, q: JointVector, torque: JointVector) -> Self {
         Self {
             touch_down,
             control: ImpedanceControl::new(touch_down.free_air, q, torque),
-            start: panda.forward(&q),
+            start: arm.forward(&q),
             phase: Phase::Standing,
             phase_cycles: 0,
             down_m: 0.0,
@@ -155,9 +155,9 @@ impl Descent {
     ///
     /// `force_n` is the vertical external force, upwards, as the robot estimates it. Only its change against free air counts, so that a
     /// part of unknown weight, or a robot that counts the other way round, makes no difference.
-    pub fn next(&mut self, panda: &Panda, q: &JointVector, dq: &JointVector, force_n: f64) -> (JointVector, bool) {
+    pub fn next(&mut self, arm: &ArmGeometry, q: &JointVector, dq: &JointVector, force_n: f64) -> (JointVector, bool) {
         let pressed_n = (force_n - self.free_air_n).abs();
-        let base_from_tcp = panda.forward(q);
+        let base_from_tcp = arm.forward(q);
         let height_m = base_from_tcp.translation.z;
         let way_m = self.start.translation.z - height_m;
         self.phase_cycles += 1;
@@ -210,7 +210,7 @@ impl Descent {
         base_from_wanted.translation.z -= self.down_m;
         let twist = Vector6::new(0.0, 0.0, -self.speed_m_s, 0.0, 0.0, 0.0);
         let reference = TcpReference { base_from_tcp: base_from_wanted, twist };
-        (self.control.torque(panda, q, dq, &reference, &JointVector::zeros()), is_last)
+        (self.control.torque(arm, q, dq, &reference, &JointVector::zeros()), is_last)
     }
 
     /// How fast the reference goes on down while less is felt than is to be pressed with, or up while more is, m/s.

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::fmt;
 
-use sdg_kinematics::{JointVector, NUM_JOINTS, VELOCITY_MAX_RAD_S};
+use sdg_kinematics::{JointLimits, JointVector, NUM_JOINTS};
 
 use crate::arm_state::{ArmMode, ArmState};
 
@@ -38,7 +38,7 @@ pub const MAX_SILENCE_SECS: f64 = 0.020;
 const ROUNDING_SECS: f64 = 0.5e-3;
 /// How much of the past is kept, in seconds of the arm's clock.
 pub const HISTORY_SECS: f64 = 1.0;
-/// A measured joint moves at most so many times as fast as Franka's limit between two states, and by so much for noise, rad.
+/// A measured joint moves at most so many times as fast as its limit between two states, and by so much for noise, rad.
 const MAX_SPEED_SHARE: f64 = 2.0;
 const NOISE_RAD: f64 = 0.005;
 
@@ -51,6 +51,8 @@ pub struct Watch {
     states: VecDeque<ArmState>,
     stop: Option<StopReason>,
     max_silence_secs: f64,
+    /// The arm's, rad/s.
+    velocity_max: JointVector,
 }
 
 impl fmt::Debug for Watch {
@@ -69,12 +71,18 @@ impl Default for Watch {
 impl Watch {
     /// Asks `request` in every cycle.
     pub fn new(request: StopRequest) -> Self {
-        Self { request, states: VecDeque::new(), stop: None, max_silence_secs: MAX_SILENCE_SECS }
+        let velocity_max = JointLimits::panda().velocity_max;
+        Self { request, states: VecDeque::new(), stop: None, max_silence_secs: MAX_SILENCE_SECS, velocity_max }
     }
 
     /// Allows longer gaps between states than [`MAX_SILENCE_SECS`], for an arm whose driver sends fewer.
     pub fn allow_silence(&mut self, max_silence_secs: f64) {
         self.max_silence_secs = max_silence_secs;
+    }
+
+    /// Holds what is plausible to the limits of an arm instead of the Panda's.
+    pub(crate) fn of_arm(self, limits: &JointLimits) -> Self {
+        Self { velocity_max: limits.velocity_max, ..self }
     }
 
     /// Begins another motion: a gap since the last state is none.
@@ -120,7 +128,7 @@ impl Watch {
                 self.max_silence_secs * 1e3
             )));
         }
-        let allowed = JointVector::from(VELOCITY_MAX_RAD_S) * (MAX_SPEED_SHARE * elapsed_secs.max(0.0));
+        let allowed = self.velocity_max * (MAX_SPEED_SHARE * elapsed_secs.max(0.0));
         let jump = |now: &JointVector, before: &JointVector, what: &str| {
             let moved = (now - before).abs();
             let joint_idx = (0..NUM_JOINTS).find(|&idx| moved[idx] > allowed[idx] + NOISE_RAD)?;

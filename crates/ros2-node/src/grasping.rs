@@ -5,7 +5,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant, SystemTime};
 
 use anyhow::{Context, Result};
-use sdg_cell::{ModelFinder, Pictures, PlacedCamera, TakenPicture, UNKNOWN_HEIGHTS_M, height_measurement, part_shape};
+use sdg_cell::{ModelFinder, MountedCamera, Pictures, TakenPicture, UNKNOWN_HEIGHTS_M, height_measurement, part_shape};
 use sdg_grasp::{GraspError, GraspModel};
 use sdg_robot::height::ToldHeight;
 use sdg_robot::workcell::Workcell;
@@ -28,7 +28,7 @@ pub struct GraspSettings {
     /// The cell, with the limits of motions in it.
     pub workcell: Workcell,
     /// The camera of the pictures.
-    pub camera: PlacedCamera,
+    pub camera: MountedCamera,
     /// The height that was told, which is measured otherwise.
     pub told: Option<ToldHeight>,
     /// Share of the joints' velocity limits, unless a request says another.
@@ -156,7 +156,7 @@ fn grasped(
 ) -> (GraspResponse, Option<String>) {
     let mut robot = Robot::new(arm, settings.workcell.safety_limits(), watch(is_interrupted));
     let mut step = LastStep(GraspStep::Detect);
-    let ended = sdg_robot::grasp(&mut robot, finder, &mut step, settings.camera.mount(), config);
+    let ended = sdg_robot::grasp(&mut robot, finder, &mut step, settings.camera.pose, config);
     let latched = robot.latched().map(str::to_owned);
     let answer = match ended {
         Ok(report) => {
@@ -201,12 +201,12 @@ fn planned(
         Ok(_) => return refused("the part was not found".to_owned()),
         Err(error) => return refused(error.to_string()),
     };
-    let mut planned = PlannedArm::new(state.q, hand.opening_m);
+    let mut planned = PlannedArm::new(settings.workcell.robot.geometry(), state.q, hand.opening_m);
     let mut robot = Robot::new(&mut planned, settings.workcell.safety_limits(), Default::default());
     let mut step = LastStep(GraspStep::Detect);
-    let mount = settings.camera.mount();
-    let mut known = KnownTarget::new(Some(target), mount, config);
-    let ended = sdg_robot::grasp(&mut robot, &mut known, &mut step, mount, config);
+    let camera_pose = settings.camera.pose;
+    let mut known = KnownTarget::new(Some(target), camera_pose, config);
+    let ended = sdg_robot::grasp(&mut robot, &mut known, &mut step, camera_pose, config);
     let (success, message) = match ended.map(|report| report.outcome) {
         Ok(GraspOutcome::Held) => (true, "the part can be grasped".to_owned()),
         Ok(GraspOutcome::Failed { step, why }) => (false, format!("{step}: {why}")),

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! image ─ PictureReader: a thread ─ queue ─┐                     ┌─ Topics: pose, detections, overlay, tf, diagnostics
-//! camera_info, tf ─ CameraPlace: threads ──┴─ Searcher ─ Searched ┴─ Services: who waits for a picture
+//! camera_info, tf ─ CameraPoseReader: threads ──┴─ Searcher ─ Searched ┴─ Services: who waits for a picture
 //!                                             run: this thread       Teaching, Grasping: a thread each, while they go on
 //! ```
 //!
@@ -14,10 +14,10 @@
 #![forbid(unsafe_code)]
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod camera_pose;
 mod grasping;
 mod lines;
 mod pictures;
-mod place;
 mod publishing;
 mod searching;
 mod services;
@@ -30,15 +30,15 @@ use std::time::Duration;
 use anyhow::Result;
 use sdg_ros2::dds::{Node, TrajectoryArm};
 
+pub use camera_pose::CameraPoseSource;
 pub use grasping::GraspSettings;
-pub use place::PlaceSource;
 pub use settings::{IsInterrupted, Settings};
 pub use teaching::{Teach, TeachJob};
 
+use camera_pose::CameraPoseReader;
 use grasping::Grasping;
 use lines::Lines;
 use pictures::PictureReader;
-use place::CameraPlace;
 use publishing::Topics;
 use sdg_inputs::one_line;
 use searching::Searcher;
@@ -59,7 +59,7 @@ pub fn run(
 ) -> Result<()> {
     let lines = Arc::<Lines>::default();
     let mut topics = Topics::open(&mut node, &lines)?;
-    let place = CameraPlace::open(&mut node, settings.place, settings.max_transform_age_secs, &lines)?;
+    let camera_pose = CameraPoseReader::open(&mut node, settings.camera_pose, settings.max_transform_age_secs, &lines)?;
     let reader = PictureReader::open(&mut node, settings.is_compressed, settings.picture_qos, settings.queue, &lines)?;
     let grasping = arm.map(|(grasp, arm)| Grasping::new(grasp, arm, Arc::clone(&reader.shared), is_interrupted));
     let mut services = Services::open(&mut node, settings.teach, settings.trigger_teaching, grasping, &lines)?;
@@ -67,8 +67,8 @@ pub fn run(
     eprintln!("sdg ros2: pictures from {}; publishes {}; Ctrl-C ends it", reader.topic, topics.names());
     while !is_interrupted() {
         if let Some(picture) = reader.shared.next(LOOK_EVERY) {
-            let placed = place.at(&picture.header).map_err(anyhow::Error::from);
-            match placed.and_then(|over_table| searcher.search(&picture, over_table.as_ref())) {
+            let over_table = camera_pose.at(&picture.header).map_err(anyhow::Error::from);
+            match over_table.and_then(|over_table| searcher.search(&picture, over_table.as_ref())) {
                 Ok(searched) => {
                     topics.publish(&node, &searched);
                     services.searched(Ok(&searched), picture.arrived);

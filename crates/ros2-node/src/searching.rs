@@ -52,16 +52,16 @@ impl Searcher {
         self.model.as_ref()
     }
 
-    /// Searches a picture; `place` is where its camera was, which a node knows of each picture or of none.
+    /// Searches a picture; `over_table` is where its camera was, which a node knows of each picture or of none.
     ///
     /// # Errors
     /// No model, one without lengths behind a calibrated camera, a picture of another size than the camera's.
-    pub(super) fn search(&mut self, picture: &Picture, place: Option<&CameraOverTable>) -> Result<Searched> {
+    pub(super) fn search(&mut self, picture: &Picture, over_table: Option<&CameraOverTable>) -> Result<Searched> {
         const NO_MODEL: &str = "no grasp model yet: start the node with one, or call the service teach";
         let perception = self.perception.as_mut().context(NO_MODEL)?;
         let started = Instant::now();
-        if let Some(place) = place {
-            perception.move_to(place)?;
+        if let Some(over_table) = over_table {
+            perception.move_to(over_table)?;
         }
         let name = perception.model().object();
         let part = |Found { detection, pose }: &Found| FoundPart {
@@ -71,8 +71,8 @@ impl Searcher {
                 Point2::new(detection.bbox.x1, detection.bbox.y1),
                 Point2::new(detection.bbox.x2, detection.bbox.y2),
             ],
-            grasp: pose.zip(place).map(|(pose, place)| {
-                (place.camera.world_from_camera.inverse() * pose.frame_from_tcp(), pose.opening_m)
+            grasp: pose.zip(over_table).map(|(pose, over_table)| {
+                (over_table.camera.world_from_camera.inverse() * pose.frame_from_tcp(), pose.opening_m)
             }),
         };
         let seen = perception.detect(&picture.picture, Verification::ByShape)?;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use sdg_grasp::{Device, GraspModel};
 use sdg_ros2::dds::Qos;
 
-use crate::place::PlaceSource;
+use crate::camera_pose::CameraPoseSource;
 use crate::teaching::{Teach, TeachJob};
 
 /// Whether the node is to end, and an arm to stop.
@@ -17,8 +17,8 @@ pub struct Settings {
     pub model: Option<GraspModel>,
     /// Where models compute.
     pub device: Device,
-    /// Where the camera's place comes from.
-    pub place: PlaceSource,
+    /// Where the camera's pose comes from.
+    pub camera_pose: CameraPoseSource,
     /// How old a transform may be beside the picture's stamp.
     pub max_transform_age_secs: f64,
     /// Detections with a lower score are not published.

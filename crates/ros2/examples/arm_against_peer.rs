@@ -51,7 +51,7 @@ fn follow(arm: &mut TrajectoryArm, by_rad: f64, watch: Watch) -> Result<(), Robo
     let start = robot.commanded()?;
     let mut end = ready_pose();
     end[6] += by_rad;
-    let limits = JointLimits::franka().scaled(0.1, 0.1, 0.1)?;
+    let limits = JointLimits::panda().scaled(0.1, 0.1, 0.1)?;
     robot.follow(Trajectory::point_to_point(&start, &end, &limits)?)
 }
 

@@ -25,7 +25,7 @@ fn cell(spec: &ObjectSpec, seed: u64) -> sdg_simulation::Result<Workcell> {
 /// Over the network: whether the part is held by the hand's word, and by the truth, and why not.
 fn over_network(cell: Workcell, pace: Pace) -> Result<(bool, bool, String), Box<dyn std::error::Error>> {
     let (server, positions) = network::serve(&cell, pace);
-    let mount = cell.wrist_mount();
+    let mount = cell.wrist_camera();
     let mut twin = network::Twin { cell, positions };
     let mut arm = network::connect(&server)?;
     let mut robot = Robot::new(&mut arm, Workcell::safety_limits(), Watch::default());

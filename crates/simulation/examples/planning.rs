@@ -25,7 +25,9 @@ use rand_pcg::Pcg64Mcg;
 use sdg_kinematics::collision::Checker;
 use sdg_kinematics::dynamics::ArmDynamics;
 use sdg_kinematics::planning::{Plan, PlanOptions};
-use sdg_kinematics::{CartesianLimits, HAND_OPENING_MAX_M, JointLimits, JointVector, Panda, RoundedPath, Trajectory};
+use sdg_kinematics::{
+    ArmGeometry, CartesianLimits, HAND_OPENING_MAX_M, JointLimits, JointVector, RoundedPath, Trajectory,
+};
 use sdg_simulation::{CollisionWorld, InverseDynamics, PlanningProblem};
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -71,7 +73,7 @@ fn rate() -> Result<(), Box<dyn Error>> {
     const COUNT: usize = 200_000;
     let problem =
         (0..).map(PlanningProblem::random).find(|problem| problem.obstacles.len() == 8).ok_or("no problem")?;
-    let limits = JointLimits::franka();
+    let limits = JointLimits::panda();
     let mut rng = Pcg64Mcg::seed_from_u64(1);
     let configurations: Vec<JointVector> = (0..COUNT)
         .map(|_| JointVector::from_fn(|i, _| rng.random_range(limits.position_min[i]..limits.position_max[i])))
@@ -99,7 +101,7 @@ impl Shares {
 
     /// Looks at every millisecond of a motion.
     fn look_at(&mut self, motion: &Trajectory, mujoco: &mut InverseDynamics) -> Result<(), Box<dyn Error>> {
-        let (panda, joints, tcp) = (Panda::new(), JointLimits::franka(), CartesianLimits::franka());
+        let (panda, joints, tcp) = (ArmGeometry::panda(), JointLimits::panda(), CartesianLimits::panda());
         let share = |values: &JointVector, limits: &JointVector| values.abs().component_div(limits).max();
         let (mut ddq_before, mut twists) = (JointVector::zeros(), Vec::new());
         for step in 0..=(motion.duration_secs() * 1e3).ceil() as usize {
@@ -151,7 +153,7 @@ struct Bent {
 
 impl Bent {
     fn look_at(&mut self, plan: &Plan, motions: &[Trajectory], dynamics: &ArmDynamics) -> Result<(), Box<dyn Error>> {
-        let (joints, tcp) = (JointLimits::franka(), CartesianLimits::franka());
+        let (joints, tcp) = (JointLimits::panda(), CartesianLimits::panda());
         let secs: f64 = motions.iter().map(Trajectory::duration_secs).sum();
         let jerkless: f64 = motions.iter().filter_map(Trajectory::without_jerk_limit_secs).sum();
         let lengths: Vec<f64> =
@@ -206,8 +208,8 @@ fn print_spread(name: &str, values: &mut [f64], digits: usize) {
 }
 
 fn proof(count: u64, first_seed: u64) -> Result<(), Box<dyn Error>> {
-    let (panda, limits) = (Panda::new(), JointLimits::franka());
-    let dynamics = ArmDynamics::panda(HAND_OPENING_MAX_M);
+    let (panda, limits) = (ArmGeometry::panda(), JointLimits::panda());
+    let dynamics = ArmDynamics::new(&ArmGeometry::panda(), HAND_OPENING_MAX_M);
     let mut mujoco = InverseDynamics::new(HAND_OPENING_MAX_M)?;
     let (mut millis, mut timing_millis) = (Vec::new(), Vec::new());
     let (mut search_checks, mut all_checks) = (Vec::new(), Vec::new());
@@ -231,7 +233,7 @@ fn proof(count: u64, first_seed: u64) -> Result<(), Box<dyn Error>> {
         search_checks.push(plan.num_search_checks as f64);
         all_checks.push(plan.num_checks as f64);
         let watch = Stopwatch::start();
-        let motions = plan.trajectories(&limits, &CartesianLimits::franka(), &dynamics)?;
+        let motions = plan.trajectories(&limits, &CartesianLimits::panda(), &dynamics)?;
         // Linux may count the processor's time in steps that are longer than this takes: its sum is right.
         let [clock_ms, processor_ms] = watch.elapsed_ms();
         timing_millis.push(clock_ms);
@@ -281,7 +283,7 @@ fn proof(count: u64, first_seed: u64) -> Result<(), Box<dyn Error>> {
 }
 
 fn checks(count: u64, first_seed: u64) -> Result<(), Box<dyn Error>> {
-    let panda = Panda::new();
+    let panda = ArmGeometry::panda();
     // One search: further ones look for shorter ways, after the count has ended.
     let mut options = PlanOptions::default();
     options.num_searches = 1;
@@ -312,7 +314,7 @@ const MAX_EXCESS: f64 = 1e-3;
 
 fn length(count: u64, first_seed: u64, seconds: u64) -> Result<(), Box<dyn Error>> {
     const MAX_RATIO: f64 = 1.3;
-    let panda = Panda::new();
+    let panda = ArmGeometry::panda();
     let mut ratios = Vec::new();
     for seed in first_seed.. {
         if ratios.len() as u64 == count {

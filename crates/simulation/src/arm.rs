@@ -1,5 +1,6 @@
 //! The simulated Panda as an arm that the grasp sequence moves.
 
+use sdg_kinematics::ArmGeometry;
 use sdg_robot::{
     Arm, ArmMode, ArmState, CheckedMotion, ContactSensitivity, GRASP_TOLERANCE_M, HandCommand, HandState, Load,
     MIN_HELD_WIDTH_M, MotionEnd, PERIOD_SECS, Playback, RobotError, StopReason, Watch,
@@ -85,6 +86,10 @@ impl Workcell {
 }
 
 impl Arm for Workcell {
+    fn geometry(&self) -> &ArmGeometry {
+        &self.panda
+    }
+
     fn state(&mut self) -> Result<ArmState> {
         Ok(self.arm_state(ArmMode::Idle))
     }

@@ -2,7 +2,7 @@
 
 use nalgebra::{SMatrix, Vector3, Vector6};
 use sdg_kinematics::dynamics::GRAVITY_M_S2;
-use sdg_kinematics::{JointVector, Panda};
+use sdg_kinematics::{ArmGeometry, JointVector};
 use sdg_robot::{CompliantArm, Descent, Load, PERIOD_SECS, RobotError, TouchDown, Touched, Watch};
 
 use crate::controller::ArmReference;
@@ -24,7 +24,7 @@ pub(crate) fn friction_torque_nm(friction_nm: f64, velocity_rad_s: f64) -> f64 {
 }
 
 /// Joint torques that hold a load against gravity, N·m.
-fn load_torque(panda: &Panda, q: &JointVector, load: &Load) -> JointVector {
+fn load_torque(panda: &ArmGeometry, q: &JointVector, load: &Load) -> JointVector {
     let frames = panda.frames(q);
     let center = frames.base_from_flange * nalgebra::Point3::from(load.center_in_flange_m);
     let weight = Vector3::new(0.0, 0.0, load.mass_kg * GRAVITY_M_S2);
@@ -36,7 +36,7 @@ fn load_torque(panda: &Panda, q: &JointVector, load: &Load) -> JointVector {
 }
 
 /// The vertical force on the hand from outside, upwards, N: least squares over what contacts exert on the joints.
-fn felt_n(panda: &Panda, ids: &PandaIds, data: &Data) -> f64 {
+fn felt_n(panda: &ArmGeometry, ids: &PandaIds, data: &Data) -> f64 {
     let joints = ids.qvel_indices();
     let torque = JointVector::from_fn(|joint, _| data.qfrc_constraint()[joints[joint]]);
     if torque == JointVector::zeros() {

@@ -43,7 +43,7 @@ impl Default for ArmController {
         Self {
             frequency_rad_s: 30.0,
             damping_ratio: 1.0,
-            max_torque_nm: ArmVector::from(sdg_kinematics::TORQUE_MAX_NM),
+            max_torque_nm: sdg_kinematics::JointLimits::panda().torque_max,
         }
     }
 }
@@ -83,7 +83,7 @@ impl ArmController {
 mod tests {
     use std::sync::Arc;
 
-    use sdg_kinematics::{JointLimits, Panda, Trajectory, ready_pose};
+    use sdg_kinematics::{ArmGeometry, JointLimits, Trajectory, ready_pose};
 
     use super::*;
     use crate::model::Model;
@@ -117,7 +117,7 @@ mod tests {
         let controller = ArmController::default();
         let start = ready_pose();
         let end = start + ArmVector::from([0.8, 0.3, -0.5, 0.6, 0.7, -0.4, -0.9]);
-        let limits = JointLimits::franka().scaled(0.6, 0.5, 0.5).unwrap();
+        let limits = JointLimits::panda().scaled(0.6, 0.5, 0.5).unwrap();
         let trajectory = Trajectory::point_to_point(&start, &end, &limits).unwrap();
         ids.set_position(&mut data, &start);
         let mut worst: f64 = 0.0;
@@ -131,7 +131,7 @@ mod tests {
         }
         assert!(worst < 2e-3, "worst error {worst} rad");
         data.forward().unwrap();
-        let miss = Panda::new().forward(&end).inverse() * ids.base_from_tcp(&data);
+        let miss = ArmGeometry::panda().forward(&end).inverse() * ids.base_from_tcp(&data);
         assert!(miss.translation.vector.norm() < 1e-4, "missed by {} m", miss.translation.vector.norm());
     }
 
@@ -143,7 +143,7 @@ mod tests {
         let far = ArmReference::at_rest(ready_pose() + ArmVector::repeat(1.0));
         let torque = ArmController::default().torque_nm(&data, &ids, &far);
         for joint in 0..NUM_ARM_JOINTS {
-            assert!(torque[joint].abs() <= sdg_kinematics::TORQUE_MAX_NM[joint]);
+            assert!(torque[joint].abs() <= JointLimits::panda().torque_max[joint]);
         }
         assert_eq!(torque[0].abs(), 87.0);
     }

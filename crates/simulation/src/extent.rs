@@ -95,8 +95,8 @@ mod tests {
     #[test]
     fn the_capsules_of_the_robot_hold_the_simulated_arm() {
         use crate::panda::{FINGER_TRAVEL_M, PandaIds, panda_asset};
+        use sdg_kinematics::ArmGeometry;
         use sdg_kinematics::collision::Capsule;
-        use sdg_robot::LinkCapsules;
 
         // Directions on a spiral over the sphere, some three degrees apart.
         let directions: Vec<Vector3<f64>> = (0..4000)
@@ -110,7 +110,7 @@ mod tests {
         let model = Arc::new(Model::from_xml(xml, &[panda_asset()]).unwrap());
         let ids = PandaIds::find(&model).unwrap();
         let mut data = Data::new(model.clone()).unwrap();
-        let capsules = LinkCapsules::panda();
+        let arm = ArmGeometry::panda();
         let mut num_held = 0;
         for finger_m in [0.0, FINGER_TRAVEL_M] {
             ids.set_finger_position_m(&mut data, finger_m);
@@ -136,7 +136,8 @@ mod tests {
                         own <= along(&capsule.from).max(along(&capsule.to)) + capsule.radius_m
                     })
                 };
-                assert!(capsules.of_body(body).iter().any(is_held), "geom {} of {name} sticks out", geom.index());
+                let capsules = if body == 8 { &arm.hand.wide_capsules } else { &arm.wide_capsules[body] };
+                assert!(capsules.iter().any(is_held), "geom {} of {name} sticks out", geom.index());
                 num_held += 1;
             }
         }
@@ -173,7 +174,7 @@ mod tests {
         let mut data = Data::new(model.clone()).unwrap();
         ids.set_finger_position_m(&mut data, 0.5 * OPENING_M);
         data.forward().unwrap();
-        let planner = CollisionModel::new(Vec::new(), OPENING_M).unwrap();
+        let planner = CollisionModel::new(&sdg_kinematics::ArmGeometry::panda(), Vec::new(), OPENING_M).unwrap();
         /// A geom: a point inside, support values along the normals from there, and whether it is seen.
         type Solid = (Point3<f64>, Vec<f64>, bool);
         // Those of each body.

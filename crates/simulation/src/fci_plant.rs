@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use nalgebra::{Isometry3, SMatrix, Vector3};
 use sdg_fci::server::{Jacobian, JointVector, Observation, Plant};
-use sdg_kinematics::{Panda, ready_pose};
+use sdg_kinematics::{ArmGeometry, ready_pose};
 use sdg_robot::PERIOD_SECS;
 
 use crate::compliant::friction_torque_nm;
@@ -37,7 +37,7 @@ impl SharedPositions {
 pub struct PandaPlant {
     data: Data,
     ids: PandaIds,
-    panda: Panda,
+    panda: ArmGeometry,
     gripper: Gripper,
     capsules: LinkCapsules,
     /// Arm and hand alone, at rest: what gravity takes.
@@ -86,7 +86,7 @@ impl PandaPlant {
         Ok(Self {
             data,
             ids,
-            panda: Panda::new(),
+            panda: ArmGeometry::panda(),
             gripper: Gripper::at_opening_m(opening_m),
             capsules,
             standing: (Data::new(alone)?, standing_ids),

@@ -33,7 +33,7 @@ impl InverseDynamics {
             // The smallest inertia that MuJoCo takes does not show beside the mass.
             let load = format!(
                 "<body name=\"load\" pos=\"0 0 {}\"><inertial mass=\"{mass_kg}\" pos=\"{x} {y} {z}\" diaginertia=\"1e-12 1e-12 1e-12\"/></body>",
-                sdg_kinematics::FLANGE_OFFSET_M
+                sdg_kinematics::ArmGeometry::panda().flange_offset_m
             );
             let hand = "<!-- Flange 0.107 m on";
             text = text.replacen(hand, &format!("{load}{hand}"), 1);
@@ -76,8 +76,8 @@ impl InverseDynamics {
 mod tests {
     use rand::{Rng, SeedableRng};
     use rand_pcg::Pcg64;
+    use sdg_kinematics::ArmGeometry;
     use sdg_kinematics::dynamics::ArmDynamics;
-    use sdg_kinematics::{POSITION_MAX_RAD, POSITION_MIN_RAD, TORQUE_MAX_NM};
 
     use super::*;
 
@@ -88,20 +88,22 @@ mod tests {
         let mut rng = Pcg64::seed_from_u64(71);
         for load in [None, Some((0.7, [0.02, -0.01, 0.15])), Some((3.0, [0.0, 0.0, 0.1034]))] {
             let opening_m = rng.random_range(0.0..0.08);
-            let mut dynamics = ArmDynamics::panda(opening_m);
+            let arm = ArmGeometry::panda();
+            let mut dynamics = ArmDynamics::new(&arm, opening_m);
             let (mass_kg, center_m) = load.unwrap_or((0.0, [0.0; 3]));
             if load.is_some() {
                 dynamics = dynamics.with_load(mass_kg, center_m);
             }
             let mut mujoco = InverseDynamics::with_load(opening_m, mass_kg, center_m).unwrap();
             for _ in 0..200 {
-                let q =
-                    ArmVector::from_fn(|joint, _| rng.random_range(POSITION_MIN_RAD[joint]..POSITION_MAX_RAD[joint]));
+                let q = ArmVector::from_fn(|joint, _| {
+                    rng.random_range(arm.limits.position_min[joint]..arm.limits.position_max[joint])
+                });
                 let qd = ArmVector::from_fn(|_, _| rng.random_range(-2.5..2.5));
                 let qdd = ArmVector::from_fn(|_, _| rng.random_range(-15.0..15.0));
                 let expected = mujoco.torques_nm(&q, &qd, &qdd).unwrap();
                 let error = dynamics.torques_nm(&q, &qd, &qdd) - expected;
-                let relative = error.component_div(&ArmVector::from(TORQUE_MAX_NM)).amax();
+                let relative = error.component_div(&arm.limits.torque_max).amax();
                 assert!(relative < TOLERANCE, "{relative}: {error}, {expected}");
             }
         }

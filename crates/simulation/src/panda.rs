@@ -191,11 +191,11 @@ mod tests {
     #[test]
     fn mujoco_and_kinematics_agree_everywhere() {
         let (mut data, ids) = arm();
-        let panda = kinematics::Panda::new();
+        let panda = kinematics::ArmGeometry::panda();
         let mut rng = Pcg64::seed_from_u64(7);
         for _ in 0..200 {
             let q = ArmVector::from_fn(|joint, _| {
-                rng.random_range(kinematics::POSITION_MIN_RAD[joint]..kinematics::POSITION_MAX_RAD[joint])
+                rng.random_range(panda.limits.position_min[joint]..panda.limits.position_max[joint])
             });
             ids.set_position(&mut data, &q);
             data.forward().unwrap();
@@ -215,6 +215,7 @@ mod tests {
     #[test]
     fn limits_are_frankas() {
         let (data, ids) = arm();
+        let limits = kinematics::JointLimits::panda();
         let raw = data.model().raw();
         for joint in 0..NUM_ARM_JOINTS {
             // SAFETY: two numbers a joint and two an actuator.
@@ -224,8 +225,8 @@ mod tests {
                     *raw.actuator_ctrlrange.add(2 * ids.motors[joint].index()).cast::<[f64; 2]>(),
                 )
             };
-            assert_eq!(range, [kinematics::POSITION_MIN_RAD[joint], kinematics::POSITION_MAX_RAD[joint]]);
-            assert_eq!(torque, [-kinematics::TORQUE_MAX_NM[joint], kinematics::TORQUE_MAX_NM[joint]]);
+            assert_eq!(range, [limits.position_min[joint], limits.position_max[joint]]);
+            assert_eq!(torque, [-limits.torque_max[joint], limits.torque_max[joint]]);
         }
     }
 

@@ -5,7 +5,7 @@ use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use sdg_kinematics::collision::{Checker, CollisionModel, Obstacle, Shape};
 use sdg_kinematics::planning::PlanOptions;
-use sdg_kinematics::{HAND_OPENING_MAX_M, JointLimits, JointVector, Panda};
+use sdg_kinematics::{ArmGeometry, HAND_OPENING_MAX_M, JointLimits, JointVector};
 
 use crate::obstacles::random_obstacles;
 
@@ -37,8 +37,9 @@ impl PlanningProblem {
     pub fn random(seed: u64) -> Self {
         let mut rng = Pcg64Mcg::seed_from_u64(seed);
         let obstacles = random_obstacles(rng.random_range(1..=8), rng.random());
-        let model = CollisionModel::new(obstacles.clone(), HAND_OPENING_MAX_M).expect("random obstacles make sense");
-        let limits = JointLimits::franka();
+        let model = CollisionModel::new(&ArmGeometry::panda(), obstacles.clone(), HAND_OPENING_MAX_M)
+            .expect("random obstacles make sense");
+        let limits = JointLimits::panda();
         let mut checker = Checker::new(&model, Self::FREE_M);
         let mut free = || loop {
             let q = JointVector::from_fn(|i, _| {
@@ -49,13 +50,13 @@ impl PlanningProblem {
             }
         };
         let (start, goal) = (free(), free());
-        Self { obstacles, base_from_goal: Panda::new().forward(&goal), start, goal, model }
+        Self { obstacles, base_from_goal: ArmGeometry::panda().forward(&goal), start, goal, model }
     }
 
     /// The same with up to [`Self::MAX_ADDED`] more obstacles, each a ball in the middle of the tcp's way on the straight motion
     /// that was found before: of random problems alone, nearly all are solved by a straight motion.
     pub fn obstructed(seed: u64) -> Self {
-        let panda = Panda::new();
+        let panda = ArmGeometry::panda();
         let mut problem = Self::random(seed);
         for number in 0..Self::MAX_ADDED {
             let options = PlanOptions::default();
@@ -71,7 +72,9 @@ impl PlanningProblem {
                 base_from_obstacle: middle.into(),
             };
             let obstacles: Vec<Obstacle> = problem.obstacles.iter().cloned().chain([obstacle]).collect();
-            let Ok(model) = CollisionModel::new(obstacles.clone(), HAND_OPENING_MAX_M) else { break };
+            let Ok(model) = CollisionModel::new(&ArmGeometry::panda(), obstacles.clone(), HAND_OPENING_MAX_M) else {
+                break;
+            };
             let mut checker = Checker::new(&model, Self::FREE_M);
             if !checker.is_free(&problem.start) || !checker.is_free(&problem.goal) {
                 break;

@@ -3,7 +3,7 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use nalgebra::{Vector3, Vector6};
-use sdg_kinematics::{ACCELERATION_MAX_RAD_S2, JointVector, VELOCITY_MAX_RAD_S};
+use sdg_kinematics::JointVector;
 use sdg_robot::PERIOD_SECS;
 
 use crate::attempt_errors::Shake;
@@ -56,15 +56,16 @@ impl Workcell {
         let solved = damped.cholesky().map_or_else(Vector6::zeros, |factors| factors.solve(&twist));
         let q_per_m: JointVector = jacobian.transpose() * solved;
 
+        let limits = &self.panda.limits;
         let num_periods = (shake.duration_secs / PERIOD_SECS).round() as usize;
         let times = (1..=num_periods).map(|period| period as f64 * PERIOD_SECS);
         let amplitude_m = times.clone().fold(shake.amplitude_m, |amplitude_m, time_secs| {
             let [_, velocity, acceleration] = shake.at(time_secs);
-            let most = |limits: [f64; 7], rate: f64| {
+            let most = |limits: &JointVector, rate: f64| {
                 let needed = (0..7).map(|joint| (q_per_m[joint] * rate / limits[joint]).abs()).fold(1e-9, f64::max);
                 SHARE_OF_LIMITS / needed
             };
-            amplitude_m.min(most(VELOCITY_MAX_RAD_S, velocity)).min(most(ACCELERATION_MAX_RAD_S2, acceleration))
+            amplitude_m.min(most(&limits.velocity_max, velocity)).min(most(&limits.acceleration_max, acceleration))
         });
         for time_secs in times {
             let [position, velocity, acceleration] = shake.at(time_secs).map(|value| q_per_m * (amplitude_m * value));

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use sdg_kinematics::collision::{Checker, CollisionModel};
-use sdg_kinematics::{JointLimits, JointVector};
+use sdg_kinematics::{ArmGeometry, JointLimits, JointVector};
 use sdg_simulation::{CollisionWorld, random_obstacles};
 
 /// An overlap that MuJoCo finds and the model does not may be this deep, m.
@@ -14,7 +14,7 @@ const MAX_MISSED_M: f64 = 0.003;
 const MAX_FALSE_COLLISIONS: f64 = 0.05;
 
 fn random_configurations(count: usize, rng: &mut Pcg64Mcg) -> Vec<JointVector> {
-    let limits = JointLimits::franka();
+    let limits = JointLimits::panda();
     (0..count)
         .map(|_| JointVector::from_fn(|i, _| rng.random_range(limits.position_min[i]..limits.position_max[i])))
         .collect()
@@ -31,7 +31,7 @@ fn the_model_agrees_with_mujoco_on_a_hundred_thousand_configurations() {
         let mut rng = Pcg64Mcg::seed_from_u64(1000 + scene);
         let obstacles = random_obstacles(1 + scene as usize % 8, scene);
         let opening_m = if scene % 2 == 0 { 0.08 } else { rng.random_range(0.0..0.08) };
-        let model = CollisionModel::new(obstacles.clone(), opening_m).unwrap();
+        let model = CollisionModel::new(&ArmGeometry::panda(), obstacles.clone(), opening_m).unwrap();
         let mut world = CollisionWorld::new(&obstacles, opening_m).unwrap();
         let configurations = random_configurations(PER_SCENE, &mut rng);
         let distances = Checker::new(&model, 0.001).distances_m(&configurations);

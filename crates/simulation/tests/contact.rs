@@ -2,7 +2,7 @@
 
 use crate::network::connect;
 use sdg_fci::server::{Pace, Server, ServerConfig};
-use sdg_kinematics::{CartesianLimits, JointLimits, LineOptions, Panda, Trajectory};
+use sdg_kinematics::{ArmGeometry, CartesianLimits, JointLimits, LineOptions, Trajectory};
 use sdg_robot::{
     Arm, ArmMode, ContactSensitivity, FrankaArm, Robot, RobotError, SafetyLimits, StopReason, TouchDown, Watch,
 };
@@ -35,12 +35,12 @@ fn limits() -> SafetyLimits {
 
 /// A straight motion of the tcp to a place.
 fn line_to(robot: &mut Robot<'_, FrankaArm>, to_m: [f64; 3]) -> Trajectory {
-    let (panda, start) = (Panda::new(), robot.commanded().unwrap());
+    let (panda, start) = (ArmGeometry::panda(), robot.commanded().unwrap());
     let mut base_from_tcp = panda.forward(&start);
     base_from_tcp.translation = to_m.into();
     let path = panda.straight_path(&start, &base_from_tcp, &LineOptions::default()).unwrap();
-    let slow = CartesianLimits::franka().scaled(0.1, 0.1, 0.05).unwrap();
-    Trajectory::along_path(path, &JointLimits::franka(), &slow).unwrap()
+    let slow = CartesianLimits::panda().scaled(0.1, 0.1, 0.05).unwrap();
+    Trajectory::along_path(path, &JointLimits::panda(), &slow).unwrap()
 }
 
 fn go_above(robot: &mut Robot<'_, FrankaArm>) {

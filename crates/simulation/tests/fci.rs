@@ -10,7 +10,7 @@ use sdg_fci::client::{Answer, InternalController, Robot};
 use sdg_fci::server::Pace;
 use sdg_fci::wire::{Load, RobotMode, RobotState, Status};
 use sdg_fci::{FciError, Limits, RobotError, isometry};
-use sdg_kinematics::{JointVector, Panda};
+use sdg_kinematics::{ArmGeometry, JointVector};
 
 /// How far the arm may lag behind its reference in these slow motions: the stiffness of 3000 N·m/rad yields 0.3 mrad to 1 N·m.
 const LAG_RAD: f64 = 2e-3;
@@ -203,7 +203,7 @@ fn each_limit_stops_the_motion_outside_of_it_and_none_inside() {
 
 /// How far the end effector's motion is from a direction that the joints cannot do.
 fn smallest_singular_value(q: &[f64; 7]) -> f64 {
-    Panda::new().jacobian(&JointVector::from(*q)).svd(false, false).singular_values.min()
+    ArmGeometry::panda().jacobian(&JointVector::from(*q)).svd(false, false).singular_values.min()
 }
 
 #[test]

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use crate::network::{Twin, cell, connect, serve, some_motion};
 use crate::old_robot;
 use sdg_fci::server::Pace;
-use sdg_kinematics::{CartesianLimits, JointLimits, LineOptions, Panda, Trajectory};
+use sdg_kinematics::{ArmGeometry, CartesianLimits, JointLimits, LineOptions, Trajectory};
 use sdg_robot::{
     Arm, ArmMode, FrankaArm, GraspConfig, GraspOutcome, GraspStep, GraspTarget, PartFinder, Robot, RobotError,
     SafetyLimits, Scheduling, StopReason, Watch, grasp,
@@ -61,7 +61,7 @@ fn late_commands_are_made_up_for_on_the_way() {
     let mut arm = connect(&server).unwrap();
     let start = arm.state().unwrap().q_commanded;
     let motion = |from, to| {
-        let limits = JointLimits::franka().scaled(0.6, 0.4, 0.2).unwrap();
+        let limits = JointLimits::panda().scaled(0.6, 0.4, 0.2).unwrap();
         Trajectory::point_to_point(from, to, &limits).unwrap()
     };
     let mut end = start;
@@ -104,12 +104,12 @@ fn a_table_that_is_higher_than_its_file_says_stops_the_arm() {
     let wrong = SafetyLimits { table_height_m: -0.6, ..Workcell::safety_limits() };
     let mut robot = Robot::new(&mut arm, SafetyLimits { workspace: None, ..wrong }, Watch::default());
     // Straight down, 5 cm into the table.
-    let panda = Panda::new();
+    let panda = ArmGeometry::panda();
     let mut base_from_tcp = panda.forward(&start);
     base_from_tcp.translation.z = -0.05;
     let path = panda.straight_path(&start, &base_from_tcp, &LineOptions::default()).unwrap();
-    let slow = CartesianLimits::franka().scaled(0.1, 0.1, 0.05).unwrap();
-    let error = robot.follow(Trajectory::along_path(path, &JointLimits::franka(), &slow).unwrap()).unwrap_err();
+    let slow = CartesianLimits::panda().scaled(0.1, 0.1, 0.05).unwrap();
+    let error = robot.follow(Trajectory::along_path(path, &JointLimits::panda(), &slow).unwrap()).unwrap_err();
     assert!(matches!(error, RobotError::Reflex(_)), "{error}");
     let line = error.to_string();
     assert!(line.contains("_reflex") && !line.contains('\n'), "{line}");
@@ -136,7 +136,7 @@ fn no_motion_begins_on_a_detection_that_is_older_than_a_second() {
     let cell = cell("pendulum", 101);
     let (server, positions) = serve(&cell, Pace::LOCKSTEP);
     let mut arm = connect(&server).unwrap();
-    let mount = cell.wrist_mount();
+    let mount = cell.wrist_camera();
     let mut finder = OldPicture(Twin { cell, positions: positions.clone() }, Duration::from_millis(1200));
     let mut robot = Robot::new(&mut arm, Workcell::safety_limits(), Watch::default());
     let report = grasp(&mut robot, &mut finder, &mut (), mount, &GraspConfig::default()).unwrap();
@@ -151,7 +151,7 @@ fn a_part_that_slips_is_told_by_the_hand() {
     let cell = cell("pendulum", 101);
     let (server, positions) = serve(&cell, Pace::LOCKSTEP);
     let mut arm = connect(&server).unwrap();
-    let mount = cell.wrist_mount();
+    let mount = cell.wrist_camera();
     let mut twin = Twin { cell, positions: positions.clone() };
     let mut robot = Robot::new(&mut arm, Workcell::safety_limits(), Watch::default());
     // A force that does not hold what weighs so much.
@@ -223,7 +223,7 @@ fn a_hand_that_fails_ends_the_grasp() {
     let cell = cell("pendulum", 101);
     let (server, positions) = serve(&cell, Pace::LOCKSTEP);
     let mut arm = connect(&server).unwrap();
-    let mount = cell.wrist_mount();
+    let mount = cell.wrist_camera();
     let mut twin = Twin { cell, positions };
     server.set_hand_failing(true);
     let mut robot = Robot::new(&mut arm, Workcell::safety_limits(), Watch::default());

@@ -16,7 +16,7 @@ const TIPS_IN_FLANGE_M: [f64; 3] = [0.0, 0.0, 0.2104];
 fn a_part_is_grasped_over_the_network_in_lockstep() {
     let cell = cell("pendulum", 101);
     let (server, positions) = serve(&cell, Pace::LOCKSTEP);
-    let mount = cell.wrist_mount();
+    let mount = cell.wrist_camera();
     let mut twin = Twin { cell, positions };
     let mut arm = connect(&server).unwrap();
     let mut robot = Robot::new(&mut arm, Workcell::safety_limits(), Watch::default());

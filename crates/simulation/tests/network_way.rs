@@ -45,7 +45,9 @@ fn plan(robot: &mut Robot<FrankaArm>, y: f64) -> Trajectory {
         table_clearance_m: FREE_CLEARANCE_M,
     };
     let goal = [beside_the_wall(y)];
-    let way = robot.plan_around(&surroundings, &Destination::Poses(&goal), &Pace::REHEARSED.free_limits()).unwrap();
+    let way = robot
+        .plan_around(&surroundings, &Destination::Poses(&goal), &Pace::REHEARSED.free_limits(robot.geometry()))
+        .unwrap();
     assert_eq!(way.motions.len(), 1, "the way has no stop");
     way.motions.into_iter().next().unwrap()
 }

@@ -4,7 +4,7 @@
 
 use crate::placing::{Where, beside, cell, config, place, tray};
 use nalgebra::Isometry3;
-use sdg_robot::{PlaceOutcome, PlacingConfig};
+use sdg_robot::{PlacingConfig, PlacingOutcome};
 use sdg_simulation::objects::ObjectSpec;
 
 /// Of the parts of the tray.
@@ -28,7 +28,7 @@ fn fill(at: Where, cells: &[u32]) {
         let goal = tray().goal(number).unwrap();
         let placed = place(cell(&spec, u64::from(number), &lying), at, &goal, &config(&spec), &placing);
         let report = placed.report.unwrap();
-        assert_eq!(report.outcome, PlaceOutcome::Placed, "{number}: {report:?}");
+        assert_eq!(report.outcome, PlacingOutcome::Placed, "{number}: {report:?}");
         let (distance_m, angle_rad) = beside(&spec, &placed.base_from_object, &goal);
         println!("{number}: {:.2} mm, {:.2}°, {:?}", distance_m * 1e3, angle_rad.to_degrees(), report.touched);
         assert!(distance_m <= MAX_BESIDE_M && angle_rad.to_degrees() <= MAX_TURNED_DEG, "{number}: {report:?}");

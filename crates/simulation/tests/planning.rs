@@ -2,7 +2,7 @@
 
 use sdg_kinematics::dynamics::ArmDynamics;
 use sdg_kinematics::planning::PlanOptions;
-use sdg_kinematics::{CartesianLimits, HAND_OPENING_MAX_M, JointLimits, Panda};
+use sdg_kinematics::{ArmGeometry, CartesianLimits, HAND_OPENING_MAX_M, JointLimits};
 use sdg_simulation::{CollisionWorld, PlanningProblem};
 
 #[test]
@@ -16,12 +16,14 @@ fn no_path_of_fifty_collides_in_mujoco() {
         let goals = [problem.base_from_goal];
         let mut options = PlanOptions::default();
         options.max_checks = 300_000;
-        let Ok(plan) = Panda::new().plan(&problem.model, &problem.start, &goals, None, &options) else { continue };
+        let Ok(plan) = ArmGeometry::panda().plan(&problem.model, &problem.start, &goals, None, &options) else {
+            continue;
+        };
         num_found += 1;
         num_bent += usize::from(plan.waypoints.len() > 2);
         let mut world = CollisionWorld::new(&problem.obstacles, HAND_OPENING_MAX_M).unwrap();
-        let dynamics = ArmDynamics::panda(HAND_OPENING_MAX_M);
-        for motion in plan.trajectories(&JointLimits::franka(), &CartesianLimits::franka(), &dynamics).unwrap() {
+        let dynamics = ArmDynamics::new(&ArmGeometry::panda(), HAND_OPENING_MAX_M);
+        for motion in plan.trajectories(&JointLimits::panda(), &CartesianLimits::panda(), &dynamics).unwrap() {
             for step in 0..=(motion.duration_secs() * 1e3).ceil() as usize {
                 let overlap = world.deepest(&motion.sample(step as f64 * 1e-3).0).unwrap();
                 assert_eq!(overlap, None, "problem {seed}, {step} ms");

@@ -31,7 +31,7 @@ fn cell(arm_fault: Option<ArmFault>) -> Workcell {
 }
 
 fn run(robot: &mut Robot<'_, Workcell>) -> sdg_robot::Result<GraspReport> {
-    let mount = robot.arm().wrist_mount();
+    let mount = robot.arm().wrist_camera();
     grasp(robot, &mut Truth, &mut (), mount, &GraspConfig::default())
 }
 
@@ -39,7 +39,7 @@ fn run(robot: &mut Robot<'_, Workcell>) -> sdg_robot::Result<GraspReport> {
 fn some_motion(robot: &mut Robot<'_, Workcell>) -> Trajectory {
     let start = robot.arm().state().unwrap().q_commanded;
     let end = start + JointVector::from([0.1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
-    Trajectory::point_to_point(&start, &end, &JointLimits::franka().scaled(0.1, 0.1, 0.1).unwrap()).unwrap()
+    Trajectory::point_to_point(&start, &end, &JointLimits::panda().scaled(0.1, 0.1, 0.1).unwrap()).unwrap()
 }
 
 /// Nothing moves: motions and the hand are refused, and the arm stands still while time passes.
@@ -139,7 +139,7 @@ fn a_part_that_slips_is_felt_by_the_hand() {
     let mut robot = Robot::new(&mut cell, Workcell::safety_limits(), Watch::default());
     // A force that does not hold what weighs so much.
     let config = GraspConfig { grasp_force_n: 0.3, ..GraspConfig::default() };
-    let mount = robot.arm().wrist_mount();
+    let mount = robot.arm().wrist_camera();
     let report = grasp(&mut robot, &mut Truth, &mut (), mount, &config).unwrap();
     let GraspOutcome::Failed { step, why } = report.outcome else { panic!("0.3 N hold nothing") };
     assert!(matches!(step, GraspStep::Lift | GraspStep::Hold), "{step}: {why}");
@@ -177,7 +177,7 @@ fn a_motion_from_elsewhere_is_not_begun() {
     let mut robot = Robot::new(&mut cell, Workcell::safety_limits(), Watch::default());
     let mut start = ready_pose();
     start[1] += 1.0;
-    let slow = JointLimits::franka().scaled(0.1, 0.1, 0.1).unwrap();
+    let slow = JointLimits::panda().scaled(0.1, 0.1, 0.1).unwrap();
     let motion = Trajectory::point_to_point(&start, &ready_pose(), &slow).unwrap();
     let error = robot.follow(motion).unwrap_err().to_string();
     assert!(error.contains("starts 1.000 rad from where joint 2 is"), "{error}");

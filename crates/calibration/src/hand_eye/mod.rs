@@ -63,7 +63,7 @@ pub struct HandEye {
 impl HandEye {
     /// The camera with its place: on the hand, or over the table. `table_height_m` is the table's z in the base; without it, that of the
     /// camera's file or 0.
-    pub fn place(&self, camera: CalibratedCamera, mount: Mount, table_height_m: Option<f64>) -> CalibratedCamera {
+    pub fn mounted(&self, camera: CalibratedCamera, mount: Mount, table_height_m: Option<f64>) -> CalibratedCamera {
         match mount {
             Mount::Hand => CalibratedCamera { flange_from_camera: Some(self.frame_from_camera), ..camera },
             Mount::Base => {

@@ -7,7 +7,7 @@ use anyhow::{Context, Result, anyhow};
 use clap::Args;
 use sdg_camera::{Address, LatestFrame, PixelFrame};
 use sdg_cell::{
-    DryRun, Ended, LivePictures, ModelFinder, Pictures, PlacedCamera, SeenOutline, UNKNOWN_HEIGHTS_M,
+    DryRun, Ended, LivePictures, ModelFinder, MountedCamera, Pictures, SeenOutline, UNKNOWN_HEIGHTS_M,
     height_measurement, part_shape, run_sequence,
 };
 use sdg_grasp::{GraspError, GraspModel};
@@ -93,7 +93,7 @@ pub struct GraspArgs {
 struct Prepared {
     workcell: Workcell,
     model: GraspModel,
-    camera: PlacedCamera,
+    camera: MountedCamera,
     config: GraspConfig,
     place: Option<(PlaceGoal, PlacingConfig)>,
 }
@@ -133,7 +133,7 @@ fn prepare(args: &GraspArgs) -> Result<Prepared> {
         Usage(format!("expected --camera FILE, or a file under [camera] in {}", args.workcell.display()))
     })?;
     let (calibrated, _) = camera_files::read(&camera_path)?;
-    let camera = camera_files::placed(&calibrated, &workcell, &camera_path)?;
+    let camera = camera_files::mounted(&calibrated, &workcell, &camera_path)?;
     let model = sdg_inputs::read_model(&args.grasp_model, &devices::open(&args.compute)?)?;
     if model.facts().lengths.is_none() {
         return Err(GraspError::NoLengths).with_context(|| args.grasp_model.display().to_string());
@@ -224,9 +224,9 @@ fn attempt<A: CompliantArm, P: Pictures<A>>(
         }
     }
     let started = Instant::now();
-    let mount = prepared.camera.mount();
+    let camera_pose = prepared.camera.pose;
     let mut robot = Robot::new(arm, limits, robots::watch(interrupt));
-    let ended = run_sequence(&mut robot, &mut finder, mount, &prepared.config, prepared.place.as_ref());
+    let ended = run_sequence(&mut robot, &mut finder, camera_pose, &prepared.config, prepared.place.as_ref());
     // A part that is not there is no error, and one that is held or in its place is none.
     let has_failed = match &ended {
         Ok(ended) => ended.failed.is_some() && !is_nothing_found(&ended.grasp),
@@ -249,9 +249,9 @@ fn dry_run<A: Arm>(
     seen: Option<&SeenOutline>,
 ) -> Result<()> {
     let (state, hand) = (arm.state()?, arm.hand()?);
-    let mount = prepared.camera.mount();
+    let camera_pose = prepared.camera.pose;
     let place = prepared.place.as_ref();
-    let plan = DryRun::plan(state, hand.opening_m, target, limits, mount, &prepared.config, place)?;
+    let plan = DryRun::plan(state, hand.opening_m, target, limits, camera_pose, &prepared.config, place)?;
     eprintln!("what would be done:");
     print_plan(&plan, target.is_some())?;
     for file in draw_dry_run(&plan, &args.out, seen.filter(|_| target.is_some()), &prepared.workcell.obstacles)? {

@@ -2,24 +2,24 @@
 
 use anyhow::{Result, anyhow};
 use sdg_cell::DryRun;
-use sdg_robot::PlannedAction;
+use sdg_robot::{Arm, PlannedAction};
 
 /// A line for each motion, and how the plan ends.
 ///
 /// # Errors
 /// The step that cannot be planned.
 pub(crate) fn print_plan(plan: &DryRun, is_seen: bool) -> Result<()> {
-    let panda = sdg_kinematics::Panda::new();
+    let geometry = plan.arm.geometry();
     for action in plan.arm.actions() {
         match action {
             PlannedAction::Motion(motion) => {
-                let tcp = panda.forward(motion.end()).translation.vector * 1e3;
+                let tcp = geometry.forward(motion.end()).translation.vector * 1e3;
                 let secs = motion.duration_secs();
                 eprintln!("  tcp to ({:.0}, {:.0}, {:.0}) mm in {secs:.1} s", tcp.x, tcp.y, tcp.z);
             }
             PlannedAction::Wait(_) => {}
             PlannedAction::Down { end, duration_secs } => {
-                let z_mm = panda.forward(end).translation.z * 1e3;
+                let z_mm = geometry.forward(end).translation.z * 1e3;
                 eprintln!("  down softly until something is felt, about {z_mm:.0} mm, in {duration_secs:.1} s");
             }
             PlannedAction::Hand(sdg_robot::HandCommand::Move { opening_m, .. }) => {

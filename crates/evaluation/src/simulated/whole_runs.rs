@@ -8,7 +8,7 @@ use sdg_grasp::{ModelKind, Preset};
 use sdg_simulation::objects::ObjectSpec;
 
 use crate::axes::{
-    Against, AxesEvaluation, AxesSummary, GraspCondition, GroupSummary, Selection, Way, comparison_tables,
+    Against, AxesEvaluation, AxesSummary, GraspCondition, GroupSummary, Selection, Way, difference_tables,
 };
 use crate::cameras::{self, CamerasEvaluation, CamerasSummary, PictureSet};
 use crate::{Evaluation, Progress, Settings, Share, Store, Summary, TeachingRecord, markdown, page};
@@ -127,7 +127,7 @@ fn go_on_with_axes(folder: &Path, names: &[&str], is_interrupted: &(dyn Fn() -> 
     assert!(ended.failures.is_empty(), "{:?}", ended.failures);
     let comparisons = Against::open(folder).unwrap().compare(&evaluation).unwrap();
     assert!(comparisons.iter().all(|comparison| comparison.difference == 0.0 && !comparison.differs));
-    let page = crate::axes::page(&summary, comparison_tables(&comparisons, "itself"), &[], "sdg evaluate");
+    let page = crate::axes::page(&summary, difference_tables(&comparisons, "itself"), &[], "sdg evaluate");
     assert!(page.to_html().is_ok());
     summary
 }

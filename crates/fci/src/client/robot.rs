@@ -203,24 +203,6 @@ impl Robot {
         self.set(&Request::SetEeToStiffness(*ee_from_stiffness))
     }
 
-    /// Sets what a person may lead by hand: x, y, z, roll, pitch, yaw, elbow.
-    ///
-    /// # Errors
-    /// [`FciError::Refused`] and the errors of the connection.
-    pub fn set_guiding_mode(&mut self, axes: &[bool; 7]) -> Result<()> {
-        self.set(&Request::SetGuidingMode(*axes))
-    }
-
-    /// The robot's description, a URDF (version 10 alone).
-    ///
-    /// # Errors
-    /// [`FciError::Refused`] in version 5, and the errors of the connection.
-    pub fn robot_model(&mut self) -> Result<String> {
-        let response = execute(&mut self.session, &Request::GetRobotModel, self.version, Some(RECOVERY_TIMEOUT))?;
-        accept(&response, Command::GetRobotModel)?;
-        Ok(String::from_utf8_lossy(&response.rest).into_owned())
-    }
-
     fn set(&mut self, request: &Request) -> Result<()> {
         let timeout = self.session.timeout();
         self.execute(request, Some(timeout))

@@ -77,9 +77,4 @@ impl ControlStatistics {
         }
         self.max_answer
     }
-
-    /// The slowest answer.
-    pub fn max_answer(&self) -> Duration {
-        self.max_answer
-    }
 }

@@ -7,7 +7,6 @@
 //! Curves are proven in the same way, with the greatest rate of each joint along them.
 #![allow(clippy::needless_range_loop, reason = "one index for the lanes of several arrays")]
 
-use super::arm_shape::SELF_PAIRS;
 use super::lanes::{Lane, NUM_LANES};
 use super::model::CollisionModel;
 use super::pair_search::{Found, Placed, Weights, evaluate};
@@ -137,11 +136,8 @@ impl<'a> Checker<'a> {
         // A pair that does not move against each other gets infinity: any distance lasts for the whole edge.
         let per_metre = |speed_m: f64| if speed_m > 0.0 { 1.0 / speed_m } else { f64::INFINITY };
         Weights {
-            self_pairs: std::array::from_fn(|pair| {
-                let (one, other) = SELF_PAIRS[pair];
-                // What happens before the first body's own joint moves both alike.
-                per_metre(speed_m(other, one))
-            }),
+            // What happens before the first body's own joint moves both alike.
+            self_pairs: std::array::from_fn(|one| std::array::from_fn(|other| per_metre(speed_m(other, one)))),
             bodies: std::array::from_fn(|body| per_metre(speed_m(body, 0))),
             offset_m: self.margin_m,
         }
@@ -160,10 +156,11 @@ impl<'a> Checker<'a> {
 #[cfg(test)]
 mod tests {
     use super::super::arm_shape::Body;
-    use super::super::capsule::Capsule;
     use super::super::model::Obstacle;
     use super::super::shape::Shape;
     use super::*;
+    use crate::capsule::Capsule;
+    use crate::geometry::ArmGeometry;
     use crate::joints::ready_pose;
     use crate::test_poses::random_configuration;
     use nalgebra::{Isometry3, UnitQuaternion, Vector3};
@@ -186,7 +183,7 @@ mod tests {
             };
             Obstacle { name: index.to_string(), shape, base_from_obstacle: Isometry3::from_parts(at.into(), turn) }
         });
-        let mut model = CollisionModel::new(obstacles.collect(), 0.04).unwrap();
+        let mut model = CollisionModel::new(&ArmGeometry::panda(), obstacles.collect(), 0.04).unwrap();
         model.hold(&[Capsule::new([-0.1, 0.0, 0.02], [0.1, 0.0, 0.02], 0.015)]).unwrap();
         model
     }
@@ -279,7 +276,7 @@ mod tests {
             shape: Shape::Box { half_m: [0.1, 0.1, 0.005] },
             base_from_obstacle: Isometry3::translation(0.307, 0.0, 0.485),
         };
-        let mut model = CollisionModel::new(vec![table], 0.08).unwrap();
+        let mut model = CollisionModel::new(&ArmGeometry::panda(), vec![table], 0.08).unwrap();
         let found = model.nearest(&ready_pose());
         assert_eq!((found.body, found.other.as_str()), (Body::HAND, "table"));
         assert!(found.distance_m < 0.0 && found.to_string().contains("mm inside table"), "{found}");

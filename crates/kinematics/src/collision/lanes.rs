@@ -3,10 +3,10 @@
 //! L lanes; every function is one loop over them without branches.
 #![allow(clippy::needless_range_loop, reason = "one index for the lanes of several arrays")]
 
+use crate::capsule::nearest_shares;
+use crate::geometry::DhJoint;
 use crate::joints::{JointVector, NUM_JOINTS};
-use crate::panda::{DH_A_M, DH_ALPHA_RAD, DH_D_M};
 
-use super::capsule::nearest_shares;
 use super::shape::DistanceAndSlope;
 
 /// Configurations that are computed side by side.
@@ -70,9 +70,9 @@ impl FrameLanes {
     }
 }
 
-/// The frames of links 1 to 7; see `panda.rs` for the convention.
+/// The frames of links 1 to 7; see `geometry.rs` for the convention.
 #[inline(always)]
-pub(super) fn link_frames(q: &[JointVector; NUM_LANES]) -> [FrameLanes; NUM_JOINTS] {
+pub(super) fn link_frames(joints: &[DhJoint; NUM_JOINTS], q: &[JointVector; NUM_LANES]) -> [FrameLanes; NUM_JOINTS] {
     let mut frames = [FrameLanes::base(); NUM_JOINTS];
     let mut parent = FrameLanes::base();
     for joint_idx in 0..NUM_JOINTS {
@@ -81,8 +81,8 @@ pub(super) fn link_frames(q: &[JointVector; NUM_LANES]) -> [FrameLanes; NUM_JOIN
             (sine[i], cosine[i]) = q[i][joint_idx].sin_cos();
         }
         // alpha is 0 or a quarter turn either way: the turned axes are the parent's, exchanged.
-        let (sin_alpha, cos_alpha) = quarter_turn(DH_ALPHA_RAD[joint_idx]);
-        let (a, d) = (DH_A_M[joint_idx], DH_D_M[joint_idx]);
+        let (sin_alpha, cos_alpha) = joints[joint_idx].twist();
+        let (a, d) = (joints[joint_idx].a_m, joints[joint_idx].d_m);
         let mut next = FrameLanes::base();
         for (of, from_x, from_y, from_z, origin, parent_origin) in [
             (0, parent.axes[0].x, parent.axes[1].x, parent.axes[2].x, &mut next.origin.x, &parent.origin.x),
@@ -108,11 +108,6 @@ pub(super) fn link_frames(q: &[JointVector; NUM_LANES]) -> [FrameLanes; NUM_JOIN
         parent = next;
     }
     frames
-}
-
-/// Sine and cosine of 0 or ±π/2, without their rounding.
-fn quarter_turn(angle_rad: f64) -> (f64, f64) {
-    if angle_rad == 0.0 { (0.0, 1.0) } else { (angle_rad.signum(), 0.0) }
 }
 
 /// Distances between segments.

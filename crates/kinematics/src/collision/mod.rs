@@ -9,7 +9,6 @@
 //! Capsules hold the real shapes with some room, so arms whose capsules are apart are apart. crates/simulation compares them with MuJoCo.
 
 mod arm_shape;
-mod capsule;
 mod checker;
 mod error;
 mod lanes;
@@ -17,8 +16,8 @@ mod model;
 mod pair_search;
 mod shape;
 
+pub use crate::capsule::Capsule;
 pub use arm_shape::Body;
-pub use capsule::Capsule;
 pub use checker::Checker;
 pub use error::CollisionError;
 pub use lanes::NUM_LANES;

@@ -2,14 +2,14 @@
 
 use nalgebra::{Isometry3, Point3};
 
-use super::arm_shape::{ArmShape, Body, FIRST_MOVING, NUM_BODIES, SELF_PAIRS, base_from_body};
-use super::capsule::Capsule;
+use super::arm_shape::{ArmShape, Body, FIRST_MOVING, NUM_BODIES, base_from_body};
 use super::error::CollisionError;
 use super::lanes::ToLocal;
 use super::shape::Shape;
+use crate::capsule::Capsule;
 use crate::check::check_pose;
+use crate::geometry::{ArmGeometry, Frames};
 use crate::joints::{JointVector, NUM_JOINTS};
-use crate::panda::{DH_D_M, Frames, Panda};
 
 /// A solid thing that stands still in the base frame.
 #[derive(Debug, Clone, PartialEq)]
@@ -50,6 +50,7 @@ impl std::fmt::Display for Proximity {
 /// The arm's shape, the obstacles around it, and the pairs that may not touch.
 #[derive(Debug, Clone)]
 pub struct CollisionModel {
+    pub(super) geometry: ArmGeometry,
     pub(super) arm: ArmShape,
     pub(super) obstacles: Vec<Obstacle>,
     pub(super) obstacle_frames: Vec<ToLocal>,
@@ -58,30 +59,30 @@ pub struct CollisionModel {
 }
 
 impl CollisionModel {
-    /// The Panda with its fingers at an opening (m) among obstacles.
+    /// An arm with its fingers at an opening (m) among obstacles.
     ///
     /// The base is not compared with obstacles: it is bolted to one.
     ///
     /// # Errors
     /// [`CollisionError`] for lengths and poses that make no sense, and for names given twice.
-    pub fn new(obstacles: Vec<Obstacle>, opening_m: f64) -> Result<Self, CollisionError> {
+    pub fn new(arm: &ArmGeometry, obstacles: Vec<Obstacle>, opening_m: f64) -> Result<Self, CollisionError> {
         for (index, obstacle) in obstacles.iter().enumerate() {
             check_obstacle(obstacle)?;
             if obstacles[..index].iter().any(|other| other.name == obstacle.name) {
                 return Err(CollisionError::NameTwice { name: obstacle.name.clone() });
             }
         }
-        if !(0.0..=crate::panda::HAND_OPENING_MAX_M).contains(&opening_m) {
+        if !(0.0..=arm.hand.opening_max_m).contains(&opening_m) {
             return Err(CollisionError::Size {
                 obstacle: "the hand".to_owned(),
                 what: "opening",
-                expected: "from 0 to 0.08 m",
+                expected: "from 0 to what the hand opens",
                 found: opening_m,
             });
         }
         let obstacle_frames = obstacles.iter().map(|obstacle| to_local(&obstacle.base_from_obstacle)).collect();
         let may_touch = std::array::from_fn(|_| vec![false; obstacles.len()]);
-        Ok(Self { arm: ArmShape::panda(opening_m), obstacles, obstacle_frames, may_touch })
+        Ok(Self { geometry: arm.clone(), arm: ArmShape::new(arm, opening_m), obstacles, obstacle_frames, may_touch })
     }
 
     /// Puts a part into the hand: capsules that hold it, in the tcp's frame. It may touch hand and links 6 and 7.
@@ -119,6 +120,11 @@ impl CollisionModel {
         }
     }
 
+    /// The arm, with any opening.
+    pub fn arm(&self) -> &ArmGeometry {
+        &self.geometry
+    }
+
     /// The obstacles, in the order in which they were given.
     pub fn obstacles(&self) -> &[Obstacle] {
         &self.obstacles
@@ -133,7 +139,7 @@ impl CollisionModel {
     ///
     /// Computed pair by pair and without bounds: slow, and what [`super::Checker`] is tested against.
     pub fn nearest(&self, q: &JointVector) -> Proximity {
-        let frames = Panda::new().frames(q);
+        let frames = self.geometry.frames(q);
         let placed: [Vec<Capsule>; NUM_BODIES] = std::array::from_fn(|body| {
             let base_from_body = base_from_body(&frames, body);
             self.arm.capsules[body].iter().map(|capsule| capsule.moved(&base_from_body)).collect()
@@ -144,7 +150,7 @@ impl CollisionModel {
             distance_m: f64::INFINITY,
             gradient: JointVector::zeros(),
         };
-        for (one, other) in SELF_PAIRS {
+        for &(one, other) in &self.geometry.self_pairs {
             for a in &placed[one] {
                 for b in &placed[other] {
                     let (p, q) = a.nearest_points(b);
@@ -190,7 +196,7 @@ impl CollisionModel {
     /// The obstacle that overlaps the arm's column the deepest, if one does, and how deep (m): the part of link 1 around joint 1's axis, which stands
     /// still in every motion.
     pub fn overlap_with_column(&self) -> Option<(String, f64)> {
-        let column = self.arm.capsules[1][0].moved(&Isometry3::translation(0.0, 0.0, DH_D_M[0]));
+        let column = self.arm.capsules[1][0].moved(&Isometry3::translation(0.0, 0.0, self.geometry.joints[0].d_m));
         let mut deepest: Option<(String, f64)> = None;
         for (index, obstacle) in self.obstacles.iter().enumerate() {
             let obstacle_from_base = obstacle.base_from_obstacle.inverse();

@@ -3,7 +3,7 @@
 //! Bodies are compared as balls, then as capsules around their middles; the exact distance is computed where these bounds leave something to find.
 #![allow(clippy::needless_range_loop, reason = "one index for the lanes of several arrays")]
 
-use super::arm_shape::{FIRST_MOVING, NUM_BODIES, SELF_PAIRS};
+use super::arm_shape::{FIRST_MOVING, NUM_BODIES};
 use super::lanes::{
     FrameLanes, Lane, Lane3, NUM_LANES, ToLocal, link_frames, point_distances, segment_distances,
     segment_shape_distances, shape_distances,
@@ -30,7 +30,7 @@ impl Placed {
 /// Factors of the distances before the smallest is sought: for each pair of bodies, and for each body and what stands still.
 #[derive(Debug, Clone)]
 pub(super) struct Weights {
-    pub(super) self_pairs: [f64; SELF_PAIRS.len()],
+    pub(super) self_pairs: [[f64; NUM_BODIES]; NUM_BODIES],
     pub(super) bodies: [f64; NUM_BODIES],
     /// Added to each distance, m.
     pub(super) offset_m: f64,
@@ -38,7 +38,7 @@ pub(super) struct Weights {
 
 impl Weights {
     pub(super) const DISTANCES: Self =
-        Self { self_pairs: [1.0; SELF_PAIRS.len()], bodies: [1.0; NUM_BODIES], offset_m: 0.0 };
+        Self { self_pairs: [[1.0; NUM_BODIES]; NUM_BODIES], bodies: [1.0; NUM_BODIES], offset_m: 0.0 };
 }
 
 /// What was found in each lane.
@@ -96,7 +96,7 @@ pub(super) fn evaluate(
 
 #[inline(always)]
 fn place(model: &CollisionModel, placed: &mut Placed, q: &[JointVector; NUM_LANES]) {
-    let frames = link_frames(q);
+    let frames = link_frames(&model.geometry.joints, q);
     for body in 0..NUM_BODIES {
         let frame = if body == 0 { FrameLanes::base() } else { frames[body.min(NUM_JOINTS) - 1] };
         placed.balls[body] = frame.place(model.arm.bounds[body].0.coords.into());
@@ -175,12 +175,12 @@ impl Search {
     #[inline(always)]
     fn self_pairs(&mut self, model: &CollisionModel, placed: &Placed, weights: &Weights) {
         let arm = &model.arm;
-        for (pair, &(one, other)) in SELF_PAIRS.iter().enumerate() {
+        for &(one, other) in &model.geometry.self_pairs {
             let (ones, others) = (&arm.capsules[one], &arm.capsules[other]);
             if others.is_empty() {
                 continue;
             }
-            let weight = weights.self_pairs[pair];
+            let weight = weights.self_pairs[one][other];
             let balls = point_distances(&placed.balls[one], &placed.balls[other]);
             if self.can_skip(&balls, arm.bounds[one].1 + arm.bounds[other].1, weight) {
                 continue;

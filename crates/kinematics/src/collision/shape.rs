@@ -3,6 +3,7 @@
 //! Every shape is convex, and the signed distance to a convex set is a convex function: along a segment it has one minimum,
 //! which bisection of its slope finds. That works alike for all shapes, and inside them as well as outside.
 
+use crate::capsule::clamp;
 use nalgebra::{Point3, Vector3};
 
 /// A solid obstacle in its own frame, m.
@@ -136,12 +137,6 @@ pub(super) fn capsule(p: [f64; 3], direction: [f64; 3], radius: f64, half_length
 #[inline(always)]
 fn positive(x: f64) -> f64 {
     if x > 0.0 { x } else { 0.0 }
-}
-
-#[inline(always)]
-pub(super) fn clamp(x: f64, low: f64, high: f64) -> f64 {
-    let x = if x > low { x } else { low };
-    if x < high { x } else { high }
 }
 
 /// `value` times the sign of `of`.

@@ -6,14 +6,11 @@
 //! # Source
 //! J. Craig, "Introduction to Robotics", chapter 6 (frames by modified Denavit-Hartenberg parameters).
 
-mod inertia;
+use nalgebra::{Isometry3, Matrix3, Vector3};
 
-pub use inertia::LinkInertia;
-
-use nalgebra::{Isometry3, Matrix3, UnitQuaternion, Vector3};
-
+use crate::geometry::{ArmGeometry, DhJoint};
+pub use crate::inertia::LinkInertia;
 use crate::joints::{JointVector, NUM_JOINTS};
-use crate::panda::{DH_A_M, DH_ALPHA_RAD, DH_D_M, FLANGE_OFFSET_M, HAND_TURN_RAD, TCP_OFFSET_M};
 
 /// Acceleration of free fall, m/s².
 pub const GRAVITY_M_S2: f64 = 9.81;
@@ -21,6 +18,10 @@ pub const GRAVITY_M_S2: f64 = 9.81;
 /// Masses of the arm and of what it carries, fingers and load at rest in the hand.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ArmDynamics {
+    joints: [DhJoint; NUM_JOINTS],
+    /// Link 7 to flange, and flange to tcp, along z, m.
+    flange_offset_m: f64,
+    tcp_offset_m: f64,
     /// Links 1 to 7 in their frames by Denavit and Hartenberg; link 7 with hand, fingers, camera and load.
     links: [LinkInertia; NUM_JOINTS],
     /// Inertia of the motors and gears behind each joint, kg·m².
@@ -47,28 +48,26 @@ pub(crate) struct Placed {
 }
 
 impl ArmDynamics {
-    /// The arm with Franka's hand and a small camera, the fingers at an opening (m), holding nothing.
-    ///
-    /// # Source
-    /// Franka publishes no masses. These are the simulated arm's (crates/simulation/assets/panda.xml): plausible, not identified.
-    pub fn panda(opening_m: f64) -> Self {
-        let link = |mass_kg, center_m: [f64; 3], diagonal: [f64; 3]| LinkInertia::new(mass_kg, center_m, diagonal);
-        let mut links = [
-            link(2.8, [0.0, -0.03, -0.08], [0.017, 0.017, 0.006]),
-            link(2.6, [0.0, -0.08, 0.03], [0.016, 0.006, 0.016]),
-            link(2.7, [0.03, 0.02, -0.06], [0.013, 0.013, 0.007]),
-            link(2.6, [-0.04, 0.04, 0.02], [0.012, 0.008, 0.013]),
-            link(2.4, [0.0, 0.04, -0.12], [0.020, 0.018, 0.005]),
-            link(1.5, [0.05, 0.01, 0.005], [0.003, 0.005, 0.005]),
-            link(0.75, [0.01, 0.0, 0.07], [0.0010, 0.0010, 0.0008]),
-        ];
-        let hand = link(0.85, [0.01, 0.0, 0.035], [0.0027, 0.0010, 0.0030]);
-        links[NUM_JOINTS - 1].add(&hand, &link7_from_hand());
+    /// An arm with its hand, the fingers at an opening (m), holding nothing.
+    pub fn new(arm: &ArmGeometry, opening_m: f64) -> Self {
+        let mut links = arm.links;
+        let link7_from_hand = arm.link7_from_hand();
+        links[NUM_JOINTS - 1].add(&arm.hand.inertia, &link7_from_hand);
+        let finger = &arm.hand.finger;
+        let [from_pad_m, z_m] = finger.center_m;
         for side in [1.0, -1.0] {
-            let finger = link(0.06, [0.0, side * (0.010 + 0.5 * opening_m), 0.0784], [1.5e-5, 1.5e-5, 5e-6]);
-            links[NUM_JOINTS - 1].add(&finger, &link7_from_hand());
+            let center_m = [0.0, side * (from_pad_m + 0.5 * opening_m), z_m];
+            let one = LinkInertia::new(finger.mass_kg, center_m, finger.inertia);
+            links[NUM_JOINTS - 1].add(&one, &link7_from_hand);
         }
-        Self { links, rotor_inertia: JointVector::repeat(0.1), damping: JointVector::repeat(0.5) }
+        Self {
+            joints: arm.joints,
+            flange_offset_m: arm.flange_offset_m,
+            tcp_offset_m: arm.hand.tcp_offset_m,
+            links,
+            rotor_inertia: arm.rotor_inertia,
+            damping: arm.damping,
+        }
     }
 
     /// The same with a load: its mass (kg) and its centre in the flange's frame (m), as a point.
@@ -79,20 +78,32 @@ impl ArmDynamics {
         assert!(mass_kg >= 0.0 && mass_kg.is_finite(), "a mass is not negative, found {mass_kg} kg");
         assert!(center_in_flange_m.iter().all(|x| x.is_finite()), "{center_in_flange_m:?} m is no place");
         let load = LinkInertia::new(mass_kg, center_in_flange_m, [0.0; 3]);
-        self.links[NUM_JOINTS - 1].add(&load, &Isometry3::translation(0.0, 0.0, FLANGE_OFFSET_M));
+        self.links[NUM_JOINTS - 1].add(&load, &Isometry3::translation(0.0, 0.0, self.flange_offset_m));
         self
     }
 
     /// The torques (N·m) of a motion: positions in rad, velocities in rad/s, accelerations in rad/s².
     pub fn torques_nm(&self, q: &JointVector, velocity: &JointVector, acceleration: &JointVector) -> JointVector {
-        let (torques, _) = self.of_motion(&Placed::new(q), velocity, acceleration, GRAVITY_M_S2);
+        let (torques, _) = self.of_motion(&self.placed(q), velocity, acceleration, GRAVITY_M_S2);
         torques + self.damping.component_mul(velocity)
     }
 
     /// What holds the arm against its weight, N·m.
     pub fn gravity_nm(&self, q: &JointVector) -> JointVector {
         let zero = JointVector::zeros();
-        self.of_motion(&Placed::new(q), &zero, &zero, GRAVITY_M_S2).0
+        self.of_motion(&self.placed(q), &zero, &zero, GRAVITY_M_S2).0
+    }
+
+    /// Where the links are at a configuration.
+    pub(crate) fn placed(&self, q: &JointVector) -> Placed {
+        let parent_from_link: [Matrix3<f64>; NUM_JOINTS] = std::array::from_fn(|joint| {
+            let (sin_a, cos_a) = self.joints[joint].twist();
+            let (sin_q, cos_q) = q[joint].sin_cos();
+            Matrix3::new(cos_q, -sin_q, 0.0, sin_q * cos_a, cos_q * cos_a, -sin_a, sin_q * sin_a, cos_q * sin_a, cos_a)
+        });
+        // The hand's turn about z leaves vectors' lengths and the axis to the tcp as they are.
+        let base_from_tcp = parent_from_link.iter().fold(Matrix3::identity(), |product, turn| product * turn);
+        Placed { parent_from_link, base_from_tcp }
     }
 
     /// Viscous friction of each joint, N·m·s/rad.
@@ -115,7 +126,7 @@ impl ArmDynamics {
         let mut forces = [(zero, zero); NUM_JOINTS];
         for joint in 0..NUM_JOINTS {
             let link_from_parent = placed.parent_from_link[joint].transpose();
-            let place = place_in_parent(joint);
+            let place = place_in_parent(&self.joints[joint]);
             moving = link_from_parent * (moving + turning.cross(&place));
             moving_rate =
                 link_from_parent * (moving_rate + turning_rate.cross(&place) + turning.cross(&turning.cross(&place)));
@@ -126,7 +137,7 @@ impl ArmDynamics {
                 link_from_parent * turning_rate + carried.cross(&spin) + Vector3::new(0.0, 0.0, acceleration[joint]);
             forces[joint] = self.links[joint].force_and_torque(&moving_rate, &turning, &turning_rate);
         }
-        let to_tcp = Vector3::new(0.0, 0.0, FLANGE_OFFSET_M + TCP_OFFSET_M);
+        let to_tcp = Vector3::new(0.0, 0.0, self.flange_offset_m + self.tcp_offset_m);
         let tcp_rate = moving_rate + turning_rate.cross(&to_tcp) + turning.cross(&turning.cross(&to_tcp));
         let tcp = TcpMotion {
             velocity: placed.base_from_tcp * (moving + turning.cross(&to_tcp)),
@@ -142,39 +153,16 @@ impl ArmDynamics {
             torque += forces[joint].1;
             torques[joint] += torque.z;
             let in_parent = placed.parent_from_link[joint] * force;
-            torque = placed.parent_from_link[joint] * torque + place_in_parent(joint).cross(&in_parent);
+            torque = placed.parent_from_link[joint] * torque + place_in_parent(&self.joints[joint]).cross(&in_parent);
             force = in_parent;
         }
         (torques, tcp)
     }
 }
 
-impl Placed {
-    pub(crate) fn new(q: &JointVector) -> Self {
-        let parent_from_link: [Matrix3<f64>; NUM_JOINTS] = std::array::from_fn(|joint| {
-            let (sin_a, cos_a) = twist(joint);
-            let (sin_q, cos_q) = q[joint].sin_cos();
-            Matrix3::new(cos_q, -sin_q, 0.0, sin_q * cos_a, cos_q * cos_a, -sin_a, sin_q * sin_a, cos_q * sin_a, cos_a)
-        });
-        // The hand's turn about z leaves vectors' lengths and the axis to the tcp as they are.
-        let base_from_tcp = parent_from_link.iter().fold(Matrix3::identity(), |product, turn| product * turn);
-        Self { parent_from_link, base_from_tcp }
-    }
-}
-
-/// Sine and cosine of a link's twist, which is 0 or a right angle.
-fn twist(joint: usize) -> (f64, f64) {
-    if DH_ALPHA_RAD[joint] == 0.0 { (0.0, 1.0) } else { (DH_ALPHA_RAD[joint].signum(), 0.0) }
-}
-
-fn place_in_parent(joint: usize) -> Vector3<f64> {
-    let (sin_a, cos_a) = twist(joint);
-    Vector3::new(DH_A_M[joint], -sin_a * DH_D_M[joint], cos_a * DH_D_M[joint])
-}
-
-fn link7_from_hand() -> Isometry3<f64> {
-    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), HAND_TURN_RAD);
-    Isometry3::from_parts(Vector3::new(0.0, 0.0, FLANGE_OFFSET_M).into(), turn)
+fn place_in_parent(joint: &DhJoint) -> Vector3<f64> {
+    let (sin_a, cos_a) = joint.twist();
+    Vector3::new(joint.a_m, -sin_a * joint.d_m, cos_a * joint.d_m)
 }
 
 #[cfg(test)]

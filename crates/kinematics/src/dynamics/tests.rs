@@ -2,8 +2,9 @@ use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 
 use super::*;
+use crate::geometry::ArmGeometry;
 use crate::joints::ready_pose;
-use crate::panda::Panda;
+use crate::limits::JointLimits;
 use crate::test_poses::random_configuration;
 
 #[test]
@@ -11,7 +12,7 @@ fn a_load_straight_out_weighs_what_its_lever_says() {
     // The arm stretched to the side at the height of its shoulder: joint 2 at a right angle, the others at zero; the load 1 m outside of joint 2's axis.
     let mut q = JointVector::zeros();
     q[1] = std::f64::consts::FRAC_PI_2;
-    let bare = ArmDynamics::panda(0.08);
+    let bare = ArmDynamics::new(&ArmGeometry::panda(), 0.08);
     // Outwards from joint 2: 0.316 + 0.384, then 0.088 across; the flange points back at the base, 0.088 m lower.
     let out_m = 0.3;
     let loaded = bare.clone().with_load(2.0, [0.0, 0.0, -out_m]);
@@ -25,19 +26,19 @@ fn a_load_straight_out_weighs_what_its_lever_says() {
 fn power_is_the_change_of_energy() {
     // Without friction the joints' power is the rate of kinetic and potential energy; kinetic energy is half of velocity times momentum.
     const STEP_SECS: f64 = 1e-5;
-    let dynamics = ArmDynamics::panda(0.04).with_load(0.7, [0.01, -0.02, 0.12]);
+    let dynamics = ArmDynamics::new(&ArmGeometry::panda(), 0.04).with_load(0.7, [0.01, -0.02, 0.12]);
     let mut rng = Pcg64Mcg::seed_from_u64(41);
     for _ in 0..100 {
         let q = random_configuration(&mut rng);
         let (qd, qdd) = (random_configuration(&mut rng), random_configuration(&mut rng) * 3.0);
         let kinetic = |q: &JointVector, qd: &JointVector| {
-            let placed = Placed::new(q);
+            let placed = dynamics.placed(q);
             0.5 * qd.dot(&dynamics.of_motion(&placed, &JointVector::zeros(), qd, 0.0).0)
         };
         let at = |time: f64| (q + qd * time + qdd * (0.5 * time * time), qd + qdd * time);
         let [(q0, qd0), (q1, qd1)] = [-STEP_SECS, STEP_SECS].map(at);
         let kinetic_rate = (kinetic(&q1, &qd1) - kinetic(&q0, &qd0)) / (2.0 * STEP_SECS);
-        let power = qd.dot(&dynamics.of_motion(&Placed::new(&q), &qd, &qdd, GRAVITY_M_S2).0);
+        let power = qd.dot(&dynamics.of_motion(&dynamics.placed(&q), &qd, &qdd, GRAVITY_M_S2).0);
         let against_weight = qd.dot(&dynamics.gravity_nm(&q));
         let error = power - against_weight - kinetic_rate;
         assert!(error.abs() < 1e-6 * (1.0 + power.abs()), "{power} {against_weight} {kinetic_rate}");
@@ -47,12 +48,12 @@ fn power_is_the_change_of_energy() {
 #[test]
 fn the_tcp_moves_as_the_jacobian_says() {
     const STEP_SECS: f64 = 1e-6;
-    let (panda, dynamics) = (Panda::new(), ArmDynamics::panda(0.08));
+    let (panda, dynamics) = (ArmGeometry::panda(), ArmDynamics::new(&ArmGeometry::panda(), 0.08));
     let mut rng = Pcg64Mcg::seed_from_u64(42);
     for _ in 0..50 {
         let q = random_configuration(&mut rng);
         let (qd, qdd) = (random_configuration(&mut rng), random_configuration(&mut rng));
-        let (_, tcp) = dynamics.of_motion(&Placed::new(&q), &qd, &qdd, GRAVITY_M_S2);
+        let (_, tcp) = dynamics.of_motion(&dynamics.placed(&q), &qd, &qdd, GRAVITY_M_S2);
         let twist = panda.jacobian(&q) * qd;
         assert!((twist.fixed_rows::<3>(0) - tcp.velocity).norm() < 1e-12);
         assert!((twist.fixed_rows::<3>(3) - tcp.angular_velocity).norm() < 1e-12);
@@ -65,8 +66,8 @@ fn the_tcp_moves_as_the_jacobian_says() {
 
 #[test]
 fn standing_in_the_ready_pose_needs_a_third_of_the_torque() {
-    let gravity = ArmDynamics::panda(0.08).gravity_nm(&ready_pose());
+    let gravity = ArmDynamics::new(&ArmGeometry::panda(), 0.08).gravity_nm(&ready_pose());
     for (joint, torque) in gravity.iter().enumerate() {
-        assert!(torque.abs() < 0.4 * crate::limits::TORQUE_MAX_NM[joint], "joint {}: {torque}", joint + 1);
+        assert!(torque.abs() < 0.4 * JointLimits::panda().torque_max[joint], "joint {}: {torque}", joint + 1);
     }
 }

@@ -8,7 +8,7 @@ use crate::ik::IkOptions;
 use crate::joints::ready_pose;
 use crate::test_poses::top_grasp;
 
-fn descent(panda: &Panda) -> JointPath {
+fn descent(panda: &ArmGeometry) -> JointPath {
     let above = top_grasp(0.5, 0.1, 0.3, 0.4);
     let start = panda.inverse(&above, &ready_pose(), &IkOptions::default()).unwrap();
     let end = top_grasp(0.5, 0.1, 0.02, 0.4);
@@ -19,7 +19,7 @@ fn descent(panda: &Panda) -> JointPath {
 fn the_tcp_stays_on_the_line_between_waypoints_too() {
     // Quintic pieces of 5 mm: far below what any robot resolves.
     const TOLERANCE: f64 = 1e-8;
-    let panda = Panda::new();
+    let panda = ArmGeometry::panda();
     let path = descent(&panda);
     assert!((path.distance_m() - 0.28).abs() < 1e-6);
     assert!(path.angle_rad() < 1e-6);
@@ -35,7 +35,7 @@ fn the_tcp_stays_on_the_line_between_waypoints_too() {
 
 #[test]
 fn derivatives_agree_with_finite_differences() {
-    let path = descent(&Panda::new());
+    let path = descent(&ArmGeometry::panda());
     let step = 1e-4;
     for i in 1..100 {
         // Off the waypoints, where the third derivative jumps.
@@ -50,7 +50,7 @@ fn derivatives_agree_with_finite_differences() {
 
 #[test]
 fn a_line_with_a_turn_ends_at_the_pose_asked_for() {
-    let panda = Panda::new();
+    let panda = ArmGeometry::panda();
     let start = panda.inverse(&top_grasp(0.45, -0.1, 0.3, 0.0), &ready_pose(), &IkOptions::default()).unwrap();
     let end = top_grasp(0.55, 0.15, 0.1, 1.0);
     let path = panda.straight_path(&start.q, &end, &LineOptions::default()).unwrap();
@@ -62,7 +62,7 @@ fn a_line_with_a_turn_ends_at_the_pose_asked_for() {
 
 #[test]
 fn joints_move_little_from_waypoint_to_waypoint() {
-    let path = descent(&Panda::new());
+    let path = descent(&ArmGeometry::panda());
     assert!(path.waypoints().len() == 57);
     let waypoints: Vec<_> = path.waypoints().collect();
     for pair in waypoints.windows(2) {
@@ -72,7 +72,7 @@ fn joints_move_little_from_waypoint_to_waypoint() {
 
 #[test]
 fn most_descents_from_the_best_configuration_succeed() {
-    let panda = Panda::new();
+    let panda = ArmGeometry::panda();
     let mut rng = Pcg64Mcg::seed_from_u64(21);
     let (mut num, mut num_followed) = (0, 0);
     while num < 300 {
@@ -87,7 +87,7 @@ fn most_descents_from_the_best_configuration_succeed() {
         if let Ok(path) = panda.straight_path(&start.q, &end, &LineOptions::default()) {
             num_followed += 1;
             for q in path.waypoints() {
-                assert_eq!(panda.limits().worst_violation(q, 1e-8), None);
+                assert_eq!(panda.limits.worst_violation(q, 1e-8), None);
             }
         }
     }
@@ -97,8 +97,8 @@ fn most_descents_from_the_best_configuration_succeed() {
 
 #[test]
 fn the_elbow_slides_away_from_limits_without_moving_the_tcp() {
-    let panda = Panda::new();
-    let limits = panda.limits();
+    let panda = ArmGeometry::panda();
+    let limits = &panda.limits;
     // Sum of the fourth powers of the joints' places in their ranges, -1 to 1.
     let crowding = |q: &JointVector| {
         let half_range = (limits.position_max - limits.position_min) * 0.5;
@@ -122,7 +122,7 @@ fn the_elbow_slides_away_from_limits_without_moving_the_tcp() {
 
 #[test]
 fn a_path_out_of_reach_says_how_far_it_gets() {
-    let panda = Panda::new();
+    let panda = ArmGeometry::panda();
     let end = top_grasp(1.2, 0.0, 0.4, 0.0);
     let error = panda.straight_path(&ready_pose(), &end, &LineOptions::default()).unwrap_err();
     let (KinematicsError::PathBlocked { at_share, .. } | KinematicsError::PathJointLimit { at_share, .. }) = error
@@ -135,7 +135,7 @@ fn a_path_out_of_reach_says_how_far_it_gets() {
 
 #[test]
 fn a_path_to_where_the_tcp_is_stands_still() {
-    let panda = Panda::new();
+    let panda = ArmGeometry::panda();
     let here = panda.forward(&ready_pose());
     let path = panda.straight_path(&ready_pose(), &here, &LineOptions::default()).unwrap();
     assert_eq!(path.length_m(), 0.0);
@@ -145,7 +145,7 @@ fn a_path_to_where_the_tcp_is_stands_still() {
 
 #[test]
 fn bad_input_is_an_error() {
-    let panda = Panda::new();
+    let panda = ArmGeometry::panda();
     let options = LineOptions::default();
     let here = panda.forward(&ready_pose());
     let mut q = ready_pose();

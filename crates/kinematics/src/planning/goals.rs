@@ -7,9 +7,9 @@ use super::shortcut::motion_secs;
 use crate::analytic::analytic_solutions;
 use crate::check::check_pose;
 use crate::collision::Checker;
+use crate::geometry::ArmGeometry;
 use crate::ik::IkOptions;
 use crate::joints::JointVector;
-use crate::panda::Panda;
 
 /// Angles of joint 7 that are tried.
 const NUM_ANGLES: usize = 48;
@@ -33,7 +33,7 @@ pub(super) struct GoalConfiguration {
 /// # Errors
 /// Poses that make no sense or cannot be reached, or whose configurations are all blocked.
 pub(super) fn free_configurations(
-    panda: &Panda,
+    arm: &ArmGeometry,
     checker: &mut Checker<'_>,
     start: &JointVector,
     poses: &[Isometry3<f64>],
@@ -44,12 +44,12 @@ pub(super) fn free_configurations(
     let mut reaching = Vec::new();
     for (pose_idx, pose) in poses.iter().enumerate() {
         check_pose("the pose", pose).map_err(|cause| PlanError::Kinematics { what: "the goal".to_owned(), cause })?;
-        reaching.extend(configurations(panda, start, pose).into_iter().map(|q| GoalConfiguration { q, pose_idx }));
+        reaching.extend(configurations(arm, start, pose).into_iter().map(|q| GoalConfiguration { q, pose_idx }));
     }
     if reaching.is_empty() {
         // The grid may pass by what only a sliver of angles reaches; inverse kinematics looks closer, and says why not.
         for (pose_idx, pose) in poses.iter().enumerate() {
-            match panda.inverse(pose, start, &IkOptions::default()) {
+            match arm.inverse(pose, start, &IkOptions::default()) {
                 Ok(solution) => reaching.push(GoalConfiguration { q: solution.q, pose_idx }),
                 Err(cause) if pose_idx + 1 == poses.len() && reaching.is_empty() => {
                     return Err(PlanError::Kinematics { what: "the goal".to_owned(), cause });
@@ -58,7 +58,7 @@ pub(super) fn free_configurations(
             }
         }
     }
-    free_of(panda, checker, start, reaching)
+    free_of(arm, checker, start, reaching)
 }
 
 /// Of configurations those that are free, the quickest to reach from `start` first.
@@ -66,7 +66,7 @@ pub(super) fn free_configurations(
 /// # Errors
 /// None at all, or all blocked.
 pub(super) fn free_of(
-    panda: &Panda,
+    arm: &ArmGeometry,
     checker: &mut Checker<'_>,
     start: &JointVector,
     reaching: Vec<GoalConfiguration>,
@@ -91,7 +91,7 @@ pub(super) fn free_of(
             margin_m: checker.margin_m(),
         });
     }
-    let secs = |goal: &GoalConfiguration| motion_secs(start, &goal.q, panda.limits());
+    let secs = |goal: &GoalConfiguration| motion_secs(start, &goal.q, &arm.limits);
     free.sort_by(|a, b| secs(a).total_cmp(&secs(b)));
     let mut kept: Vec<GoalConfiguration> = Vec::new();
     for goal in free {
@@ -102,12 +102,16 @@ pub(super) fn free_of(
     Ok(kept)
 }
 
-fn configurations(panda: &Panda, start: &JointVector, pose: &Isometry3<f64>) -> Vec<JointVector> {
-    let limits = panda.limits();
-    let base_from_flange = pose * panda.flange_from_tcp().inverse();
+fn configurations(arm: &ArmGeometry, start: &JointVector, pose: &Isometry3<f64>) -> Vec<JointVector> {
+    if arm.closed_form.is_none() {
+        let solutions = arm.inverse_all(pose, start, &IkOptions::default());
+        return solutions.map_or_else(|_| Vec::new(), |found| found.into_iter().map(|solution| solution.q).collect());
+    }
+    let limits = &arm.limits;
+    let base_from_flange = pose * arm.flange_from_tcp().inverse();
     let (low, high) = (limits.position_min[6], limits.position_max[6]);
     let grid = (0..NUM_ANGLES).map(|i| low + (high - low) * (i as f64 + 0.5) / NUM_ANGLES as f64);
-    grid.flat_map(|q7| analytic_solutions(&base_from_flange, q7, start[0]))
+    grid.flat_map(|q7| analytic_solutions(arm, &base_from_flange, q7, start[0]))
         .flatten()
         .filter(|solution| solution.infeasibility <= 0.0)
         .map(|solution| solution.q)

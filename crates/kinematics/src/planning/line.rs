@@ -4,8 +4,8 @@ use nalgebra::Isometry3;
 
 use crate::collision::Checker;
 use crate::error::KinematicsError;
+use crate::geometry::ArmGeometry;
 use crate::joints::JointVector;
-use crate::panda::Panda;
 use crate::path::{JointPath, LineOptions};
 
 /// A straight motion of the tcp, and how much of it is free.
@@ -27,22 +27,22 @@ pub struct CheckedLine {
 /// # Errors
 /// [`KinematicsError`] for input that makes no sense; a line that cannot be followed is no error but a share below 1.
 pub fn checked_line(
-    panda: &Panda,
+    arm: &ArmGeometry,
     checker: &mut Checker<'_>,
     start: &JointVector,
     base_from_tcp_end: &Isometry3<f64>,
 ) -> Result<CheckedLine, KinematicsError> {
-    let whole = panda.straight_path(start, base_from_tcp_end, &LineOptions::default());
+    let whole = arm.straight_path(start, base_from_tcp_end, &LineOptions::default());
     let (path, reached_share, ended_by) = match whole {
         Ok(path) => (Some(path), 1.0, None),
         Err(
             error @ (KinematicsError::PathJointLimit { at_share, .. } | KinematicsError::PathBlocked { at_share, .. }),
         ) => {
             // What comes before that place may be blocked as well.
-            let base_from_start = panda.forward(start);
+            let base_from_start = arm.forward(start);
             let share = at_share * FOLLOWED_AGAIN;
             let end = base_from_start.lerp_slerp(base_from_tcp_end, share);
-            (panda.straight_path(start, &end, &LineOptions::default()).ok(), share, Some(error.to_string()))
+            (arm.straight_path(start, &end, &LineOptions::default()).ok(), share, Some(error.to_string()))
         }
         Err(error) => return Err(error),
     };

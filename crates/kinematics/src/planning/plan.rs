@@ -16,9 +16,9 @@ use crate::check::check_joints;
 use crate::collision::{Checker, CollisionModel};
 use crate::dynamics::ArmDynamics;
 use crate::error::KinematicsError;
+use crate::geometry::ArmGeometry;
 use crate::joints::JointVector;
 use crate::limits::{CartesianLimits, JointLimits};
-use crate::panda::Panda;
 use crate::path::JointPath;
 use crate::rounded_path::RoundedPath;
 use crate::trajectory::Trajectory;
@@ -116,7 +116,7 @@ impl Plan {
     }
 }
 
-impl Panda {
+impl ArmGeometry {
     /// Plans a motion from `start` to one of several goal poses, around the obstacles of a model.
     ///
     /// Tried are all poses of `goals` (turns about a part's symmetry, exchanged fingers) with every way of the arm and many angles of joint 7: the
@@ -147,10 +147,10 @@ impl Panda {
         self.search(checker, start, goals, approaches, options)
     }
 
-    /// As [`Panda::plan`], to one of several configurations (rad).
+    /// As [`ArmGeometry::plan`], to one of several configurations (rad).
     ///
     /// # Errors
-    /// As [`Panda::plan`].
+    /// As [`ArmGeometry::plan`].
     pub fn plan_to(
         &self,
         model: &CollisionModel,

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::grid::{Grid, Tightening};
 use super::limits::MotionLimits;
 use super::profile::Profile;
-use crate::dynamics::{GRAVITY_M_S2, Placed, TcpMotion};
+use crate::dynamics::{GRAVITY_M_S2, TcpMotion};
 use crate::joints::{JointVector, NUM_JOINTS};
 use crate::rounded_path::RoundedPath;
 
@@ -52,7 +52,7 @@ impl Worst {
             let by_profile = point.dq * jerk_before.abs().max(jerk_after.abs());
             jerk_before = jerk_after;
 
-            let (torques, tcp) = limits.dynamics.of_motion(&Placed::new(&point.q), &qd, &qdd, GRAVITY_M_S2);
+            let (torques, tcp) = limits.dynamics.of_motion(&limits.dynamics.placed(&point.q), &qd, &qdd, GRAVITY_M_S2);
             let torque_stretch = torque_stretch(limits, &point.q, &qd, &torques);
             let cartesian = tcp_shares(limits, &tcp);
             let tcp_jerk = tcp_before.map_or(0.0, |(then, before)| tcp_jerk_share(limits, &before, &tcp, time - then));

@@ -4,7 +4,7 @@
 //! `τ = M q' s̈ + (M q'' + C(q, q') q') ṡ² + g`. Speeds bound ṡ² alone.
 
 use super::limits::MotionLimits;
-use crate::dynamics::{GRAVITY_M_S2, Placed};
+use crate::dynamics::GRAVITY_M_S2;
 use crate::error::KinematicsError;
 use crate::joints::{JointVector, NUM_JOINTS};
 use crate::path::PathPoint;
@@ -85,7 +85,7 @@ impl Place {
     fn new(s: f64, point: &PathPoint, limits: &MotionLimits<'_>) -> Result<Self, KinematicsError> {
         let (joints, cartesian, dynamics) = (limits.joints, limits.cartesian, limits.dynamics);
         let PathPoint { q, dq, ddq, dddq } = point;
-        let placed = Placed::new(q);
+        let placed = dynamics.placed(q);
         let zero = JointVector::zeros();
         // As accelerations from rest, q' gives M q' and the tcp's J q'.
         let (torque_slope, tcp) = dynamics.of_motion(&placed, &zero, dq, 0.0);

@@ -3,6 +3,7 @@ use rand_pcg::Pcg64Mcg;
 
 use super::*;
 use crate::dynamics::ArmDynamics;
+use crate::geometry::ArmGeometry;
 use crate::joints::{JointVector, ready_pose};
 use crate::limits::{CartesianLimits, JointLimits};
 use crate::rounded_path::length_secs;
@@ -52,11 +53,16 @@ fn one_joint_alone_takes_the_time_of_the_textbook() {
     // Joint 1: v 2.175, a 15, j 7500, distance 2: 2/v + v/a + a/j.
     let mut end = ready_pose();
     end[0] = 2.0;
-    let mut cartesian = CartesianLimits::franka();
+    let mut cartesian = CartesianLimits::panda();
     (cartesian.velocity_m_s, cartesian.angular_velocity_rad_s) = (10.0, 10.0);
     let path = RoundedPath::new(&[ready_pose(), end], &[]);
-    let motion =
-        Trajectory::along_rounded_path(path, &JointLimits::franka(), &cartesian, &ArmDynamics::panda(0.08)).unwrap();
+    let motion = Trajectory::along_rounded_path(
+        path,
+        &JointLimits::panda(),
+        &cartesian,
+        &ArmDynamics::new(&ArmGeometry::panda(), 0.08),
+    )
+    .unwrap();
     let expected = 2.0 / 2.175 + 2.175 / 15.0 + 15.0 / 7500.0;
     // The grid's last part before full speed, and the headroom.
     assert!((motion.duration_secs() / expected - 1.0).abs() < 2e-3, "{} of {expected}", motion.duration_secs());
@@ -67,8 +73,8 @@ fn a_way_out_and_back_turns_round_at_its_corner() {
     let mut out = ready_pose();
     (out[0], out[3]) = (0.8, -2.0);
     let path = RoundedPath::new(&[ready_pose(), out, ready_pose()], &[0.2]);
-    let (joints, dynamics) = (JointLimits::franka(), ArmDynamics::panda(0.08));
-    let motion = Trajectory::along_rounded_path(path, &joints, &CartesianLimits::franka(), &dynamics).unwrap();
+    let (joints, dynamics) = (JointLimits::panda(), ArmDynamics::new(&ArmGeometry::panda(), 0.08));
+    let motion = Trajectory::along_rounded_path(path, &joints, &CartesianLimits::panda(), &dynamics).unwrap();
     let shares = largest_shares(&motion, &joints, &dynamics);
     assert!(shares.iter().all(|share| *share < 1.0 + 1e-3), "{shares:?}");
     assert!(motion.duration_secs() < 1.2, "{}", motion.duration_secs());
@@ -78,14 +84,14 @@ fn a_way_out_and_back_turns_round_at_its_corner() {
 fn random_ways_keep_all_limits_and_lose_little_by_the_jerk() {
     const TOLERANCE: f64 = 1.0 + 1e-3;
     let mut rng = Pcg64Mcg::seed_from_u64(61);
-    let dynamics = ArmDynamics::panda(0.08).with_load(0.5, [0.0, 0.0, 0.12]);
+    let dynamics = ArmDynamics::new(&ArmGeometry::panda(), 0.08).with_load(0.5, [0.0, 0.0, 0.12]);
     let mut losses = Vec::new();
     for number in 0..120 {
         let scale = [1.0, 0.6, 0.1][number % 3];
-        let joints = JointLimits::franka().scaled(scale, scale, scale).unwrap();
+        let joints = JointLimits::panda().scaled(scale, scale, scale).unwrap();
         let path = random_path(&mut rng, [1.0, 0.3, 0.02][number / 3 % 3]);
         let motion =
-            Trajectory::along_rounded_path(path.clone(), &joints, &CartesianLimits::franka(), &dynamics).unwrap();
+            Trajectory::along_rounded_path(path.clone(), &joints, &CartesianLimits::panda(), &dynamics).unwrap();
         let shares = largest_shares(&motion, &joints, &dynamics);
         assert!(shares.iter().all(|share| *share < TOLERANCE), "{number}: {shares:?}");
         assert_eq!((motion.sample(0.0).0, motion.sample(1e3).0), (*path.start(), *path.end()));
@@ -102,18 +108,18 @@ fn random_ways_keep_all_limits_and_lose_little_by_the_jerk() {
 #[test]
 fn weak_joints_slow_a_motion_down_and_too_weak_ones_are_named() {
     let mut rng = Pcg64Mcg::seed_from_u64(62);
-    let dynamics = ArmDynamics::panda(0.08);
+    let dynamics = ArmDynamics::new(&ArmGeometry::panda(), 0.08);
     let (mut num_slower, mut num_refused) = (0, 0);
     for _ in 0..40 {
         let path = random_path(&mut rng, 1.0);
-        let mut weak = JointLimits::franka();
+        let mut weak = JointLimits::panda();
         weak.torque_max *= 0.45;
-        let plan = |joints| Trajectory::along_rounded_path(path.clone(), joints, &CartesianLimits::franka(), &dynamics);
+        let plan = |joints| Trajectory::along_rounded_path(path.clone(), joints, &CartesianLimits::panda(), &dynamics);
         match plan(&weak) {
             Ok(motion) => {
                 let shares = largest_shares(&motion, &weak, &dynamics);
                 assert!(shares.iter().all(|share| *share < 1.0 + 1e-3), "{shares:?}");
-                let strong = plan(&JointLimits::franka()).unwrap();
+                let strong = plan(&JointLimits::panda()).unwrap();
                 num_slower += usize::from(motion.duration_secs() > strong.duration_secs() * 1.01);
             }
             Err(KinematicsError::Trajectory { reason }) => {
@@ -129,7 +135,8 @@ fn weak_joints_slow_a_motion_down_and_too_weak_ones_are_named() {
 #[test]
 fn a_pass_keeps_its_rows_and_leaves_no_room() {
     let mut rng = Pcg64Mcg::seed_from_u64(63);
-    let (joints, cartesian, dynamics) = (JointLimits::franka(), CartesianLimits::franka(), ArmDynamics::panda(0.08));
+    let (joints, cartesian, dynamics) =
+        (JointLimits::panda(), CartesianLimits::panda(), ArmDynamics::new(&ArmGeometry::panda(), 0.08));
     let mut ratios = Vec::new();
     for _ in 0..20 {
         let path = random_path(&mut rng, 1.0);

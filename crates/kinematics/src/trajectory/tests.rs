@@ -2,9 +2,9 @@ use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
 use super::*;
+use crate::geometry::{ArmGeometry, pose_error};
 use crate::ik::IkOptions;
 use crate::joints::ready_pose;
-use crate::panda::{Panda, pose_error};
 use crate::path::LineOptions;
 use crate::test_poses::{random_configuration, top_grasp};
 
@@ -54,7 +54,7 @@ fn one_joint_alone_takes_the_time_of_the_textbook() {
     let start = ready_pose();
     let mut end = start;
     end[0] = 2.0;
-    let trajectory = Trajectory::point_to_point(&start, &end, &JointLimits::franka()).unwrap();
+    let trajectory = Trajectory::point_to_point(&start, &end, &JointLimits::panda()).unwrap();
     let expected = 2.0 / 2.175 + 2.175 / 15.0 + 15.0 / 7500.0;
     assert!((trajectory.duration_secs() - expected).abs() < 1e-9);
 }
@@ -63,7 +63,7 @@ fn one_joint_alone_takes_the_time_of_the_textbook() {
 fn point_to_point_keeps_the_limits_and_the_straight_line() {
     let mut rng = Pcg64Mcg::seed_from_u64(31);
     for scale in [1.0, 0.3] {
-        let limits = JointLimits::franka().scaled(scale, scale, scale * 0.1).unwrap();
+        let limits = JointLimits::panda().scaled(scale, scale, scale * 0.1).unwrap();
         for _ in 0..100 {
             let (start, end) = (random_configuration(&mut rng), random_configuration(&mut rng));
             let trajectory = Trajectory::point_to_point(&start, &end, &limits).unwrap();
@@ -79,7 +79,7 @@ fn point_to_point_keeps_the_limits_and_the_straight_line() {
 #[test]
 fn a_motion_is_slow_only_as_far_as_a_limit_binds() {
     let mut rng = Pcg64Mcg::seed_from_u64(32);
-    let limits = JointLimits::franka();
+    let limits = JointLimits::panda();
     for _ in 0..50 {
         let (start, end) = (random_configuration(&mut rng), random_configuration(&mut rng));
         let trajectory = Trajectory::point_to_point(&start, &end, &limits).unwrap();
@@ -93,7 +93,7 @@ fn a_motion_is_slow_only_as_far_as_a_limit_binds() {
 #[test]
 fn from_motion_keeps_the_limits_and_starts_as_told() {
     let mut rng = Pcg64Mcg::seed_from_u64(33);
-    let limits = JointLimits::franka();
+    let limits = JointLimits::panda();
     let mut num_found = 0;
     for _ in 0..300 {
         let (start, end) = (random_configuration(&mut rng) * 0.7, random_configuration(&mut rng));
@@ -125,7 +125,7 @@ fn from_motion_keeps_the_limits_and_starts_as_told() {
 
 #[test]
 fn straight_paths_keep_joint_and_cartesian_limits() {
-    let panda = Panda::new();
+    let panda = ArmGeometry::panda();
     let mut rng = Pcg64Mcg::seed_from_u64(34);
     let mut num = 0;
     let mut shortest_share: f64 = 1.0;
@@ -142,8 +142,8 @@ fn straight_paths_keep_joint_and_cartesian_limits() {
         };
         num += 1;
         let share_allowed = if num % 3 == 0 { 0.2 } else { 1.0 };
-        let limits = panda.limits().scaled(share_allowed, share_allowed, share_allowed * 0.2).unwrap();
-        let cartesian = CartesianLimits::franka().scaled(share_allowed, share_allowed, 1.0).unwrap();
+        let limits = panda.limits.scaled(share_allowed, share_allowed, share_allowed * 0.2).unwrap();
+        let cartesian = CartesianLimits::panda().scaled(share_allowed, share_allowed, 1.0).unwrap();
         let trajectory = Trajectory::along_path(path.clone(), &limits, &cartesian).unwrap();
         assert_within_limits(&trajectory, &limits, 4000);
         assert_rests_at_both_ends(&trajectory);
@@ -172,13 +172,13 @@ fn straight_paths_keep_joint_and_cartesian_limits() {
 #[test]
 fn a_low_jerk_limit_binds_and_holds_on_a_curved_path() {
     // At a five-hundredth of Franka's jerk the acceleration limits are out of reach, and the path's curvature counts.
-    let panda = Panda::new();
-    let limits = panda.limits().scaled(1.0, 1.0, 0.002).unwrap();
+    let panda = ArmGeometry::panda();
+    let limits = panda.limits.scaled(1.0, 1.0, 0.002).unwrap();
     let start = top_grasp(0.4, 0.2, 0.3, 0.5);
     let start = panda.inverse(&start, &ready_pose(), &IkOptions::default()).unwrap();
     let end = top_grasp(0.6, -0.2, 0.05, -0.6);
     let path = panda.straight_path(&start.q, &end, &LineOptions::default()).unwrap();
-    let trajectory = Trajectory::along_path(path, &limits, &CartesianLimits::franka()).unwrap();
+    let trajectory = Trajectory::along_path(path, &limits, &CartesianLimits::panda()).unwrap();
     const NUM: usize = 4000;
     assert_within_limits(&trajectory, &limits, NUM);
     let step = trajectory.duration_secs() / NUM as f64;
@@ -193,7 +193,7 @@ fn a_low_jerk_limit_binds_and_holds_on_a_curved_path() {
 
 #[test]
 fn standing_still_takes_no_time() {
-    let limits = JointLimits::franka();
+    let limits = JointLimits::panda();
     let trajectory = Trajectory::point_to_point(&ready_pose(), &ready_pose(), &limits).unwrap();
     assert_eq!(trajectory.duration_secs(), 0.0);
     for time in [-1.0, 0.0, 5.0, f64::NAN] {
@@ -204,7 +204,7 @@ fn standing_still_takes_no_time() {
 
 #[test]
 fn tiny_and_lopsided_motions_work() {
-    let limits = JointLimits::franka();
+    let limits = JointLimits::panda();
     for size in [1e-11, 1e-9, 1e-6, 1e-3] {
         let mut end = ready_pose();
         end[1] += size;
@@ -217,7 +217,7 @@ fn tiny_and_lopsided_motions_work() {
 
 #[test]
 fn bad_input_is_an_error() {
-    let limits = JointLimits::franka();
+    let limits = JointLimits::panda();
     let mut q = ready_pose();
     q[6] = f64::NAN;
     assert!(matches!(

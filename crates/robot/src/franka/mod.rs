@@ -18,7 +18,7 @@ use std::time::Duration;
 use sdg_fci::FciError;
 use sdg_fci::client::{Hand, HandConfig, InternalController, Robot, RobotConfig};
 use sdg_fci::wire::{CollisionBehavior, RobotMode, RobotState, Status, Version};
-use sdg_kinematics::{JointVector, Panda};
+use sdg_kinematics::{ArmGeometry, JointVector};
 
 use crate::arm::{Arm, CompliantArm};
 use crate::arm_state::{ArmMode, ArmState, ContactSensitivity, HandCommand, HandState, Load, MotionEnd};
@@ -48,6 +48,7 @@ const LOAD_RADIUS_M: f64 = 0.03;
 /// A Franka arm, connected.
 #[derive(Debug)]
 pub struct FrankaArm {
+    geometry: ArmGeometry,
     robot: Robot,
     hand: HandWorker,
     address: RobotAddress,
@@ -70,7 +71,8 @@ impl FrankaArm {
         let config = HandConfig { port: address.hand_port, timeout: TIMEOUT };
         let hand = Hand::connect(&address.host, &config).map_err(|error| address.refused("hand", error))?;
         let hand = HandWorker::new(hand);
-        Ok(Self { robot, hand, address: address.clone(), scheduling, sensitivity: None })
+        let geometry = model_of(robot.version()).geometry();
+        Ok(Self { geometry, robot, hand, address: address.clone(), scheduling, sensitivity: None })
     }
 
     /// Refuses a robot of another model than the workcell's file says: the limits that motions are checked with would be another's.
@@ -78,10 +80,7 @@ impl FrankaArm {
     /// # Errors
     /// [`RobotError::Configuration`].
     pub fn check_model(&self, expected: RobotModel) -> Result<()> {
-        let found = match self.robot.version() {
-            Version::V5 => RobotModel::Panda,
-            Version::V10 => RobotModel::Fr3,
-        };
+        let found = model_of(self.robot.version());
         if found == expected {
             return Ok(());
         }
@@ -156,19 +155,19 @@ impl FrankaArm {
 
     /// The loop of coming down.
     fn come_down(&mut self, touch_down: &TouchDown, watch: &mut Watch) -> Result<Touched> {
-        let panda = Panda::new();
+        let arm = &self.geometry;
         let mut descent: Option<Descent> = None;
         let mut stopped: Option<StopReason> = None;
         let controlled = self.robot.control_torques(|state, _| {
             let (q, dq) = (JointVector::from(state.q), JointVector::from(state.dq));
             let descent = descent
-                .get_or_insert_with(|| Descent::new(*touch_down, &panda, q, JointVector::from(state.torque_desired)));
+                .get_or_insert_with(|| Descent::new(*touch_down, arm, q, JointVector::from(state.torque_desired)));
             if let Some(reason) = watch.observe(&arm_state(state)) {
                 stopped = Some(reason.clone());
                 // At this speed the robot's own control holds the arm where it is.
                 return ControlFlow::Break((*descent.last_torque()).into());
             }
-            match descent.next(&panda, &q, &dq, state.external_wrench_in_base[2]) {
+            match descent.next(arm, &q, &dq, state.external_wrench_in_base[2]) {
                 (torque, false) => ControlFlow::Continue(torque.into()),
                 (torque, true) => ControlFlow::Break(torque.into()),
             }
@@ -196,6 +195,10 @@ impl FrankaArm {
 }
 
 impl Arm for FrankaArm {
+    fn geometry(&self) -> &ArmGeometry {
+        &self.geometry
+    }
+
     fn state(&mut self) -> Result<ArmState> {
         match self.robot.read_state() {
             Ok(state) => Ok(arm_state(state)),
@@ -271,6 +274,13 @@ impl CompliantArm for FrankaArm {
     fn touch_down(&mut self, touch_down: &TouchDown, watch: &mut Watch) -> Result<Touched> {
         self.set_contact_sensitivity(ContactSensitivity::Contact)?;
         self.in_control(|arm| arm.come_down(touch_down, watch))
+    }
+}
+
+fn model_of(version: Version) -> RobotModel {
+    match version {
+        Version::V5 => RobotModel::Panda,
+        Version::V10 => RobotModel::Fr3,
     }
 }
 

@@ -1,7 +1,7 @@
 //! Up from what was felt lower than the limits allow, and nowhere else.
 
 use nalgebra::Vector3;
-use sdg_kinematics::{JointVector, Panda, Trajectory};
+use sdg_kinematics::{JointVector, Trajectory};
 
 use super::limits::{CheckedMotion, SafetyLimits};
 use super::violation::Violation;
@@ -60,10 +60,10 @@ impl SafetyLimits {
 
     /// The limits of a motion from a configuration. A hand that stands where it came down by contact, lower than the limits allow, may go
     /// straight up from there.
-    pub(crate) fn starting_at(&self, panda: &Panda, start: &JointVector, felt: Option<&FeltBelow>) -> LimitsFrom<'_> {
+    pub(crate) fn starting_at(&self, start: &JointVector, felt: Option<&FeltBelow>) -> LimitsFrom<'_> {
         let leaving = felt.and_then(|felt| {
-            let tcp = panda.forward(start).translation.vector;
-            let table_m = self.below_table_m(panda, start);
+            let tcp = self.geometry.forward(start).translation.vector;
+            let table_m = self.below_table_m(start);
             let floor_m = self.workspace.map_or(0.0, |workspace| workspace.min_m.z - tcp.z);
             let deepest_m = table_m.max(floor_m);
             let is_below = deepest_m > 0.0 && deepest_m <= felt.below_limits_m + LEAVING_M;
@@ -75,14 +75,14 @@ impl SafetyLimits {
     }
 
     /// How much nearer to the table than allowed the arm is, m.
-    fn below_table_m(&self, panda: &Panda, q: &JointVector) -> f64 {
-        let lowest_m = panda.clearance(q, self.table_height_m).lowest_m - self.fingertip_beyond_tcp_m;
+    fn below_table_m(&self, q: &JointVector) -> f64 {
+        let lowest_m = self.geometry.clearance(q, self.table_height_m).lowest_m - self.fingertip_beyond_tcp_m;
         self.min_table_clearance_m - lowest_m
     }
 
-    fn is_below(&self, panda: &Panda, q: &JointVector, tcp_z_m: f64) -> bool {
+    fn is_below(&self, q: &JointVector, tcp_z_m: f64) -> bool {
         let is_under_floor = self.workspace.is_some_and(|workspace| tcp_z_m < workspace.min_m.z);
-        is_under_floor || self.below_table_m(panda, q) > 0.0
+        is_under_floor || self.below_table_m(q) > 0.0
     }
 }
 
@@ -98,15 +98,15 @@ impl LimitsFrom<'_> {
     }
 
     fn check_leaving(&self, trajectory: &Trajectory) -> Result<(), Violation> {
-        let panda = Panda::new();
-        let from = panda.forward(trajectory.start()).translation.vector;
+        let arm = &self.limits.geometry;
+        let from = arm.forward(trajectory.start()).translation.vector;
         let num_cycles = (trajectory.duration_secs() / PERIOD_SECS).ceil() as usize;
         let (mut highest_m, mut was_above) = (from.z, false);
         for cycle in 0..=num_cycles {
             let time_secs = cycle as f64 * PERIOD_SECS;
             let (q, _, _) = trajectory.sample(time_secs);
-            let tcp = panda.forward(&q).translation.vector;
-            if !self.limits.is_below(&panda, &q, tcp.z) {
+            let tcp = arm.forward(&q).translation.vector;
+            if !self.limits.is_below(&q, tcp.z) {
                 was_above = true;
                 continue;
             }

@@ -2,10 +2,10 @@
 
 use nalgebra::{Isometry3, Vector3, Vector6};
 use sdg_fci::Limits;
-use sdg_kinematics::{ArmPart, CartesianLimits, JointLimits, JointVector, NUM_JOINTS, Panda, Trajectory};
+use sdg_kinematics::{ArmGeometry, ArmPart, CartesianLimits, JointLimits, JointVector, NUM_JOINTS, Trajectory};
 
 use crate::arm_state::PERIOD_SECS;
-use crate::safety::capsules::LinkCapsules;
+use crate::safety::self_collision::self_collision;
 use crate::safety::violation::Violation;
 
 /// Where the hand may be, in the robot's base frame, m.
@@ -30,47 +30,42 @@ pub struct SafetyLimits {
     pub table_height_m: f64,
     /// How far the finger tips reach beyond the tcp, m.
     pub fingertip_beyond_tcp_m: f64,
-    /// The least height of hand, wrist and elbow above the table, m. [`sdg_kinematics::Panda::clearance`] says what counts as theirs.
+    /// The least height of hand, wrist and elbow above the table, m. [`sdg_kinematics::ArmGeometry::clearance`] says what counts as theirs.
     pub min_table_clearance_m: f64,
-    /// The arm's shape, against itself.
-    pub capsules: LinkCapsules,
+    /// The least distance between two of the arm's own bodies, m.
+    pub min_self_distance_m: f64,
     /// What the robot itself holds its client to, for the velocities that fall near the ends of an FR3's joints.
-    pub robot: &'static Limits,
+    pub robot: Option<&'static Limits>,
+    /// The arm.
+    pub geometry: ArmGeometry,
 }
 
 impl Default for SafetyLimits {
-    /// Franka's limits over a table at the base's height.
+    /// The Panda's limits over a table at the base's height.
     fn default() -> Self {
-        Self {
-            joints: JointLimits::franka(),
-            cartesian: CartesianLimits::franka(),
-            workspace: None,
-            table_height_m: 0.0,
-            fingertip_beyond_tcp_m: 0.004,
-            min_table_clearance_m: 0.001,
-            capsules: LinkCapsules::panda(),
-            robot: &Limits::PANDA,
-        }
+        Self { robot: Some(&Limits::PANDA), ..Self::of(ArmGeometry::panda()) }
     }
 }
 
 impl SafetyLimits {
+    /// The limits of an arm over a table at the base's height.
+    pub fn of(geometry: ArmGeometry) -> Self {
+        Self {
+            joints: geometry.limits.clone(),
+            cartesian: geometry.cartesian_limits,
+            workspace: None,
+            table_height_m: 0.0,
+            fingertip_beyond_tcp_m: 0.004,
+            min_table_clearance_m: 0.001,
+            min_self_distance_m: 0.010,
+            robot: None,
+            geometry,
+        }
+    }
+
     /// The FR3's limits over a table at the base's height. The tcp is not allowed to be faster than a Panda's.
     pub fn fr3() -> Self {
-        let robot = &Limits::FR3;
-        let mut joints = JointLimits::franka();
-        joints.position_min = robot.q_min.into();
-        joints.position_max = robot.q_max.into();
-        joints.velocity_max = robot.velocity.into();
-        joints.acceleration_max = robot.acceleration.into();
-        joints.jerk_max = robot.jerk.into();
-        let mut cartesian = CartesianLimits::franka();
-        cartesian.acceleration_m_s2 = robot.translation.acceleration;
-        cartesian.jerk_m_s3 = robot.translation.jerk;
-        cartesian.angular_velocity_rad_s = robot.rotation.velocity;
-        cartesian.angular_acceleration_rad_s2 = robot.rotation.acceleration;
-        cartesian.angular_jerk_rad_s3 = robot.rotation.jerk;
-        Self { joints, cartesian, robot, ..Self::default() }
+        Self { robot: Some(&Limits::FR3), ..Self::of(ArmGeometry::fr3()) }
     }
 }
 
@@ -111,20 +106,19 @@ impl SafetyLimits {
     /// # Errors
     /// The first limit that it breaks.
     pub fn check(&self, trajectory: Trajectory) -> Result<CheckedMotion, Violation> {
-        let panda = Panda::new();
         let num_cycles = (trajectory.duration_secs() / PERIOD_SECS).ceil() as usize;
         let mut before = Derivatives::default();
         for cycle in 0..=num_cycles {
             let time_secs = cycle as f64 * PERIOD_SECS;
             let (q, dq, ddq) = trajectory.sample(time_secs);
             before = self.check_joints(time_secs, (&q, &dq, &ddq), &before)?.cartesian_of(&before);
-            let frames = panda.frames(&q);
-            let twist = panda.jacobian(&q) * dq;
+            let frames = self.geometry.frames(&q);
+            let twist = self.geometry.jacobian(&q) * dq;
             before = self.check_twist(time_secs, twist, &before)?;
             self.check_workspace(time_secs, "tcp", &frames.base_from_tcp)?;
             self.check_workspace(time_secs, "flange", &frames.base_from_flange)?;
-            self.check_table(time_secs, &panda, &q)?;
-            if let Some(collision) = self.capsules.collision(&frames) {
+            self.check_table(time_secs, &q)?;
+            if let Some(collision) = self_collision(&self.geometry, &frames, self.min_self_distance_m) {
                 return Err(Violation::SelfCollision { time_secs, collision });
             }
         }
@@ -158,7 +152,8 @@ impl SafetyLimits {
                     return Err(Violation::Joint { time_secs, quantity, joint, found, min, max, unit });
                 }
             }
-            let [min, max] = self.robot.velocity_range(idx, q[idx]);
+            let Some(robot) = self.robot else { continue };
+            let [min, max] = robot.velocity_range(idx, q[idx]);
             if dq[idx] < min - ROUNDING || dq[idx] > max + ROUNDING {
                 let (quantity, found, unit) = ("velocity", dq[idx], "rad/s");
                 return Err(Violation::Joint { time_secs, quantity, joint, found, min, max, unit });
@@ -209,8 +204,8 @@ impl SafetyLimits {
         Ok(())
     }
 
-    fn check_table(&self, time_secs: f64, panda: &Panda, q: &JointVector) -> Result<(), Violation> {
-        let clearance = panda.clearance(q, self.table_height_m);
+    fn check_table(&self, time_secs: f64, q: &JointVector) -> Result<(), Violation> {
+        let clearance = self.geometry.clearance(q, self.table_height_m);
         let (part, beyond_m) = match clearance.part {
             ArmPart::FingerTips => ("finger tips", self.fingertip_beyond_tcp_m),
             ArmPart::Hand => ("hand", 0.0),

@@ -8,12 +8,12 @@
 //! the arm against itself. These limits are no safety function in the sense of a standard: they know nothing of people, of what
 //! stands in the cell, or of a fault below them. An emergency stop remains required.
 
-mod capsules;
 mod leaving;
 mod limits;
+mod self_collision;
 mod violation;
 
-pub use capsules::{LinkCapsules, SelfCollision};
 pub(crate) use leaving::{FeltBelow, LimitsFrom};
 pub use limits::{CheckedMotion, SafetyLimits, WorkspaceBox};
+pub use self_collision::SelfCollision;
 pub use violation::Violation;

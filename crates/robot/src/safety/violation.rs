@@ -1,6 +1,6 @@
 //! Which limit a motion breaks.
 
-use crate::safety::capsules::SelfCollision;
+use crate::safety::self_collision::SelfCollision;
 
 /// The first limit that a motion breaks; times in seconds from the motion's start.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -42,9 +42,10 @@ impl<A: Arm> Sequence<'_, '_, A> {
         opening_m: f64,
         slip: &Isometry3<f64>,
     ) -> Steps<Aim> {
-        let held = self.held.clone().ok_or_else(|| Stop::Failed(GraspStep::Carry, "nothing is held".to_owned()))?;
+        let held =
+            self.known.held.clone().ok_or_else(|| Stop::Failed(GraspStep::Carry, "nothing is held".to_owned()))?;
         // Where the hand cannot open it need not come down.
-        self.opening_m = opening_m;
+        self.known.opening_m = opening_m;
         let mut aims: Vec<Aim> = same_turns_rad(symmetry)
             .into_iter()
             .map(|turn_rad| {
@@ -113,7 +114,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         for (index, pose) in poses.iter().enumerate() {
             let (ik, line) = (IkOptions::default(), LineOptions::default());
             let planned =
-                self.robot.panda().approach(&above(pose, height_m), pose, GraspSymmetry::Fixed, &seed, &ik, &line);
+                self.robot.geometry().approach(&above(pose, height_m), pose, GraspSymmetry::Fixed, &seed, &ik, &line);
             match planned {
                 Ok(approach) if best.as_ref().is_none_or(|(_, best)| approach.pregrasp.cost < best.pregrasp.cost) => {
                     best = Some((index, approach));
@@ -127,9 +128,9 @@ impl<A: Arm> Sequence<'_, '_, A> {
 
     /// Whether the arm can come down from a configuration as far as a place may be felt; why not.
     fn goes_on_down(&self, from: &JointVector) -> Result<(), String> {
-        let panda = self.robot.panda();
-        let lowest = above(&panda.forward(from), -(SOFT_WAY_M + BELOW_M));
-        let line = panda.straight_path(from, &lowest, &LineOptions::default());
+        let arm = self.robot.geometry();
+        let lowest = above(&arm.forward(from), -(SOFT_WAY_M + BELOW_M));
+        let line = arm.straight_path(from, &lowest, &LineOptions::default());
         line.map(|_| ()).map_err(|error| error.to_string())
     }
 
@@ -146,7 +147,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         let hand = self.robot.hand()?;
         self.judge(GraspStep::Carry, &hand)?;
         self.robot.set_contact_sensitivity(ContactSensitivity::Contact)?;
-        let planned = self.robot.plan_along(&path, &self.config.pace.approach_limits());
+        let planned = self.robot.plan_along(&path, &self.cell.config.pace.approach_limits(self.robot.geometry()));
         let motion = fails_at(GraspStep::PutDown, planned)?;
         self.follow(motion, GraspStep::PutDown)
     }

@@ -2,9 +2,10 @@
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use sdg_kinematics::collision::Obstacle;
-use sdg_kinematics::{IkOptions, JointVector, Panda, ready_pose};
+use sdg_kinematics::{ArmGeometry, IkOptions, JointVector};
 
 use crate::arm_state::Load;
+use crate::camera_pose::CameraPose;
 use crate::error::{Result, RobotError};
 use crate::height::HeightMeasurement;
 use crate::lying_part::LyingPart;
@@ -32,18 +33,6 @@ pub enum LookOut {
     },
     /// The arm is in a configuration, rad: with a camera beside the robot, out of its view.
     Joints(JointVector),
-}
-
-/// Where the camera is.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum CameraMount {
-    /// On the hand: it is moved over the part and looks again.
-    Hand {
-        /// From the optical frame to the tcp, m.
-        tcp_from_camera: Isometry3<f64>,
-    },
-    /// Beside the robot: it looks once, with the arm out of its view.
-    Base,
 }
 
 /// Where the sequence goes, how it grasps, and how fast.
@@ -118,11 +107,11 @@ impl LookOut {
     ///
     /// # Errors
     /// [`RobotError::Configuration`] for a place out of reach, or a camera that is to be moved and does not stand on the hand.
-    pub fn configuration(&self, panda: &Panda, mount: &CameraMount, table_height_m: f64) -> Result<JointVector> {
-        let (at_m, height_m, yaw_rad) = match (*self, mount) {
+    pub fn configuration(&self, arm: &ArmGeometry, camera: &CameraPose, table_height_m: f64) -> Result<JointVector> {
+        let (at_m, height_m, yaw_rad) = match (*self, camera) {
             (Self::Joints(q), _) => return Ok(q),
-            (Self::CameraAt { at_m, height_m, yaw_rad }, CameraMount::Hand { .. }) => (at_m, height_m, yaw_rad),
-            (Self::CameraAt { .. }, CameraMount::Base) => {
+            (Self::CameraAt { at_m, height_m, yaw_rad }, CameraPose::OnFlange(_)) => (at_m, height_m, yaw_rad),
+            (Self::CameraAt { .. }, CameraPose::InBase(_)) => {
                 return Err(RobotError::Configuration {
                     what: "look-out pose".into(),
                     expected: "joint angles, with a camera that stands beside the robot".into(),
@@ -131,24 +120,14 @@ impl LookOut {
             }
         };
         let base_from_camera = camera_looking_down(at_m[0], at_m[1], table_height_m + height_m, yaw_rad);
-        let base_from_tcp = mount.base_from_tcp(&base_from_camera);
-        panda.inverse(&base_from_tcp, &ready_pose(), &IkOptions::default()).map(|solution| solution.q).map_err(
-            |error| RobotError::Configuration {
+        let base_from_tcp = camera.base_from_tcp(arm, &base_from_camera);
+        arm.inverse(&base_from_tcp, &arm.ready, &IkOptions::default()).map(|solution| solution.q).map_err(|error| {
+            RobotError::Configuration {
                 what: format!("look-out pose at ({}, {}) m, {height_m} m above the table", at_m[0], at_m[1]),
                 expected: "a camera pose within the arm's reach".into(),
                 found: error.to_string(),
-            },
-        )
-    }
-}
-
-impl CameraMount {
-    /// The tcp's pose for the camera on the hand to be at a pose.
-    pub(super) fn base_from_tcp(&self, base_from_camera: &Isometry3<f64>) -> Isometry3<f64> {
-        match self {
-            Self::Hand { tcp_from_camera } => base_from_camera * tcp_from_camera.inverse(),
-            Self::Base => *base_from_camera,
-        }
+            }
+        })
     }
 }
 
@@ -168,25 +147,25 @@ mod tests {
 
     #[test]
     fn a_look_out_puts_the_camera_where_it_is_told() {
-        let panda = Panda::new();
-        let mount = CameraMount::Hand { tcp_from_camera: Isometry3::translation(0.072, 0.0, -0.0534) };
+        let panda = ArmGeometry::panda();
+        let tcp_from_camera = Isometry3::translation(0.072, 0.0, -0.0534);
+        let camera = CameraPose::OnFlange(panda.flange_from_tcp() * tcp_from_camera);
         let look_out = LookOut::CameraAt { at_m: [0.5, 0.1], height_m: 0.5, yaw_rad: 0.3 };
-        let q = look_out.configuration(&panda, &mount, 0.05).unwrap();
-        let CameraMount::Hand { tcp_from_camera } = mount else { unreachable!() };
+        let q = look_out.configuration(&panda, &camera, 0.05).unwrap();
         let apart = (panda.forward(&q) * tcp_from_camera).inverse() * camera_looking_down(0.5, 0.1, 0.55, 0.3);
         assert!(apart.translation.vector.norm() < 1e-5 && apart.rotation.angle() < 1e-5, "{apart}");
     }
 
     #[test]
     fn places_that_cannot_be_are_said() {
-        let (panda, mount) = (Panda::new(), CameraMount::Hand { tcp_from_camera: Isometry3::identity() });
+        let (panda, camera) = (ArmGeometry::panda(), CameraPose::OnFlange(Isometry3::identity()));
         let far = LookOut::CameraAt { at_m: [1.5, 0.0], height_m: 0.5, yaw_rad: 0.0 };
-        let found = far.configuration(&panda, &mount, 0.0).unwrap_err().to_string();
+        let found = far.configuration(&panda, &camera, 0.0).unwrap_err().to_string();
         assert!(
             found.starts_with("look-out pose at (1.5, 0) m, 0.5 m above the table: expected a camera pose"),
             "{found}"
         );
-        let found = far.configuration(&panda, &CameraMount::Base, 0.0).unwrap_err().to_string();
+        let found = far.configuration(&panda, &CameraPose::InBase(Isometry3::identity()), 0.0).unwrap_err().to_string();
         assert!(found.contains("joint angles, with a camera that stands beside the robot"), "{found}");
     }
 }

@@ -29,35 +29,35 @@ impl<A: Arm> Sequence<'_, '_, A> {
         self.robot.start_hand(HandCommand::Grasp {
             width_m: target.jaw_width_m,
             speed_m_s: CLOSING_SPEED_M_S,
-            force_n: self.config.grasp_force_n,
+            force_n: self.cell.config.grasp_force_n,
         })?;
         let hand = self.robot.finish_hand()?;
-        self.closed = Some(hand);
-        self.opening_m = hand.opening_m;
+        self.known.closed = Some(hand);
+        self.known.opening_m = hand.opening_m;
         self.judge(GraspStep::Close, &hand)?;
-        if let Some(load) = self.config.load {
+        if let Some(load) = self.cell.config.load {
             self.robot.set_load(load)?;
         }
         let q = self.robot.state()?.q;
-        let base_from_tcp = self.robot.panda().forward(&q);
-        self.held = Some(HeldPart::new(target, &base_from_tcp, self.surface_height_m(), self.config));
+        let base_from_tcp = self.robot.geometry().forward(&q);
+        self.known.held = Some(HeldPart::new(target, &base_from_tcp, self.surface_height_m(), self.cell.config));
         Ok(())
     }
 
     /// Lifts the part, as high as the arm reaches.
     pub(super) fn lift(&mut self) -> Steps<()> {
         let start = self.robot.commanded()?;
-        let base_from_tcp = self.robot.panda().forward(&start);
-        let mut lift_m = self.config.lift_m;
+        let base_from_tcp = self.robot.geometry().forward(&start);
+        let mut lift_m = self.cell.config.lift_m;
         let path = loop {
             let lifted = above(&base_from_tcp, lift_m);
             match self.free_line(&start, &lifted)? {
                 Ok(path) => break path,
-                Err(_) if lift_m - LIFT_STEP_M >= self.config.min_lift_m - 1e-9 => lift_m -= LIFT_STEP_M,
+                Err(_) if lift_m - LIFT_STEP_M >= self.cell.config.min_lift_m - 1e-9 => lift_m -= LIFT_STEP_M,
                 Err(why) => return Err(Stop::Failed(GraspStep::Lift, why)),
             }
         };
-        let planned = self.robot.plan_along(&path, &self.config.pace.lift_limits());
+        let planned = self.robot.plan_along(&path, &self.cell.config.pace.lift_limits(self.robot.geometry()));
         let motion = fails_at(GraspStep::Lift, planned)?;
         self.follow(motion, GraspStep::Lift)?;
         let hand = self.robot.hand()?;
@@ -70,14 +70,14 @@ impl<A: Arm> Sequence<'_, '_, A> {
         start: &JointVector,
         base_from_tcp: &Isometry3<f64>,
     ) -> Steps<Result<JointPath, String>> {
-        let panda = self.robot.panda();
+        let arm = self.robot.geometry();
         if !self.is_surrounded() {
-            let line = panda.straight_path(start, base_from_tcp, &LineOptions::default());
+            let line = arm.straight_path(start, base_from_tcp, &LineOptions::default());
             return Ok(line.map_err(|error| error.to_string()));
         }
-        let model = self.surroundings().contact_model(self.robot.limits().table_height_m)?;
+        let model = self.surroundings().contact_model(self.robot.geometry(), self.robot.limits().table_height_m)?;
         let mut checker = Checker::new(&model, LINE_MARGIN_M);
-        let line = checked_line(panda, &mut checker, start, base_from_tcp).map_err(RobotError::Planning)?;
+        let line = checked_line(arm, &mut checker, start, base_from_tcp).map_err(RobotError::Planning)?;
         let CheckedLine { share, path, blocked_by } = line;
         Ok(path.ok_or_else(|| {
             let why = blocked_by.unwrap_or_default();
@@ -88,19 +88,19 @@ impl<A: Arm> Sequence<'_, '_, A> {
     /// Holds the part still for a while.
     pub(super) fn hold(&mut self) -> Steps<()> {
         self.observer.before(self.robot.arm(), GraspStep::Hold)?;
-        self.robot.wait(self.config.hold_secs)?;
+        self.robot.wait(self.cell.config.hold_secs)?;
         let hand = self.robot.hand()?;
         self.judge(GraspStep::Hold, &hand)
     }
 
     /// Whether the part is held: the observer's word, which may rest on more, then the hand's.
     pub(super) fn judge(&mut self, step: GraspStep, hand: &HandState) -> Steps<()> {
-        let by_hand = held(&self.closed.unwrap_or(*hand), hand);
-        if by_hand.is_err() && self.held.take().is_some() && self.config.load.is_some() {
+        let by_hand = held(&self.known.closed.unwrap_or(*hand), hand);
+        if by_hand.is_err() && self.known.held.take().is_some() && self.cell.config.load.is_some() {
             // The controller must not carry what is lost.
             self.robot.set_load(Load::NONE)?;
         }
-        self.hand_verdicts.push((step, by_hand.clone().err()));
+        self.report.hand_verdicts.push((step, by_hand.clone().err()));
         self.passed(step)?;
         by_hand.map_err(|why| Stop::Failed(step, why))
     }

@@ -1,7 +1,7 @@
 //! Looking: from afar, and from above what was found.
 
 use nalgebra::{Isometry3, Vector3};
-use sdg_kinematics::{HAND_OPENING_MAX_M, IkOptions, IkSolution, KinematicsError, with_fingers_exchanged};
+use sdg_kinematics::{IkOptions, IkSolution, KinematicsError, with_fingers_exchanged};
 
 use super::held_part::shape_of;
 use super::{SETTLE_SECS, Sequence, Steps, Stop, camera_looking_down};
@@ -23,11 +23,11 @@ const CONFIRMED_WITHIN: (f64, f64) = (0.015, 0.26);
 impl<A: Arm> Sequence<'_, '_, A> {
     /// Looks from one place after the other until the part is found.
     pub(super) fn look_around(&mut self) -> Steps<GraspTarget> {
-        let config = self.config;
+        let config = self.cell.config;
         let table_height_m = self.robot.limits().table_height_m;
         let mut looks = 0;
         for look_out in &config.look_outs {
-            let arrived = match look_out.configuration(self.robot.panda(), &self.mount, table_height_m) {
+            let arrived = match look_out.configuration(self.robot.geometry(), &self.cell.camera, table_height_m) {
                 Ok(q) => self.move_freely(&q, GraspStep::Detect),
                 Err(error) => Err(Stop::Error(error)),
             };
@@ -38,7 +38,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
                 Ok(()) => self.robot.wait(SETTLE_SECS)?,
             }
             looks += 1;
-            self.looks[0] = looks;
+            self.report.looks[0] = looks;
             if let Some(target) = self.find(|target| target.score >= SURE)? {
                 return Ok(target);
             }
@@ -55,7 +55,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
                 Err(_) => continue,
                 Ok(()) => looks += 1,
             }
-            self.looks[1] = looks;
+            self.report.looks[1] = looks;
             if let Some(target) = self.find(|target| target.score >= SURE || confirms(first, target))? {
                 return Ok(target);
             }
@@ -67,19 +67,20 @@ impl<A: Arm> Sequence<'_, '_, A> {
     fn find(&mut self, is_accepted: impl Fn(&GraspTarget) -> bool) -> Steps<Option<GraspTarget>> {
         let target = self.finder.find(self.robot.arm())?.filter(is_accepted);
         self.note_others();
-        self.picture_time = self.finder.picture_time();
-        self.targets.push(target);
+        self.known.picture_time = self.finder.picture_time();
+        self.report.targets.push(target);
         let Some(found) = target else { return Ok(None) };
         let failed = |why: String| Stop::Failed(GraspStep::Detect, why);
         let p = found.base_from_tcp.translation.vector;
         if !(p.iter().all(|value| value.is_finite()) && found.jaw_width_m.is_finite()) {
             return Err(failed("the grasp that was found is not finite".into()));
         }
-        if found.jaw_width_m > HAND_OPENING_MAX_M {
+        let opening_max_m = self.robot.geometry().hand.opening_max_m;
+        if found.jaw_width_m > opening_max_m {
             return Err(failed(format!(
                 "the part is {:.0} mm wide, the hand opens {:.0} mm",
                 found.jaw_width_m * 1e3,
-                HAND_OPENING_MAX_M * 1e3
+                opening_max_m * 1e3
             )));
         }
         Ok(Some(found))
@@ -89,16 +90,16 @@ impl<A: Arm> Sequence<'_, '_, A> {
     pub(super) fn note_others(&mut self) {
         let table_height_m = self.robot.limits().table_height_m;
         for other in self.finder.others() {
-            if let Some(shape) = shape_of(&other, table_height_m, self.config) {
-                self.lying.put(LyingPart { base_from_part: other.base_from_tcp, shape });
+            if let Some(shape) = shape_of(&other, table_height_m, self.cell.config) {
+                self.known.lying.put(LyingPart { base_from_part: other.base_from_tcp, shape });
             }
         }
     }
 
     /// Refuses to begin a motion that rests on an old picture.
     pub(super) fn check_age(&mut self) -> Steps<()> {
-        let Some(taken) = self.picture_time.take() else { return Ok(()) };
-        let (age_secs, max_secs) = (taken.elapsed().as_secs_f64(), self.config.max_detection_age_secs);
+        let Some(taken) = self.known.picture_time.take() else { return Ok(()) };
+        let (age_secs, max_secs) = (taken.elapsed().as_secs_f64(), self.cell.config.max_detection_age_secs);
         if age_secs <= max_secs {
             return Ok(());
         }
@@ -112,7 +113,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
 
     /// Puts the camera over a grasp or shifted from there, the hand turned as for one of the grasps, which are at one place, or by half a turn more.
     pub(super) fn hover(&mut self, grasps: &[Isometry3<f64>], shift_m: [f64; 2], step: GraspStep) -> Steps<()> {
-        self.look_down(grasps, shift_m, self.config.hover_height_m, step)
+        self.look_down(grasps, shift_m, self.cell.config.hover_height_m, step)
     }
 
     /// The same from another height above the table.
@@ -133,7 +134,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
                 // The picture's up is the hand's x.
                 let up = base_from_grasp.rotation * Vector3::x();
                 let base_from_camera = camera_looking_down(x, y, height_m, up.y.atan2(up.x));
-                self.mount.base_from_tcp(&base_from_camera)
+                self.cell.camera.base_from_tcp(self.robot.geometry(), &base_from_camera)
             })
             .collect();
         let unreachable =
@@ -149,7 +150,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         let mut best: Option<IkSolution> = None;
         let mut first_error = None;
         for base_from_tcp in poses {
-            match self.robot.panda().inverse(&base_from_tcp, &seed, &IkOptions::default()) {
+            match self.robot.geometry().inverse(&base_from_tcp, &seed, &IkOptions::default()) {
                 Ok(solution) if best.as_ref().is_none_or(|best| solution.cost < best.cost) => best = Some(solution),
                 Ok(_) => {}
                 Err(error) => {

@@ -21,7 +21,7 @@ const NEARER: f64 = 0.5;
 impl<A: Arm> Sequence<'_, '_, A> {
     /// Measures how high the part lies, where that is asked for; the grasp at that height.
     pub(super) fn measure_height(&mut self, seen: &GraspTarget) -> Steps<GraspTarget> {
-        let Some(measurement) = self.config.height else { return Ok(*seen) };
+        let Some(measurement) = self.cell.config.height else { return Ok(*seen) };
         let mut report = HeightReport::default();
         let measured = self.look_from_two_places(seen, &measurement, &mut report);
         let measured = match measured {
@@ -38,9 +38,9 @@ impl<A: Arm> Sequence<'_, '_, A> {
             Ok((_, pair)) => pair.to_vec(),
             Err(_) => report.sightings.clone(),
         };
-        self.height = Some(report);
+        self.report.height = Some(report);
         let settled = settled.map_err(|why| Stop::Failed(GraspStep::Detect, why))?;
-        self.surface_m = Some(settled.height_m - measurement.mark_height_m);
+        self.known.surface_m = Some(settled.height_m - measurement.mark_height_m);
         let target = match (settled.source, &sightings[..]) {
             (HeightSource::Measured, [..]) => between(&sightings, settled.height_m),
             // What one picture showed is nearer to the part than the look before it.
@@ -50,7 +50,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         };
         let mut target = target.unwrap_or(*seen);
         target.base_from_tcp.translation.z = settled.height_m - measurement.marks_over_grasp_m();
-        self.targets.push(Some(target));
+        self.report.targets.push(Some(target));
         self.passed(GraspStep::Detect)?;
         Ok(target)
     }
@@ -96,7 +96,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
                 }
             }
             let shown = self.finder.sight(self.robot.arm(), seen)?;
-            self.picture_time = self.finder.picture_time();
+            self.known.picture_time = self.finder.picture_time();
             if shown.is_empty() {
                 let which = if pictures.is_empty() { "first" } else { "second" };
                 why.get_or_insert(format!("the {which} picture does not show the part"));

@@ -17,16 +17,17 @@ mod held_part;
 mod hold;
 mod look;
 mod measure;
-mod place;
+mod placing;
 mod reach;
 mod travel;
 
 use std::time::Instant;
 
-use sdg_kinematics::{HAND_OPENING_MAX_M, Trajectory};
+use sdg_kinematics::Trajectory;
 
 use crate::arm::{Arm, CompliantArm};
 use crate::arm_state::HandState;
+use crate::camera_pose::CameraPose;
 use crate::error::{Result, RobotError};
 use crate::grasp_target::GraspTarget;
 use crate::height::HeightReport;
@@ -35,9 +36,9 @@ use crate::perception::{GraspStep, PartFinder, StepObserver};
 use crate::robot::Robot;
 use crate::touch::{TouchDown, Touched};
 
-pub use config::{CameraMount, GraspConfig, LOOK_AT_M, LOOK_HEIGHT_M, LookOut, camera_looking_down};
+pub use config::{GraspConfig, LOOK_AT_M, LOOK_HEIGHT_M, LookOut, camera_looking_down};
 pub use look::{CONFIRMED, SURE};
-pub use place::{PlaceOutcome, PlaceReport, PlacingConfig, grasp_and_place};
+pub use placing::{PlacingConfig, PlacingOutcome, PlacingReport, grasp_and_place};
 
 use held_part::HeldPart;
 
@@ -88,10 +89,10 @@ pub fn grasp<A: Arm>(
     robot: &mut Robot<'_, A>,
     finder: &mut dyn PartFinder<A>,
     observer: &mut dyn StepObserver<A>,
-    mount: CameraMount,
+    camera: CameraPose,
     config: &GraspConfig,
 ) -> Result<GraspReport> {
-    let mut sequence = Sequence::new(robot, finder, observer, mount, config);
+    let mut sequence = Sequence::new(robot, finder, observer, camera, config);
     let outcome = sequence.grasp(|_, _| Ok(()))?;
     Ok(sequence.grasp_report(outcome))
 }
@@ -104,10 +105,10 @@ pub fn grasp_softly<A: CompliantArm>(
     robot: &mut Robot<'_, A>,
     finder: &mut dyn PartFinder<A>,
     observer: &mut dyn StepObserver<A>,
-    mount: CameraMount,
+    camera: CameraPose,
     config: &GraspConfig,
 ) -> Result<GraspReport> {
-    let mut sequence = Sequence::yielding(robot, finder, observer, mount, config);
+    let mut sequence = Sequence::yielding(robot, finder, observer, camera, config);
     let outcome = sequence.grasp(|_, _| Ok(()))?;
     Ok(sequence.grasp_report(outcome))
 }
@@ -144,22 +145,28 @@ struct Sequence<'s, 'r, A: Arm> {
     robot: &'s mut Robot<'r, A>,
     finder: &'s mut dyn PartFinder<A>,
     observer: &'s mut dyn StepObserver<A>,
-    mount: CameraMount,
+    cell: Cell<'s, A>,
+    known: Known,
+    /// What is reported in the end, but for the outcome.
+    report: GraspReport,
+}
+
+/// What stays as it is during a sequence.
+struct Cell<'s, A: Arm> {
+    camera: CameraPose,
     config: &'s GraspConfig,
-    targets: Vec<Option<GraspTarget>>,
-    looks: [usize; 2],
-    /// When the picture was taken that the next motion rests on.
-    picture_time: Option<Instant>,
-    closed: Option<HandState>,
-    hand_verdicts: Vec<(GraspStep, Option<String>)>,
     /// Of an arm that yields.
     touch: Option<Touch<A>>,
-    /// What was touched on soft ways down.
-    touched: Vec<Touched>,
+}
+
+/// What is known at a moment of the attempt.
+struct Known {
+    /// When the picture was taken that the next motion rests on.
+    picture_time: Option<Instant>,
+    /// The hand when it had closed.
+    closed: Option<HandState>,
     held: Option<HeldPart>,
-    /// How high the part lies, where that was to be measured.
-    height: Option<HeightReport>,
-    /// z of what the part lies on by that, m.
+    /// z of what the part lies on as measured, m.
     surface_m: Option<f64>,
     /// Parts that lie and are not to be touched.
     lying: LyingParts,
@@ -167,6 +174,21 @@ struct Sequence<'s, 'r, A: Arm> {
     opening_m: f64,
     /// How far the hand opens beyond the part, both sides together, m.
     opening_margin_m: f64,
+}
+
+impl GraspReport {
+    /// Of an attempt of which nothing was done yet.
+    fn begun() -> Self {
+        Self {
+            outcome: GraspOutcome::Failed { step: GraspStep::Detect, why: "nothing was done".to_owned() },
+            targets: Vec::new(),
+            looks: [0; 2],
+            closed: None,
+            hand_verdicts: Vec::new(),
+            touched: Vec::new(),
+            height: None,
+        }
+    }
 }
 
 impl GraspOutcome {
@@ -181,36 +203,27 @@ impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
         robot: &'s mut Robot<'r, A>,
         finder: &'s mut dyn PartFinder<A>,
         observer: &'s mut dyn StepObserver<A>,
-        mount: CameraMount,
+        camera: CameraPose,
         config: &'s GraspConfig,
     ) -> Self {
-        Self {
-            robot,
-            finder,
-            observer,
-            mount,
-            config,
-            targets: Vec::new(),
-            looks: [0; 2],
+        let known = Known {
             picture_time: None,
             closed: None,
-            hand_verdicts: Vec::new(),
-            touch: None,
-            touched: Vec::new(),
             held: None,
-            height: None,
             surface_m: None,
             lying: LyingParts::new(&config.lying),
-            opening_m: HAND_OPENING_MAX_M,
+            opening_m: robot.geometry().hand.opening_max_m,
             opening_margin_m: config.opening_margin_m,
-        }
+        };
+        let cell = Cell { camera, config, touch: None };
+        Self { robot, finder, observer, cell, known, report: GraspReport::begun() }
     }
 
     /// Comes down softly until something is felt, where the arm yields; `None` where it does not.
     fn touch_down(&mut self, touch_down: &TouchDown, step: GraspStep) -> Steps<Option<Touched>> {
-        let Some(touch) = self.touch else { return Ok(None) };
+        let Some(touch) = self.cell.touch else { return Ok(None) };
         let touched = fails_at(step, touch(self.robot, touch_down))?;
-        self.touched.push(touched);
+        self.report.touched.push(touched);
         Ok(Some(touched))
     }
 
@@ -224,25 +237,17 @@ impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
     }
 
     fn grasp_report(&mut self, outcome: GraspOutcome) -> GraspReport {
-        GraspReport {
-            outcome,
-            targets: std::mem::take(&mut self.targets),
-            looks: self.looks,
-            closed: self.closed,
-            hand_verdicts: std::mem::take(&mut self.hand_verdicts),
-            touched: std::mem::take(&mut self.touched),
-            height: self.height.take(),
-        }
+        GraspReport { outcome, closed: self.known.closed, ..std::mem::replace(&mut self.report, GraspReport::begun()) }
     }
 
     fn run(&mut self, is_wanted: impl FnOnce(&mut Self, &GraspTarget) -> Steps<()>) -> Steps<()> {
         let first = self.look_around()?;
-        let target = match self.mount {
-            CameraMount::Hand { .. } => {
+        let target = match self.cell.camera {
+            CameraPose::OnFlange(_) => {
                 let seen = self.look_from_above(&first)?;
                 self.measure_height(&seen)?
             }
-            CameraMount::Base => first,
+            CameraPose::InBase(_) => first,
         };
         is_wanted(self, &target)?;
         self.take(&target)
@@ -250,7 +255,7 @@ impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
 
     /// From above a part that was found to the part in the air.
     fn take(&mut self, target: &GraspTarget) -> Steps<()> {
-        self.lying.take(&target.base_from_tcp);
+        self.known.lying.take(&target.base_from_tcp);
         let approach = self.go_above(target)?;
         self.descend(approach)?;
         self.close(target)?;
@@ -260,7 +265,7 @@ impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
 
     /// z of what the part lies on, m: as measured, or else the table's as told.
     fn surface_height_m(&self) -> f64 {
-        self.surface_m.unwrap_or(self.robot.limits().table_height_m)
+        self.known.surface_m.unwrap_or(self.robot.limits().table_height_m)
     }
 
     /// Tells the observer that a step is done; its word is a failure of the step.
@@ -282,10 +287,12 @@ impl<'s, 'r, A: CompliantArm> Sequence<'s, 'r, A> {
         robot: &'s mut Robot<'r, A>,
         finder: &'s mut dyn PartFinder<A>,
         observer: &'s mut dyn StepObserver<A>,
-        mount: CameraMount,
+        camera: CameraPose,
         config: &'s GraspConfig,
     ) -> Self {
         let touch: Touch<A> = |robot, touch_down| robot.touch_down(touch_down);
-        Self { touch: Some(touch), ..Self::new(robot, finder, observer, mount, config) }
+        let mut sequence = Self::new(robot, finder, observer, camera, config);
+        sequence.cell.touch = Some(touch);
+        sequence
     }
 }

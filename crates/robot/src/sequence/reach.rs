@@ -1,9 +1,7 @@
 //! From above the part straight down to it.
 
 use nalgebra::{Isometry3, Translation3};
-use sdg_kinematics::{
-    Approach, GraspSymmetry, HAND_OPENING_MAX_M, IkOptions, JointPath, JointVector, LineOptions, with_fingers_exchanged,
-};
+use sdg_kinematics::{Approach, GraspSymmetry, IkOptions, JointPath, JointVector, LineOptions, with_fingers_exchanged};
 
 use super::{Sequence, Steps, Stop, fails_at};
 use crate::arm::Arm;
@@ -45,13 +43,14 @@ impl<A: Arm> Sequence<'_, '_, A> {
         let mut base_from_grasp = target.base_from_tcp;
         base_from_grasp.translation.z = base_from_grasp.translation.z.max(lowest);
 
-        let mut openings_m = vec![(target.jaw_width_m + self.opening_margin_m).min(HAND_OPENING_MAX_M)];
-        if !self.lying.all().is_empty() && NARROW_MARGIN_M < self.opening_margin_m {
-            openings_m.push((target.jaw_width_m + NARROW_MARGIN_M).min(HAND_OPENING_MAX_M));
+        let opening_max_m = self.robot.geometry().hand.opening_max_m;
+        let mut openings_m = vec![(target.jaw_width_m + self.known.opening_margin_m).min(opening_max_m)];
+        if !self.known.lying.all().is_empty() && NARROW_MARGIN_M < self.known.opening_margin_m {
+            openings_m.push((target.jaw_width_m + NARROW_MARGIN_M).min(opening_max_m));
         }
         let mut first_error = None;
         for opening_m in openings_m {
-            self.opening_m = opening_m;
+            self.known.opening_m = opening_m;
             let reach = match self.reach(&base_from_grasp)? {
                 Ok(reach) => reach,
                 Err(why) => {
@@ -79,7 +78,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
     /// How to come above a grasp; else why there is no way.
     fn reach(&mut self, base_from_grasp: &Isometry3<f64>) -> Steps<Result<Reach, String>> {
         let seed = self.robot.commanded()?;
-        let here = self.robot.panda().forward(&seed).translation.z;
+        let here = self.robot.geometry().forward(&seed).translation.z;
         let mut first_error = None;
         for height in [&[here - base_from_grasp.translation.z], &HEIGHTS_M[..]].concat() {
             let height = height.max(0.05);
@@ -95,7 +94,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
                 }
                 continue;
             }
-            let planned = self.robot.panda().approach(
+            let planned = self.robot.geometry().approach(
                 &above(base_from_grasp, height),
                 base_from_grasp,
                 GraspSymmetry::HalfTurn,
@@ -117,10 +116,11 @@ impl<A: Arm> Sequence<'_, '_, A> {
     pub(super) fn descend(&mut self, path: JointPath) -> Steps<()> {
         self.robot.finish_hand()?;
         self.robot.set_contact_sensitivity(ContactSensitivity::Contact)?;
-        match self.config.soft_approach.filter(|_| self.touch.is_some()) {
+        match self.cell.config.soft_approach.filter(|_| self.cell.touch.is_some()) {
             Some(touch_down) => self.descend_softly(&path, &touch_down)?,
             None => {
-                let planned = self.robot.plan_along(&path, &self.config.pace.approach_limits());
+                let planned =
+                    self.robot.plan_along(&path, &self.cell.config.pace.approach_limits(self.robot.geometry()));
                 let motion = fails_at(GraspStep::Approach, planned)?;
                 self.follow(motion, GraspStep::Approach)?;
             }
@@ -130,7 +130,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
 
     /// As an approach goes, and softly on the last of it.
     fn descend_softly(&mut self, path: &JointPath, touch_down: &TouchDown) -> Steps<()> {
-        let base_from_grasp = self.robot.panda().forward(path.end());
+        let base_from_grasp = self.robot.geometry().forward(path.end());
         self.go_down_to(path.start(), &above(&base_from_grasp, SOFT_WAY_M), GraspStep::Approach)?;
         let touch_down = TouchDown { max_way_m: SOFT_WAY_M, ..*touch_down };
         let touched = self.touch_down(&touch_down, GraspStep::Approach)?;
@@ -151,9 +151,9 @@ impl<A: Arm> Sequence<'_, '_, A> {
         base_from_tcp: &Isometry3<f64>,
         step: GraspStep,
     ) -> Steps<()> {
-        let line = self.robot.panda().straight_path(start, base_from_tcp, &LineOptions::default());
+        let line = self.robot.geometry().straight_path(start, base_from_tcp, &LineOptions::default());
         let path = fails_at(step, line.map_err(RobotError::Planning))?;
-        let planned = self.robot.plan_along(&path, &self.config.pace.approach_limits());
+        let planned = self.robot.plan_along(&path, &self.cell.config.pace.approach_limits(self.robot.geometry()));
         let motion = fails_at(step, planned)?;
         self.follow(motion, step)
     }

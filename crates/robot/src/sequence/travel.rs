@@ -15,26 +15,26 @@ use crate::surroundings::{Destination, Surroundings, Way};
 impl<A: Arm> Sequence<'_, '_, A> {
     /// Whether anything stands or lies in the cell that motions have to be planned around.
     pub(super) fn is_surrounded(&self) -> bool {
-        !(self.config.obstacles.is_empty() && self.lying.all().is_empty())
+        !(self.cell.config.obstacles.is_empty() && self.known.lying.all().is_empty())
     }
 
     /// What stands and lies around the arm, and what it holds.
     pub(super) fn surroundings(&self) -> Surroundings<'_> {
-        around(self.config, &self.lying, self.held.as_ref(), self.opening_m)
+        around(self.cell.config, &self.known.lying, self.known.held.as_ref(), self.known.opening_m)
     }
 
     /// A way around what stands and lies in the cell.
     pub(super) fn way_to(&mut self, to: &Destination<'_>) -> Result<Way> {
         let limits = self.free_limits();
-        let surroundings = around(self.config, &self.lying, self.held.as_ref(), self.opening_m);
+        let surroundings = around(self.cell.config, &self.known.lying, self.known.held.as_ref(), self.known.opening_m);
         self.robot.plan_around(&surroundings, to, &limits)
     }
 
     /// Joint limits of free motions, with a part in the hand and without.
     fn free_limits(&self) -> JointLimits {
-        match self.held {
-            Some(_) => self.config.pace.carry_limits(),
-            None => self.config.pace.free_limits(),
+        match self.known.held {
+            Some(_) => self.cell.config.pace.carry_limits(self.robot.geometry()),
+            None => self.cell.config.pace.free_limits(self.robot.geometry()),
         }
     }
 
@@ -57,12 +57,12 @@ impl<A: Arm> Sequence<'_, '_, A> {
         let limits = self.free_limits();
         let planned = self.robot.plan_free(q, &limits);
         let motion = fails_at(step, planned)?;
-        let (panda, table_height_m) = (self.robot.panda(), self.robot.limits().table_height_m);
-        let clearance = motion.clearance(panda, table_height_m);
+        let (arm, table_height_m) = (self.robot.geometry(), self.robot.limits().table_height_m);
+        let clearance = motion.clearance(arm, table_height_m);
         // What is held hangs lower than the fingers.
-        let held_m = self.held.as_ref().map_or(0.0, |held| held.hang_m);
+        let held_m = self.known.held.as_ref().map_or(0.0, |held| held.hang_m);
         // The end is wanted, whatever its height; on the way the arm must not come lower.
-        let allowed = (FREE_CLEARANCE_M + held_m).min(panda.clearance(q, table_height_m).lowest_m - 1e-3);
+        let allowed = (FREE_CLEARANCE_M + held_m).min(arm.clearance(q, table_height_m).lowest_m - 1e-3);
         if clearance.lowest_m < allowed {
             return Err(Stop::Failed(
                 step,

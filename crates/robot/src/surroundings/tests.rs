@@ -18,9 +18,9 @@ fn down(x: f64, y: f64, z: f64) -> Isometry3<f64> {
 }
 
 fn plan(obstacles: &[Obstacle], start: &JointVector, to: &Destination<'_>) -> Result<Way> {
-    let mut arm = PlannedArm::new(*start, 0.08);
+    let mut arm = PlannedArm::new(ArmGeometry::panda(), *start, 0.08);
     let mut robot = Robot::new(&mut arm, SafetyLimits::default(), Watch::default());
-    let joints = JointLimits::franka().scaled(0.1, 0.1, 0.1).unwrap();
+    let joints = JointLimits::panda().scaled(0.1, 0.1, 0.1).unwrap();
     let surroundings = Surroundings { obstacles, lying: &[], held: &[], opening_m: 0.08, table_clearance_m: 0.05 };
     robot.plan_around(&surroundings, to, &joints)
 }
@@ -29,7 +29,7 @@ fn plan(obstacles: &[Obstacle], start: &JointVector, to: &Destination<'_>) -> Re
 fn a_wall_is_gone_around_and_nothing_is_touched() {
     // Between the two sides, 0.45 m high.
     let obstacles = [wall("wall", [0.2, 0.02, 0.225], [0.5, 0.0, 0.225])];
-    let panda = Panda::new();
+    let panda = ArmGeometry::panda();
     let start = panda.inverse(&down(0.45, 0.3, 0.25), &ready_pose(), &Default::default()).unwrap().q;
     let goals = [down(0.45, -0.3, 0.02)];
     let way = plan(&obstacles, &start, &Destination::Approached(&goals, 0.2)).unwrap();
@@ -41,7 +41,7 @@ fn a_wall_is_gone_around_and_nothing_is_touched() {
         (start + (end - start) * along - q).norm()
     });
     assert!(bent.fold(0.0, f64::max) > 0.1, "the way is not straight");
-    let model = collision_model(0.0, &obstacles, HAND_OPENING_MAX_M).unwrap();
+    let model = collision_model(&ArmGeometry::panda(), 0.0, &obstacles, 0.08).unwrap();
     let mut checker = Checker::new(&model, 1e-3);
     for motion in &way.motions {
         for step in 0..=200 {
@@ -74,7 +74,7 @@ fn what_blocks_is_named() {
 
 #[test]
 fn a_hand_that_begins_near_the_table_may_leave_it() {
-    let start = Panda::new().inverse(&down(0.45, 0.2, 0.012), &ready_pose(), &Default::default()).unwrap().q;
+    let start = ArmGeometry::panda().inverse(&down(0.45, 0.2, 0.012), &ready_pose(), &Default::default()).unwrap().q;
     let way = plan(&[], &start, &Destination::Configuration(&ready_pose())).unwrap();
     assert!((way.motions.last().unwrap().end() - ready_pose()).amax() < 1e-9);
 }
@@ -89,12 +89,12 @@ fn bar_at(x: f64, y: f64) -> LyingPart {
 #[test]
 fn fingers_come_down_between_parts_that_lie_as_far_as_they_are_open() {
     let lying = [bar_at(0.45, 0.153), bar_at(0.45, 0.247)];
-    let start = Panda::new().inverse(&down(0.45, 0.2, 0.30), &ready_pose(), &Default::default()).unwrap().q;
+    let start = ArmGeometry::panda().inverse(&down(0.45, 0.2, 0.30), &ready_pose(), &Default::default()).unwrap().q;
     let goals = [down(0.45, 0.2, 0.007)];
     let approach = |opening_m: f64| {
-        let mut arm = PlannedArm::new(start, 0.08);
+        let mut arm = PlannedArm::new(ArmGeometry::panda(), start, 0.08);
         let mut robot = Robot::new(&mut arm, SafetyLimits::default(), Watch::default());
-        let joints = JointLimits::franka().scaled(0.1, 0.1, 0.1).unwrap();
+        let joints = JointLimits::panda().scaled(0.1, 0.1, 0.1).unwrap();
         let surroundings = Surroundings { lying: &lying, opening_m, table_clearance_m: 0.05, ..Default::default() };
         robot.plan_around(&surroundings, &Destination::Approached(&goals, 0.2), &joints)
     };
@@ -109,16 +109,16 @@ fn what_is_held_is_carried_around_parts_that_lie() {
     // So high that the held part would run into it.
     let tall = PartShape::new(bar_at(0.0, 0.0).shape.outline().to_vec(), 0.02, 0.30, 0.15).unwrap();
     let lying = [LyingPart { base_from_part: down(0.45, 0.0, 0.15), shape: tall }];
-    let panda = Panda::new();
+    let panda = ArmGeometry::panda();
     let start = panda.inverse(&down(0.45, 0.25, 0.20), &ready_pose(), &Default::default()).unwrap().q;
     let held = [Capsule::new([-0.03, 0.0, 0.0], [0.03, 0.0, 0.0], 0.01)];
-    let mut arm = PlannedArm::new(start, 0.02);
+    let mut arm = PlannedArm::new(ArmGeometry::panda(), start, 0.02);
     let mut robot = Robot::new(&mut arm, SafetyLimits::default(), Watch::default());
-    let joints = JointLimits::franka().scaled(0.1, 0.1, 0.1).unwrap();
+    let joints = JointLimits::panda().scaled(0.1, 0.1, 0.1).unwrap();
     let surroundings = Surroundings { lying: &lying, held: &held, table_clearance_m: 0.05, ..Default::default() };
     let goals = [down(0.45, -0.25, 0.20)];
     let way = robot.plan_around(&surroundings, &Destination::Poses(&goals), &joints).unwrap();
-    let mut model = collision_model(0.0, &[lying[0].obstacle(0)], HAND_OPENING_MAX_M).unwrap();
+    let mut model = collision_model(&ArmGeometry::panda(), 0.0, &[lying[0].obstacle(0)], 0.08).unwrap();
     model.hold(&held).unwrap();
     let mut checker = Checker::new(&model, 1e-3);
     for motion in &way.motions {

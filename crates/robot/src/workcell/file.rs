@@ -7,9 +7,9 @@ use toml::Spanned;
 
 use super::error::WorkcellError;
 use super::obstacle::{ObstacleSection, obstacles};
-use super::place::{BinSection, PlaceSection, Room, TraySection, places};
+use super::place_sections::{BinSection, PlaceSection, Room, TraySection, places};
 use super::source::{MAX_REACH_MM, Numbers, Source};
-use super::{Mounting, RobotModel, Workcell};
+use super::{Mount, RobotModel, Workcell};
 use crate::robot_address::RobotAddress;
 use crate::safety::WorkspaceBox;
 use crate::sequence::LookOut;
@@ -134,9 +134,9 @@ fn read(text: &str) -> Result<Workcell, WorkcellError> {
     {
         return Err(source.error(address.span().start, format!("address: {why}")));
     }
-    let mounting = match file.camera.mounting.get_ref().as_str() {
-        "hand" => Mounting::Hand,
-        "base" => Mounting::Base,
+    let mount = match file.camera.mounting.get_ref().as_str() {
+        "hand" => Mount::Hand,
+        "base" => Mount::Base,
         other => {
             return Err(source.expected(
                 &file.camera.mounting,
@@ -182,6 +182,7 @@ fn read(text: &str) -> Result<Workcell, WorkcellError> {
     let workspace = WorkspaceBox { min_m: Vector3::new(x[0], y[0], z[0]), max_m: Vector3::new(x[1], y[1], z[1]) };
     let room = Room { table_height_m, table_m, workspace: &workspace };
     let places = places(&source, &file.place, &file.tray, &file.bin, &room)?;
+    let limits = robot.geometry().limits;
     Ok(Workcell {
         robot,
         address: file.robot.address.map(Spanned::into_inner),
@@ -191,24 +192,28 @@ fn read(text: &str) -> Result<Workcell, WorkcellError> {
         part_radius_m: option(&tool.part_radius_mm, "part_radius_mm", [1.0, MAX_PART_MM])?.unwrap_or(PART_RADIUS_MM)
             * 1e-3,
         camera_file: file.camera.file.map(Spanned::into_inner),
-        mounting,
+        mount,
         table_height_m,
         table_m,
         workspace,
         places,
         obstacles: obstacles(&source, &file.obstacle)?,
-        look_outs: look_outs.iter().map(|section| look_out(&source, section, mounting)).collect::<Result<_, _>>()?,
+        look_outs: look_outs
+            .iter()
+            .map(|section| look_out(&source, section, mount, &limits))
+            .collect::<Result<_, _>>()?,
     })
 }
 
 fn look_out(
     source: &Source<'_>,
     section: &Spanned<LookOutSection>,
-    mounting: Mounting,
+    mount: Mount,
+    limits: &JointLimits,
 ) -> Result<LookOut, WorkcellError> {
     let LookOutSection { camera_at_mm, yaw_deg, joints_deg } = section.get_ref();
     match (camera_at_mm, joints_deg) {
-        (Some(at), None) if mounting == Mounting::Hand => {
+        (Some(at), None) if mount == Mount::Hand => {
             let Numbers([x, y, height]) = *at.get_ref();
             if ![x, y].iter().all(|value| value.abs() <= MAX_REACH_MM) {
                 let expected = format!("x and y within {MAX_REACH_MM} mm of the base");
@@ -231,7 +236,7 @@ fn look_out(
                 return Err(source.error(yaw.span().start, "yaw_deg: expected with camera_at_mm only"));
             }
             let q = JointVector::from(joints.get_ref().0.map(f64::to_radians));
-            match JointLimits::franka().worst_violation(&q, 0.0) {
+            match limits.worst_violation(&q, 0.0) {
                 None if q.iter().all(|value| value.is_finite()) => Ok(LookOut::Joints(q)),
                 None => Err(source.expected(
                     joints,
@@ -242,7 +247,7 @@ fn look_out(
                 Some(violation) => {
                     let [min, max] = [violation.min_rad, violation.max_rad].map(f64::to_degrees);
                     let expected = format!("joint {} from {min:.1} to {max:.1} degrees", violation.joint);
-                    let hint = match JointLimits::franka().are_radians_given_as_degrees(&q) {
+                    let hint = match limits.are_radians_given_as_degrees(&q) {
                         true => ": radians given as degrees?",
                         false => "",
                     };

@@ -61,11 +61,11 @@
 mod error;
 mod file;
 mod obstacle;
-mod place;
+mod place_sections;
 mod source;
 
-use sdg_kinematics::JointVector;
 use sdg_kinematics::collision::{CollisionError, CollisionModel, Obstacle};
+use sdg_kinematics::{ArmGeometry, JointVector};
 
 use crate::error::{Result as RobotResult, RobotError};
 use crate::place::{Place, PlaceGoal};
@@ -92,18 +92,26 @@ impl RobotModel {
             Self::Fr3 => "fr3",
         }
     }
+
+    /// Its links, limits and hand.
+    pub fn geometry(self) -> ArmGeometry {
+        match self {
+            Self::Panda => ArmGeometry::panda(),
+            Self::Fr3 => ArmGeometry::fr3(),
+        }
+    }
 }
 
 /// Where the camera is mounted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Mounting {
+pub enum Mount {
     /// On the robot's hand: the camera's file has `hand_eye:`.
     Hand,
     /// Beside the robot: the camera's file has `table:` in the base frame.
     Base,
 }
 
-impl Mounting {
+impl Mount {
     /// The name in the file.
     pub fn name(self) -> &'static str {
         match self {
@@ -131,7 +139,7 @@ pub struct Workcell {
     /// The camera's file, as it is written.
     pub camera_file: Option<String>,
     /// How the camera is mounted.
-    pub mounting: Mounting,
+    pub mount: Mount,
     /// The table's z in the base frame, m.
     pub table_height_m: f64,
     /// Where the table is along x and y of the base frame, m, where that is told.
@@ -165,7 +173,7 @@ impl Workcell {
     pub fn grasp_config(&self) -> GraspConfig {
         let load = self.part_mass_kg.map(|mass_kg| crate::arm_state::Load {
             mass_kg,
-            center_in_flange_m: [0.0, 0.0, sdg_kinematics::TCP_OFFSET_M],
+            center_in_flange_m: self.robot.geometry().flange_from_tcp().translation.vector.into(),
         });
         GraspConfig {
             look_outs: self.look_outs.clone(),
@@ -182,7 +190,7 @@ impl Workcell {
     /// # Errors
     /// An opening that the hand does not have; obstacles were checked when the file was read.
     pub fn collision_model(&self, opening_m: f64) -> Result<CollisionModel, CollisionError> {
-        surroundings::collision_model(self.table_height_m, &self.obstacles, opening_m)
+        surroundings::collision_model(&self.robot.geometry(), self.table_height_m, &self.obstacles, opening_m)
     }
 
     /// The place of this name, or the cell of a tray: `NAME` or `NAME:CELL`.

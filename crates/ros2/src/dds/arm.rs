@@ -5,14 +5,14 @@
 //! Watch ◄─ ArmState ─ joint_states                 cancelled where Watch asks to stop
 //! HandCommand ─ GripperCommand ─► gripper_action_controller
 //! ```
-//! The planner knows Franka's Panda and FR3, so the arm behind it must have their geometry. Contact thresholds and loads are the
+//! The arm behind it must have the geometry that it is told. Contact thresholds and loads are the
 //! driver's own. Nothing recovers the arm from here.
 
 use std::time::{Duration, Instant};
 
 use sdg_robot::{
-    Arm, ArmMode, ArmState, CheckedMotion, ContactSensitivity, HandCommand, HandState, Load, MIN_HELD_WIDTH_M,
-    MotionEnd, RobotError, StopReason, Watch,
+    Arm, ArmGeometry, ArmMode, ArmState, CheckedMotion, ContactSensitivity, HandCommand, HandState, Load,
+    MIN_HELD_WIDTH_M, MotionEnd, RobotError, StopReason, Watch,
 };
 
 use super::action::{ActionClient, ActionType, Goal, GoalEnd};
@@ -172,6 +172,10 @@ fn error_name(code: i32) -> &'static str {
 }
 
 impl Arm for TrajectoryArm {
+    fn geometry(&self) -> &ArmGeometry {
+        &self.config.geometry
+    }
+
     fn state(&mut self) -> Result<ArmState> {
         self.arm_state(ArmMode::Idle)
     }

@@ -6,6 +6,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use nalgebra::SVector;
+use sdg_robot::ArmGeometry;
 
 use super::topic::Subscription;
 use crate::messages::JointState;
@@ -15,6 +16,8 @@ pub(super) type Joints = SVector<f64, 7>;
 /// Where an arm's topics and actions are.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ArmConfig {
+    /// The arm's links, limits and hand.
+    pub geometry: ArmGeometry,
     /// The action FollowJointTrajectory.
     pub trajectory_action: String,
     /// The action GripperCommand.
@@ -33,6 +36,7 @@ impl Default for ArmConfig {
     /// As franka_ros2 and Panda's MoveIt configuration name them.
     fn default() -> Self {
         Self {
+            geometry: ArmGeometry::panda(),
             trajectory_action: "/panda_arm_controller/follow_joint_trajectory".to_owned(),
             gripper_action: "/panda_hand_controller/gripper_cmd".to_owned(),
             joint_states: "/joint_states".to_owned(),

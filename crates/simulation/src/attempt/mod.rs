@@ -10,8 +10,8 @@ use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use sdg_kinematics::{CartesianLimits, JointVector, Trajectory, ready_pose};
 use sdg_robot::{
-    CameraMount, FREE_CLEARANCE_M, GraspConfig, GraspOutcome, GraspReport, GraspStep, LookOut, PartFinder, PlaceGoal,
-    PlaceOutcome, PlaceReport, PlacingConfig, Robot, SafetyLimits, Watch,
+    CameraPose, FREE_CLEARANCE_M, GraspConfig, GraspOutcome, GraspReport, GraspStep, LookOut, PartFinder, PlaceGoal,
+    PlacingConfig, PlacingOutcome, PlacingReport, Robot, SafetyLimits, Watch,
 };
 
 use crate::error::{Result, SimulationError};
@@ -51,15 +51,15 @@ impl Workcell {
     /// What every motion in the workcell keeps to: Franka's limits over the table, but for the hand's turning, since joint motions
     /// go at the pace of rehearsals.
     pub fn safety_limits() -> SafetyLimits {
-        let mut cartesian = CartesianLimits::franka();
+        let mut cartesian = CartesianLimits::panda();
         cartesian.angular_velocity_rad_s = REHEARSED_ANGULAR_VELOCITY_RAD_S;
         cartesian.angular_acceleration_rad_s2 = REHEARSED_ANGULAR_ACCELERATION_RAD_S2;
         SafetyLimits { cartesian, fingertip_beyond_tcp_m: FINGERTIP_BEYOND_TCP_M, ..SafetyLimits::default() }
     }
 
     /// Where the wrist camera is.
-    pub fn wrist_mount(&self) -> CameraMount {
-        CameraMount::Hand { tcp_from_camera: self.tcp_from_camera() }
+    pub fn wrist_camera(&self) -> CameraPose {
+        CameraPose::OnFlange(self.panda.flange_from_tcp() * self.tcp_from_camera())
     }
 
     /// `flange_from_camera` of the wrist camera as the robot is told it: with the error of its hand-eye calibration.
@@ -88,15 +88,15 @@ impl Workcell {
         }
         let base_from_object = self.base_from_object();
         let mut judge = Judge::new(config.success_height_m);
-        let mount = self.wrist_mount();
+        let camera = self.wrist_camera();
         let mut robot = Robot::new(self, Self::safety_limits(), Watch::default());
         let ended = match &config.placing {
-            None => sdg_robot::grasp(&mut robot, finder, &mut judge, mount, &config.grasp),
+            None => sdg_robot::grasp(&mut robot, finder, &mut judge, camera, &config.grasp),
             Some((goal, placing)) => {
-                sdg_robot::grasp_and_place(&mut robot, finder, &mut judge, mount, &config.grasp, goal, placing).map(
-                    |PlaceReport { grasp, outcome, .. }| match outcome {
-                        PlaceOutcome::Placed => grasp,
-                        PlaceOutcome::Failed { step, why } => {
+                sdg_robot::grasp_and_place(&mut robot, finder, &mut judge, camera, &config.grasp, goal, placing).map(
+                    |PlacingReport { grasp, outcome, .. }| match outcome {
+                        PlacingOutcome::Placed => grasp,
+                        PlacingOutcome::Failed { step, why } => {
                             GraspReport { outcome: GraspOutcome::Failed { step, why }, ..grasp }
                         }
                     },
@@ -154,11 +154,11 @@ impl Workcell {
         const NUM_TRIES: usize = 200;
         let mut rng = Pcg64Mcg::seed_from_u64(seed ^ 0x5354_4152_545f_5144);
         let first = config.look_outs.first().copied().unwrap_or(LookOut::Joints(ready_pose()));
-        let look = first.configuration(&self.panda, &self.wrist_mount(), 0.0)?;
-        let limits = config.pace.free_limits();
+        let look = first.configuration(&self.panda, &self.wrist_camera(), 0.0)?;
+        let limits = config.pace.free_limits(&self.panda);
         for _ in 0..NUM_TRIES {
             let offset = JointVector::from_fn(|joint, _| rng.random_range(-SPREAD_RAD[joint]..SPREAD_RAD[joint]));
-            let q = self.panda.limits().clamp(&(ready_pose() + offset));
+            let q = self.panda.limits.clamp(&(ready_pose() + offset));
             let safe = self.panda.clearance(&q, 0.0).lowest_m > 0.2
                 && Trajectory::point_to_point(&q, &look, &limits)
                     .is_ok_and(|motion| motion.clearance(&self.panda, 0.0).lowest_m > FREE_CLEARANCE_M);

@@ -5,7 +5,7 @@ mod model;
 mod pictures;
 
 use nalgebra::Isometry3;
-use sdg_kinematics::{Panda, ready_pose};
+use sdg_kinematics::{ArmGeometry, ready_pose};
 use sdg_robot::{CameraPose, HandCommand, Load, PERIOD_SECS};
 
 use crate::camera::posed_camera;
@@ -35,7 +35,7 @@ pub struct Workcell {
     config: WorkcellConfig,
     pub(crate) data: Data,
     pub(crate) panda_ids: PandaIds,
-    pub(crate) panda: Panda,
+    pub(crate) panda: ArmGeometry,
     part: Option<PartIds>,
     wrist_renderer: Renderer,
     scene_camera: Id<Camera>,
@@ -91,7 +91,7 @@ impl Workcell {
             config: config.clone(),
             data,
             panda_ids,
-            panda: Panda::new(),
+            panda: ArmGeometry::panda(),
             part,
             wrist_renderer,
             scene_camera,

@@ -2,8 +2,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{UnitQuaternion, Vector3};
-use sdg_kinematics::HAND_TURN_RAD;
+use sdg_kinematics::HandGeometry;
 use sdg_robot::CameraPose;
 
 use crate::camera::{WRIST_FOCAL_LENGTH_PX, optical_from_mujoco_camera, vertical_field_of_view_rad};
@@ -33,7 +32,7 @@ pub(crate) fn build_model(config: &WorkcellConfig, sections: &str) -> Result<Arc
     match config.camera_pose {
         None => {}
         Some(CameraPose::OnFlange(flange_from_camera)) => {
-            let flange_from_hand = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), HAND_TURN_RAD);
+            let flange_from_hand = HandGeometry::franka().flange_from_hand;
             hand_from_camera = Some(flange_from_hand.inverse() * flange_from_camera * optical_from_mujoco_camera());
         }
         Some(CameraPose::InBase(base_from_camera)) => {

@@ -73,5 +73,5 @@ pub fn cell(part: &str, seed: u64) -> Workcell {
 pub fn some_motion(arm: &mut impl Arm) -> Trajectory {
     let start = arm.state().unwrap().q_commanded;
     let end = start + JointVector::from([0.4, 0.0, 0.0, 0.0, 0.0, 0.0, 0.3]);
-    Trajectory::point_to_point(&start, &end, &JointLimits::franka().scaled(0.1, 0.1, 0.1).unwrap()).unwrap()
+    Trajectory::point_to_point(&start, &end, &JointLimits::panda().scaled(0.1, 0.1, 0.1).unwrap()).unwrap()
 }

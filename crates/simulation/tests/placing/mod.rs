@@ -8,8 +8,8 @@ use nalgebra::Isometry3;
 use sdg_fci::server::{Pace, Server, ServerConfig};
 use sdg_kinematics::TCP_OFFSET_M;
 use sdg_robot::{
-    Arm, CameraMount, CompliantArm, FrankaArm, GraspConfig, GraspReport, GraspTarget, Load, LyingPart, PartFinder,
-    Place, PlaceGoal, PlaceKind, PlaceReport, PlacingConfig, Robot, SafetyLimits, Watch, grasp, grasp_and_place,
+    Arm, CameraPose, CompliantArm, FrankaArm, GraspConfig, GraspReport, GraspTarget, Load, LyingPart, PartFinder,
+    Place, PlaceGoal, PlaceKind, PlacingConfig, PlacingReport, Robot, SafetyLimits, Watch, grasp, grasp_and_place,
     grasp_softly,
 };
 use sdg_simulation::objects::ObjectSpec;
@@ -100,7 +100,7 @@ pub fn config(spec: &ObjectSpec) -> GraspConfig {
 
 /// How a part was placed, and where everything is afterwards.
 pub struct Placing {
-    pub report: sdg_robot::Result<PlaceReport>,
+    pub report: sdg_robot::Result<PlacingReport>,
     /// Where the part really lies.
     pub base_from_object: Isometry3<f64>,
     /// By how much any of the parts that lay already has moved, m.
@@ -152,14 +152,14 @@ trait Sequence {
         config: &GraspConfig,
         goal: &PlaceGoal,
         placing: &PlacingConfig,
-    ) -> sdg_robot::Result<PlaceReport>;
+    ) -> sdg_robot::Result<PlacingReport>;
     fn grasp(&mut self, limits: SafetyLimits, config: &GraspConfig) -> (sdg_robot::Result<GraspReport>, f64);
 }
 
 struct With<'a, A: CompliantArm> {
     arm: &'a mut A,
     finder: &'a mut dyn PartFinder<A>,
-    mount: CameraMount,
+    mount: CameraPose,
     peak_n: fn(&mut A) -> f64,
 }
 
@@ -181,7 +181,7 @@ impl<A: CompliantArm> Sequence for With<'_, A> {
         config: &GraspConfig,
         goal: &PlaceGoal,
         placing: &PlacingConfig,
-    ) -> sdg_robot::Result<PlaceReport> {
+    ) -> sdg_robot::Result<PlacingReport> {
         let mut robot = Robot::new(self.arm, limits, Watch::default());
         grasp_and_place(&mut robot, self.finder, &mut (), self.mount, config, goal, placing)
     }
@@ -205,7 +205,7 @@ fn run<T>(
     lower_m: f64,
     sequence: &mut dyn FnMut(&mut dyn Sequence) -> T,
 ) -> (T, Workcell) {
-    let mount = cell.wrist_mount();
+    let mount = cell.wrist_camera();
     match at {
         Where::Process => {
             let mut finder = Told { finder: Truth, lower_m };

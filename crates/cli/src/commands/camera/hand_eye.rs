@@ -96,7 +96,7 @@ pub fn run(args: &HandEyeArgs) -> Result<Outcome> {
     let found = calibrate_hand_eye(&camera.intrinsics, &board, mount, &views)
         .map_err(|error| explained(error.with_picture_names(|k| seen[k].picture.clone()), args))?;
     if let Some(out) = &args.out {
-        let camera = found.place(camera, mount, args.table_height_mm.map(|height| height / 1000.0));
+        let camera = found.mounted(camera, mount, args.table_height_mm.map(|height| height / 1000.0));
         let text = camera.update_yaml(&existing).with_context(|| named(out))?;
         CalibratedCamera::from_yaml(&text).with_context(|| named(out))?;
         sdg_files::extend(out, Some(&args.camera), text.as_bytes())?;

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use anyhow::{Context, Result, bail};
 use sdg_evaluation::Store;
-use sdg_evaluation::axes::{Against, AxesEvaluation, AxesSummary, RunEnd, Selection, comparison_lines, summary_lines};
+use sdg_evaluation::axes::{Against, AxesEvaluation, AxesSummary, RunEnd, Selection, difference_lines, summary_lines};
 use sdg_grasp::ModelKind;
 use sdg_simulation::objects::ObjectSpec;
 use serde_json::json;
@@ -60,7 +60,7 @@ pub fn run(args: &EvaluateArgs, names: &[String]) -> Result<Outcome> {
         });
         println!("{}", json_line(&line)?);
     } else {
-        print!("{}{}", summary_lines(&summary), comparison_lines(&comparisons));
+        print!("{}{}", summary_lines(&summary), difference_lines(&comparisons));
         println!("seconds of a worker: {}", summary.seconds);
         println!("tables: {}\nreport: {}", tables.display(), report.display());
     }

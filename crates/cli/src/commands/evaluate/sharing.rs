@@ -8,8 +8,8 @@ use std::time::Duration;
 use anyhow::{Context, Result, anyhow, bail};
 use sdg_evaluation::Progress;
 use sdg_evaluation::sharing::{
-    Collecting, Ended, PlannedUnit, SavedPlan, SlurmJob, UnitFolder, Watch, cores, faults, near_names, own_sha256,
-    planned_units, submit_script,
+    Collecting, Ended, ListedUnit, SlurmJob, UnitFolder, UnitList, Watch, all_units, cores, faults, near_names,
+    own_sha256, submit_script,
 };
 use sdg_evaluation::{Evaluation, Settings, Store};
 use sdg_grasp::{ModelKind, Preset};
@@ -49,8 +49,8 @@ impl Asked {
         })
     }
 
-    fn units(&self) -> Vec<PlannedUnit<'_>> {
-        planned_units(&self.models, &self.objects, self.unverified)
+    fn units(&self) -> Vec<ListedUnit<'_>> {
+        all_units(&self.models, &self.objects, self.unverified)
     }
 
     /// Opens the folder as one of many.
@@ -117,15 +117,14 @@ fn do_units(asked: &Asked, args: &EvaluateArgs) -> Result<Outcome> {
     });
     let named = named.collect::<Result<Vec<_>, _>>()?;
     let store = asked.open(&args.out)?;
-    SavedPlan::new(&units).save(&args.out)?;
+    UnitList::new(&units).save(&args.out)?;
     let (evaluation, interrupt) = (asked.evaluation(&store), Interrupt::watch());
     let progress = EvaluationProgress::new();
     progress.expect(named.len());
     let mut failures: Vec<anyhow::Error> = Vec::new();
     let mut ended = Vec::new();
     for unit in &named {
-        let done =
-            evaluation.do_planned(unit, cores(), &|| interrupt.is_requested(), &|line| progress.print_line(line));
+        let done = evaluation.do_listed(unit, cores(), &|| interrupt.is_requested(), &|line| progress.print_line(line));
         let (told, how) = match done {
             Ok(Ended::Done(summary)) => (summary, "done"),
             Ok(Ended::Already(receipt)) => (format!("done already, by {}", receipt.by), "already"),
@@ -229,7 +228,7 @@ fn submit(asked: &Asked, args: &EvaluateArgs) -> Result<Outcome> {
         return Ok(Outcome::Done);
     }
     sdg_files::prepare_folder(&folder)?;
-    SavedPlan::new(&units).save(&folder)?;
+    UnitList::new(&units).save(&folder)?;
     let mut bash = Command::new("bash").arg("-s").stdin(Stdio::piped()).spawn().context("bash: cannot run")?;
     bash.stdin.take().context("bash: no standard input")?.write_all(script.as_bytes())?;
     let status = bash.wait()?;

@@ -4,11 +4,12 @@ use std::fmt::Write;
 
 use sdg_kinematics::collision::{CollisionModel, Proximity};
 use sdg_kinematics::planning::{Plan, PlanPart, nearest_on, plan_parts};
-use sdg_kinematics::{JointVector, Panda, Trajectory};
+use sdg_kinematics::{ArmGeometry, JointVector, Trajectory};
 use serde_json::{Value, json};
 
 /// What there is to say of a plan.
 pub(super) struct Explained {
+    arm: ArmGeometry,
     start: JointVector,
     parts: Vec<PlanPart>,
     /// Motions from rest to rest that the parts are followed in.
@@ -37,6 +38,7 @@ impl Explained {
         let (start, end) = (plan.waypoints[0], plan.waypoints[plan.waypoints.len() - 1]);
         let turns = turns as usize;
         Self {
+            arm: model.arm().clone(),
             start,
             parts,
             num_motions: motions.len(),
@@ -73,7 +75,7 @@ impl Explained {
             Some(nearest) => line(format!("not straight, for on the straight motion {nearest}")),
         }
         for (index, part) in self.parts.iter().enumerate() {
-            let tcp = Panda::new().forward(&part.end).translation.vector * 1e3;
+            let tcp = self.arm.forward(&part.end).translation.vector * 1e3;
             let joints: Vec<String> = part.end.iter().map(|angle| format!("{:.1}", angle.to_degrees())).collect();
             line(format!(
                 "{}. to joints ({})°, tcp ({:.0}, {:.0}, {:.0}) mm, in {:.1} s; nearest: {}",

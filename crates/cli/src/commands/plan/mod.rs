@@ -12,7 +12,7 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use sdg_kinematics::collision::Capsule;
 use sdg_kinematics::dynamics::ArmDynamics;
 use sdg_kinematics::planning::PlanOptions;
-use sdg_kinematics::{CartesianLimits, HAND_OPENING_MAX_M, JointLimits, Panda, Trajectory, ready_pose};
+use sdg_kinematics::{HAND_OPENING_MAX_M, Trajectory};
 use sdg_robot::DEFAULT_SPEED;
 use sdg_robot::workcell::Workcell;
 
@@ -74,8 +74,9 @@ pub fn run(args: &PlanArgs) -> Result<Outcome> {
         let far = (length_m - radius_m).max(0.0);
         model.hold(&[Capsule::new([0.0; 3], [0.0, 0.0, far], radius_m)]).map_err(|error| Usage(error.to_string()))?;
     }
-    let start = args.start.map_or_else(|| workcell.home().unwrap_or_else(ready_pose), |JointsDeg(q)| q);
-    if args.start.is_some() && JointLimits::franka().are_radians_given_as_degrees(&start) {
+    let arm = &workcell.robot.geometry();
+    let start = args.start.map_or_else(|| workcell.home().unwrap_or(arm.ready), |JointsDeg(q)| q);
+    if args.start.is_some() && arm.limits.are_radians_given_as_degrees(&start) {
         let found = start.map(|angle| angle.to_degrees());
         let found: Vec<String> = found.iter().map(|angle| format!("{angle:.3}")).collect();
         bail!(
@@ -88,10 +89,10 @@ pub fn run(args: &PlanArgs) -> Result<Outcome> {
     (options.seed, options.margin_m) = (args.seed, args.margin_mm * 1e-3);
 
     let started = Instant::now();
-    let plan = Panda::new().plan(&model, &start, &goals, None, &options).context("no plan")?;
+    let plan = arm.plan(&model, &start, &goals, None, &options).context("no plan")?;
     let planning_ms = started.elapsed().as_secs_f64() * 1e3;
     let (joints, tcp, dynamics) =
-        (pace.free_limits(), CartesianLimits::franka(), ArmDynamics::panda(args.opening_mm * 1e-3));
+        (pace.free_limits(arm), arm.cartesian_limits, ArmDynamics::new(arm, args.opening_mm * 1e-3));
     let motions = plan.trajectories(&joints, &tcp, &dynamics)?;
     let stopping_secs = plan.stopping_secs(&joints, &tcp, &dynamics)?;
     let explained = Explained::new(&model, &plan, &motions, stopping_secs, args.turns, planning_ms);

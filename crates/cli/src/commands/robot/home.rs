@@ -54,7 +54,7 @@ pub(super) fn run(args: &HomeArgs) -> Result<Outcome> {
     let mut robot = Robot::new(&mut arm, workcell.safety_limits(), robots::watch(&interrupt));
     let home = workcell.home().unwrap_or_else(ready_pose);
     let motions = if workcell.obstacles.is_empty() {
-        let motion = robot.plan_free(&home, &pace.free_limits())?;
+        let motion = robot.plan_free(&home, &pace.free_limits(robot.geometry()))?;
         // Refused before anybody is asked.
         robot.limits().check(motion.clone()).map_err(sdg_robot::RobotError::from)?;
         vec![motion]
@@ -64,7 +64,9 @@ pub(super) fn run(args: &HomeArgs) -> Result<Outcome> {
             table_clearance_m: FREE_CLEARANCE_M,
             ..Surroundings::default()
         };
-        robot.plan_around(&surroundings, &Destination::Configuration(&home), &pace.free_limits())?.motions
+        robot
+            .plan_around(&surroundings, &Destination::Configuration(&home), &pace.free_limits(robot.geometry()))?
+            .motions
     };
     let secs: f64 = motions.iter().map(Trajectory::duration_secs).sum();
     if confirm(&format!("Move the arm at {address} home, in {secs:.1} s?"), args.yes)? == Consent::Refused {

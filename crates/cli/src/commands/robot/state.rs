@@ -3,7 +3,6 @@
 use anyhow::Result;
 use clap::Args;
 use nalgebra::Isometry3;
-use sdg_kinematics::Panda;
 use sdg_robot::Arm;
 use serde_json::{Value, json};
 
@@ -24,8 +23,7 @@ pub struct StateArgs {
 pub(super) fn run(args: &StateArgs) -> Result<Outcome> {
     let (mut arm, address) = args.arm.connect()?;
     let (state, hand) = (arm.state()?, arm.hand()?);
-    let panda = Panda::new();
-    let base_from_tcp = panda.forward(&state.q);
+    let base_from_tcp = arm.geometry().forward(&state.q);
     let p = base_from_tcp.translation.vector;
     let joints_deg: Vec<f64> = state.q.iter().map(|q| q.to_degrees()).collect();
     if args.json {
@@ -34,7 +32,7 @@ pub(super) fn run(args: &StateArgs) -> Result<Outcome> {
             "mode": state.mode.name(),
             "joints_rad": state.q.as_slice(),
             "base_from_tcp": pose(&base_from_tcp),
-            "base_from_flange": pose(&panda.base_from_flange(&state.q)),
+            "base_from_flange": pose(&arm.geometry().base_from_flange(&state.q)),
             "external_torques_nm": state.tau_external_nm.as_slice(),
             "hand": {"opening_m": hand.opening_m, "is_grasping": hand.is_grasping},
         });

@@ -9,6 +9,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use anyhow::{Context, Result};
+use sdg_kinematics::ArmGeometry;
 use sdg_ros2::Naming;
 use sdg_ros2::dds::{ArmConfig, Node, NodeConfig, TrajectoryArm, domain_of_environment};
 use sdg_ros2_node::IsInterrupted;
@@ -36,7 +37,9 @@ pub fn run(args: &Ros2Args) -> Result<Outcome> {
     })?;
     let arm = match grasp {
         Some(grasp) => {
-            let arm = TrajectoryArm::connect(&mut node, arm_config(&args.arm), ARM_TIMEOUT).context("sdg ros2")?;
+            let arm =
+                TrajectoryArm::connect(&mut node, arm_config(&args.arm, grasp.workcell.robot.geometry()), ARM_TIMEOUT)
+                    .context("sdg ros2")?;
             Some((grasp, arm))
         }
         None => None,
@@ -50,9 +53,10 @@ fn usage(error: sdg_ros2::RosError) -> Usage {
     Usage(error.to_string())
 }
 
-fn arm_config(args: &ArmArgs) -> ArmConfig {
+fn arm_config(args: &ArmArgs, geometry: ArmGeometry) -> ArmConfig {
     let joint = |name: String| format!("{}{name}", args.joint_prefix);
     ArmConfig {
+        geometry,
         trajectory_action: args.trajectory_action.clone(),
         gripper_action: args.gripper_action.clone(),
         joint_states: args.joint_states.clone(),

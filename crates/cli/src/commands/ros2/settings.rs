@@ -7,7 +7,7 @@ use sdg_grasp::GraspError;
 use sdg_inputs::camera_files::{self, CameraFile};
 use sdg_inputs::{read_model, read_workcell};
 use sdg_ros2::dds::Qos;
-use sdg_ros2_node::{GraspSettings, PlaceSource, Settings};
+use sdg_ros2_node::{CameraPoseSource, GraspSettings, Settings};
 
 use super::args::Ros2Args;
 use super::teaching::{teach, trigger_job};
@@ -29,14 +29,14 @@ pub(super) fn node_settings(args: &Ros2Args, interrupt: &Interrupt) -> Result<Se
     if args.table_height_mm.is_some() && args.base_frame.is_none() {
         return Err(Usage("--table-height-mm: expected --base-frame, in which it is".to_owned()).into());
     }
-    let place = match (&args.base_frame, &args.camera) {
+    let camera_pose = match (&args.base_frame, &args.camera) {
         (Some(base_frame), camera) => {
             let of_workcell = match &args.arm.workcell {
                 Some(path) => Some(read_workcell(path)?.0.table_height_m),
                 None => None,
             };
             let told_m = args.table_height_mm.map(|height_mm| height_mm * 1e-3);
-            PlaceSource::Transforms {
+            CameraPoseSource::Transforms {
                 base_frame: base_frame.clone(),
                 table_height_m: told_m.or(of_workcell).unwrap_or(0.0),
                 intrinsics: camera.as_deref().map(CameraFile::read_intrinsics).transpose()?,
@@ -44,12 +44,13 @@ pub(super) fn node_settings(args: &Ros2Args, interrupt: &Interrupt) -> Result<Se
         }
         // A camera on the hand has no place of its own: its pictures are searched for the grasp alone.
         (None, Some(path)) if args.arm.allow_motion => {
-            CameraFile::read(path).map_or(PlaceSource::Unknown, |camera| PlaceSource::File(camera.over_table))
+            CameraFile::read(path).map_or(CameraPoseSource::Unknown, |camera| CameraPoseSource::File(camera.over_table))
         }
-        (None, Some(path)) => PlaceSource::File(CameraFile::read(path)?.over_table),
-        (None, None) => PlaceSource::Unknown,
+        (None, Some(path)) => CameraPoseSource::File(CameraFile::read(path)?.over_table),
+        (None, None) => CameraPoseSource::Unknown,
     };
-    if let (Some(model), false, Some(path)) = (&model, matches!(place, PlaceSource::Unknown), args.grasp_model.as_ref())
+    if let (Some(model), false, Some(path)) =
+        (&model, matches!(camera_pose, CameraPoseSource::Unknown), args.grasp_model.as_ref())
         && model.facts().lengths.is_none()
     {
         return Err(anyhow::Error::new(GraspError::NoLengths).context(path.display().to_string()));
@@ -58,7 +59,7 @@ pub(super) fn node_settings(args: &Ros2Args, interrupt: &Interrupt) -> Result<Se
     Ok(Settings {
         model,
         device,
-        place,
+        camera_pose,
         max_transform_age_secs: args.max_transform_age_secs,
         min_score: args.min_score,
         queue: args.queue as usize,
@@ -80,7 +81,7 @@ pub(super) fn grasp_settings(args: &Ros2Args) -> Result<GraspSettings> {
     robots::pace(args.arm.speed)?;
     let camera_path = args.camera.clone().or(camera_of_workcell).ok_or_else(|| needed("--camera"))?;
     let (calibrated, _) = camera_files::read(&camera_path)?;
-    let camera = camera_files::placed(&calibrated, &workcell, &camera_path)?;
+    let camera = camera_files::mounted(&calibrated, &workcell, &camera_path)?;
     let base_frame = args.base_frame.clone().unwrap_or_else(|| "panda_link0".to_owned());
     let told = args.arm.height.told(workcell.table_height_m);
     Ok(GraspSettings { workcell, camera, told, speed: args.arm.speed, base_frame })

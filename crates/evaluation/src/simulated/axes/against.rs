@@ -25,7 +25,7 @@ pub const ALL_WITH_PART: &str = "all with the part";
 
 /// A model in two runs, on the same pictures.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Comparison {
+pub struct RunDifference {
     pub group: PartGroup,
     /// The axis' name, or [`ALL_WITH_PART`].
     pub axis: &'static str,
@@ -68,7 +68,7 @@ impl Against {
     ///
     /// # Errors
     /// Records that cannot be read, and those of other pictures.
-    pub fn compare(&self, evaluation: &AxesEvaluation) -> Result<Vec<Comparison>> {
+    pub fn compare(&self, evaluation: &AxesEvaluation) -> Result<Vec<RunDifference>> {
         let mut comparisons = Vec::new();
         for group in PartGroup::ALL {
             for &model in evaluation.models {
@@ -79,9 +79,9 @@ impl Against {
                         if axis != Axis::LookAlikes {
                             with_part = with_part + counts;
                         }
-                        comparisons.extend(Comparison::new(group, axis.name(), model, way, counts));
+                        comparisons.extend(RunDifference::new(group, axis.name(), model, way, counts));
                     }
-                    comparisons.extend(Comparison::new(group, ALL_WITH_PART, model, way, with_part));
+                    comparisons.extend(RunDifference::new(group, ALL_WITH_PART, model, way, with_part));
                 }
             }
         }
@@ -134,7 +134,7 @@ impl Against {
     }
 }
 
-impl Comparison {
+impl RunDifference {
     /// `None` of no cases.
     fn new(group: PartGroup, axis: &'static str, model: ModelKind, way: Way, counts: PairedCounts) -> Option<Self> {
         Some(Self {
@@ -152,11 +152,11 @@ impl Comparison {
 }
 
 /// The comparisons as one table for each group of parts.
-pub fn comparison_tables(comparisons: &[Comparison], against: &str) -> Vec<Titled> {
+pub fn difference_tables(comparisons: &[RunDifference], against: &str) -> Vec<Titled> {
     PartGroup::ALL
         .into_iter()
         .filter_map(|group| {
-            let rows: Vec<&Comparison> = comparisons.iter().filter(|comparison| comparison.group == group).collect();
+            let rows: Vec<&RunDifference> = comparisons.iter().filter(|comparison| comparison.group == group).collect();
             (!rows.is_empty()).then(|| Titled {
                 title: format!("{}: against {against}", group.title()),
                 lead: "Both runs on the same pictures; right is an instance found or a look-alike refused. The interval of \
@@ -187,7 +187,7 @@ fn header() -> Table {
     ])
 }
 
-impl Comparison {
+impl RunDifference {
     fn row(&self) -> Vec<TableCell> {
         let share = |share: Share| TableCell::text(share.to_string());
         let [low, high] = self.interval.map(|bound| 100.0 * bound);

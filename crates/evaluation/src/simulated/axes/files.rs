@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use serde_json::json;
 
-use super::against::{Comparison, comparison_tables};
+use super::against::{RunDifference, difference_tables};
 use super::page::page;
 use super::summary::AxesSummary;
 use super::tables::markdown;
@@ -22,7 +22,7 @@ impl AxesSummary {
         &self,
         store: &Store,
         jobs: usize,
-        (comparisons, other): (&[Comparison], Option<&Path>),
+        (comparisons, other): (&[RunDifference], Option<&Path>),
         command: &str,
         report_folder: &Path,
     ) -> Result<[PathBuf; 2]> {
@@ -36,7 +36,7 @@ impl AxesSummary {
             ("version", format!("sdg {}", env!("CARGO_PKG_VERSION"))),
         ];
         let other = other.map(|folder| folder.display().to_string()).unwrap_or_default();
-        let more = || comparison_tables(comparisons, &other);
+        let more = || difference_tables(comparisons, &other);
         store.write_bytes("axes.md", markdown(self, more(), &facts, command).as_bytes())?;
         let json = json!({ "summary": self, "against": comparisons, "machine": machine(), "command": command });
         store.write_bytes("axes.json", format!("{json:#}\n").as_bytes())?;

@@ -1,6 +1,6 @@
 //! Axes in a few lines, for people.
 
-use super::against::Comparison;
+use super::against::RunDifference;
 use super::summary::AxesSummary;
 use super::way::Way;
 
@@ -44,7 +44,7 @@ pub fn summary_lines(summary: &AxesSummary) -> String {
 }
 
 /// A line for each comparison.
-pub fn comparison_lines(comparisons: &[Comparison]) -> String {
+pub fn difference_lines(comparisons: &[RunDifference]) -> String {
     let mut text = String::new();
     let mut line = |line: String| text += &(line + "\n");
     for comparison in comparisons {

@@ -27,8 +27,8 @@ mod units;
 mod way;
 mod work;
 
-pub use against::{ALL_WITH_PART, Against, Comparison, comparison_tables};
-pub use lines::{comparison_lines, summary_lines};
+pub use against::{ALL_WITH_PART, Against, RunDifference, difference_tables};
+pub use lines::{difference_lines, summary_lines};
 pub(super) use matching::match_one_to_one;
 pub use page::page;
 pub use paired::PairedCounts;

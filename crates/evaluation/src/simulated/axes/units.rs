@@ -97,13 +97,13 @@ impl AxesEvaluation<'_> {
     pub(super) fn tasks(&self) -> Result<Vec<Task<Unit<'_>>>> {
         let mut tasks = Vec::new();
         for object in self.objects {
-            let mut plan = Plan { evaluation: self, object, teachings: Vec::new(), tasks: &mut tasks };
+            let mut list = TaskList { evaluation: self, object, teachings: Vec::new(), tasks: &mut tasks };
             for &axis in &self.selection.axes {
-                plan.add_pictures(axis)?;
+                list.add_pictures(axis)?;
             }
             for &condition in &self.selection.conditions {
                 for model in self.grasping_models() {
-                    plan.add_grasps(model, condition)?;
+                    list.add_grasps(model, condition)?;
                 }
             }
         }
@@ -112,7 +112,7 @@ impl AxesEvaluation<'_> {
 }
 
 /// The tasks of one part, as they are listed.
-struct Plan<'e, 't> {
+struct TaskList<'e, 't> {
     evaluation: &'e AxesEvaluation<'e>,
     object: &'e ObjectSpec,
     /// Networks that are taught, and the index of the task that does it.
@@ -120,7 +120,7 @@ struct Plan<'e, 't> {
     tasks: &'t mut Vec<Task<Unit<'e>>>,
 }
 
-impl<'e> Plan<'e, '_> {
+impl<'e> TaskList<'e, '_> {
     fn cell(&self, model: ModelKind) -> Cell<'e> {
         Cell { model, object: &self.object.name }
     }
@@ -177,7 +177,7 @@ impl std::fmt::Display for Unit<'_> {
         match self {
             Self::Teach(cell, Marks::Shipped) => write!(f, "teach {} {}", cell.model, cell.object),
             Self::Teach(cell, Marks::Jittered) => write!(f, "teach {} {} from jittered marks", cell.model, cell.object),
-            Self::Teach(cell, Marks::InPlanView) => write!(f, "teach {} {} in the plan view", cell.model, cell.object),
+            Self::Teach(cell, Marks::InPlanView) => write!(f, "teach {} {} in the list view", cell.model, cell.object),
             Self::Pictures(object, axis) => write!(f, "{axis} {}", object.name),
             Self::Grasps(cell, _, condition) => write!(f, "grasp {} {}, {}", cell.model, cell.object, condition.name()),
         }

@@ -8,9 +8,9 @@ use sdg_weights_conversion::sha256_of;
 
 use super::super::settings::difference;
 use super::super::units::Evaluation;
-use super::plan::PlannedUnit;
 use super::records::Receipt;
 use super::unit_folder::{UnitFolder, UnitState};
+use super::unit_list::ListedUnit;
 
 /// The right to make the tables of a folder, until it is dropped.
 #[derive(Debug)]
@@ -30,7 +30,7 @@ impl Collecting {
 ///
 /// # Errors
 /// Records that cannot be read.
-pub fn faults(evaluation: &Evaluation, units: &[PlannedUnit]) -> Result<Vec<String>> {
+pub fn faults(evaluation: &Evaluation, units: &[ListedUnit]) -> Result<Vec<String>> {
     let folder = evaluation.store.folder();
     let mut faults = Vec::new();
     for unit in units {
@@ -63,7 +63,7 @@ fn why_missing(state: &UnitState) -> String {
 }
 
 /// What of a unit's results is not as its receipt says, or not of these settings and this program.
-fn stale(evaluation: &Evaluation, unit: &PlannedUnit, receipt: &Receipt) -> Result<Option<String>> {
+fn stale(evaluation: &Evaluation, unit: &ListedUnit, receipt: &Receipt) -> Result<Option<String>> {
     if let Some(difference) = difference(&evaluation.settings_of(unit)?, &receipt.settings)? {
         return Ok(Some(format!("stale: done with other settings ({difference})")));
     }

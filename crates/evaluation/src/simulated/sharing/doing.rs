@@ -14,9 +14,9 @@ use super::super::one_unit::caught;
 use super::super::schedule::{Task, run_all};
 use super::super::settings::difference;
 use super::super::units::{Evaluation, Unit};
-use super::plan::{PlannedUnit, Work};
 use super::records::{Failure, Receipt};
 use super::unit_folder::UnitFolder;
+use super::unit_list::{ListedUnit, Work};
 use super::worker::Worker;
 use crate::error::EvaluationError;
 
@@ -37,9 +37,9 @@ impl Evaluation<'_> {
     ///
     /// # Errors
     /// What the unit fails with; a unit that waits for another one; one done with other settings.
-    pub fn do_planned(
+    pub fn do_listed(
         &self,
-        unit: &PlannedUnit,
+        unit: &ListedUnit,
         threads: usize,
         is_interrupted: &(dyn Fn() -> bool + Sync),
         told: &dyn Fn(&str),
@@ -98,7 +98,7 @@ impl Evaluation<'_> {
     }
 
     /// What a unit's files depend on.
-    pub(super) fn settings_of(&self, unit: &PlannedUnit) -> Result<Value> {
+    pub(super) fn settings_of(&self, unit: &ListedUnit) -> Result<Value> {
         let settings = self.store.settings();
         Ok(match unit.work {
             Work::Unit(Unit::Teach(_)) => serde_json::to_value(settings.teaching())?,
@@ -107,7 +107,7 @@ impl Evaluation<'_> {
     }
 
     /// A unit that waits for another one has nothing to work with.
-    fn check_after(&self, unit: &PlannedUnit) -> Result<()> {
+    fn check_after(&self, unit: &ListedUnit) -> Result<()> {
         let folder = self.store.folder();
         for before in &unit.after {
             if UnitFolder::of(folder, before).read()?.receipts.is_empty() {
@@ -123,7 +123,7 @@ impl Evaluation<'_> {
 
     fn do_work(
         &self,
-        unit: &PlannedUnit,
+        unit: &ListedUnit,
         threads: usize,
         is_interrupted: &(dyn Fn() -> bool + Sync),
     ) -> Result<Option<String>> {
@@ -144,7 +144,7 @@ impl Evaluation<'_> {
     }
 
     /// The files that a unit wrote, with their hashes.
-    fn written_by(&self, unit: &PlannedUnit) -> Result<BTreeMap<String, String>> {
+    fn written_by(&self, unit: &ListedUnit) -> Result<BTreeMap<String, String>> {
         let mut written = BTreeMap::new();
         for file in &unit.files {
             let path = self.store.path(file);

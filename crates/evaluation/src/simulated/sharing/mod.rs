@@ -1,7 +1,7 @@
 //! An evaluation's units done by many processes, on as many machines as see one folder: Slurm's job arrays, or a person.
 //!
 //! ```text
-//! planned_units ─ names ─┬─ --unit NAME …  ─ UnitFolder: lock, running, receipt or failure ─ Store (shared)
+//! all_units ─ names ─┬─ --unit NAME …  ─ UnitFolder: lock, running, receipt or failure ─ Store (shared)
 //!                        ├─ --watch DIR    ─ Watch: done, running, failed, waiting, time left
 //!                        └─ --collect      ─ faults, or the tables of the ordinary run
 //! DIR/plans/HASH.json            which units there are, for --watch
@@ -20,19 +20,19 @@
 mod checking;
 mod doing;
 mod near_names;
-mod plan;
 mod records;
 mod slurm;
 mod unit_folder;
+mod unit_list;
 mod watching;
 mod worker;
 
 pub use checking::{Collecting, faults};
 pub use doing::Ended;
 pub use near_names::near_names;
-pub use plan::{PlannedUnit, SavedPlan, UnitKind, planned_units};
 pub use records::{Failure, Receipt, Running};
 pub use slurm::{SlurmJob, cores, submit_script};
 pub use unit_folder::UnitFolder;
+pub use unit_list::{ListedUnit, UnitKind, UnitList, all_units};
 pub use watching::{Progress, Watch};
 pub use worker::{Worker, own_sha256};

@@ -7,7 +7,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use super::plan::{PlannedUnit, UnitKind};
+use super::unit_list::{ListedUnit, UnitKind};
 use super::worker::{Worker, unix_secs};
 
 /// What one task runs.
@@ -30,7 +30,7 @@ pub struct SlurmJob<'a> {
 }
 
 /// The script.
-pub fn submit_script(job: &SlurmJob, units: &[PlannedUnit]) -> String {
+pub fn submit_script(job: &SlurmJob, units: &[ListedUnit]) -> String {
     let folder = quoted(&job.folder.display().to_string());
     let host = Worker::this().host;
     let marker = format!("submitted-{}-{}", unix_secs(), std::process::id());
@@ -67,7 +67,7 @@ pub fn submit_script(job: &SlurmJob, units: &[PlannedUnit]) -> String {
         ("time", &[UnitKind::Time], " --exclusive"),
     ];
     for (list, kinds, alone) in arrays {
-        let is_in_list = |unit: &&PlannedUnit| UnitKind::of(&unit.name).is_some_and(|kind| kinds.contains(&kind));
+        let is_in_list = |unit: &&ListedUnit| UnitKind::of(&unit.name).is_some_and(|kind| kinds.contains(&kind));
         let names: Vec<&str> = units.iter().filter(is_in_list).map(|unit| unit.name.as_str()).collect();
         if names.is_empty() {
             continue;
@@ -109,7 +109,7 @@ pub fn cores() -> usize {
 
 #[cfg(test)]
 mod tests {
-    use super::super::plan::planned_units;
+    use super::super::unit_list::all_units;
     use super::*;
     use sdg_grasp::ModelKind;
     use sdg_simulation::objects::ObjectSpec;
@@ -117,7 +117,7 @@ mod tests {
     #[test]
     fn arrays_wait_for_each_other() {
         let objects = ["pendulum", "rod_end"].map(|name| ObjectSpec::by_name(name).unwrap());
-        let units = planned_units(&[ModelKind::S, ModelKind::C], &objects, false);
+        let units = all_units(&[ModelKind::S, ModelKind::C], &objects, false);
         let command = ["/opt/a program/sdg", "evaluate", "--seed", "3"].map(str::to_owned);
         let job = SlurmJob {
             command: &command,
@@ -145,8 +145,8 @@ mod tests {
     #[test]
     fn long_lists_are_several_arrays() {
         let objects = [ObjectSpec::by_name("pendulum").unwrap()];
-        let one = planned_units(&[ModelKind::S], &objects, false);
-        let many: Vec<_> = (0..2500).map(|i| PlannedUnit { name: format!("teach-S-{i}"), ..one[0].clone() }).collect();
+        let one = all_units(&[ModelKind::S], &objects, false);
+        let many: Vec<_> = (0..2500).map(|i| ListedUnit { name: format!("teach-S-{i}"), ..one[0].clone() }).collect();
         let job =
             SlurmJob { command: &[], folder: Path::new("/shared"), cores: 1, memory_mb: 1, limit_mins: 1, sbatch: &[] };
         let script = submit_script(&job, &many);

@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use anyhow::{Result, bail};
 use serde::Serialize;
 
-use super::plan::{SavedPlan, SavedUnit, UnitKind};
 use super::unit_folder::UnitFolder;
+use super::unit_list::{SavedUnit, UnitKind, UnitList};
 use super::worker::{Worker, unix_secs};
 
 /// After so many failures nobody tries again: a job of Slurm's is put back once.
@@ -69,7 +69,7 @@ impl Watch {
     /// # Errors
     /// A folder without units.
     pub fn new(folder: &Path) -> Result<Self> {
-        if SavedPlan::read_all(folder)?.units.is_empty() {
+        if UnitList::read_all(folder)?.units.is_empty() {
             bail!("{}: expected a folder in which units of an evaluation are done, found no plan", folder.display());
         }
         Ok(Self { folder: folder.to_owned(), done: HashMap::new() })
@@ -80,7 +80,7 @@ impl Watch {
     /// # Errors
     /// Records that cannot be read.
     pub fn progress(&mut self) -> Result<Progress> {
-        let plan = SavedPlan::read_all(&self.folder)?;
+        let plan = UnitList::read_all(&self.folder)?;
         let (mut running, mut failed, mut waiting) = (Vec::new(), Vec::new(), Vec::new());
         for unit in &plan.units {
             if self.done.contains_key(&unit.name) {
@@ -132,7 +132,7 @@ impl Watch {
     }
 
     /// What is left takes as long as units of its kind took, or as all took where none of its kind is done.
-    fn seconds_left(&self, plan: &SavedPlan, running: usize) -> Option<f64> {
+    fn seconds_left(&self, plan: &UnitList, running: usize) -> Option<f64> {
         let mean = |kind: Option<UnitKind>| {
             let of_kind = self.done.iter().filter(|(name, _)| kind.is_none() || UnitKind::of(name) == kind);
             let seconds: Vec<f64> = of_kind.map(|(_, seconds)| *seconds).collect();

@@ -2,8 +2,8 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use super::*;
 use crate::collision::{Body, Capsule, Obstacle, Shape};
+use crate::geometry::pose_error;
 use crate::joints::ready_pose;
-use crate::panda::pose_error;
 use crate::test_poses::top_grasp;
 
 fn obstacle(name: &str, shape: Shape, at: [f64; 3]) -> Obstacle {
@@ -20,22 +20,23 @@ fn wall() -> Obstacle {
 }
 
 fn cell(obstacles: Vec<Obstacle>) -> CollisionModel {
-    CollisionModel::new(obstacles, 0.08).unwrap()
+    CollisionModel::new(&ArmGeometry::panda(), obstacles, 0.08).unwrap()
 }
 
 /// On one side of the wall, the hand low.
 fn start() -> JointVector {
     let pose = top_grasp(0.5, 0.3, 0.15, 0.0);
-    Panda::new().inverse(&pose, &ready_pose(), &Default::default()).unwrap().q
+    ArmGeometry::panda().inverse(&pose, &ready_pose(), &Default::default()).unwrap().q
 }
 
 fn plan(model: &CollisionModel, goals: &[Isometry3<f64>], seed: u64) -> Result<Plan, PlanError> {
     let options = PlanOptions { seed, max_checks: 200_000, ..PlanOptions::default() };
-    Panda::new().plan(model, &start(), goals, None, &options)
+    ArmGeometry::panda().plan(model, &start(), goals, None, &options)
 }
 
 fn motions(plan: &Plan) -> Vec<Trajectory> {
-    plan.trajectories(&JointLimits::franka(), &CartesianLimits::franka(), &ArmDynamics::panda(0.08)).unwrap()
+    plan.trajectories(&JointLimits::panda(), &CartesianLimits::panda(), &ArmDynamics::new(&ArmGeometry::panda(), 0.08))
+        .unwrap()
 }
 
 #[test]
@@ -44,7 +45,8 @@ fn corners_are_round_free_and_quicker_than_stops() {
     const MIN_SAVED_SECS: f64 = 0.1;
     let model = cell(vec![table(), wall()]);
     let goal = top_grasp(0.5, -0.3, 0.15, 0.0);
-    let (joints, cartesian, dynamics) = (JointLimits::franka(), CartesianLimits::franka(), ArmDynamics::panda(0.08));
+    let (joints, cartesian, dynamics) =
+        (JointLimits::panda(), CartesianLimits::panda(), ArmDynamics::new(&ArmGeometry::panda(), 0.08));
     let (mut num_corners, mut num_stops) = (0, 0);
     for seed in 0..5 {
         let found = plan(&model, &[goal], seed).unwrap();
@@ -78,13 +80,13 @@ fn corners_are_round_free_and_quicker_than_stops() {
 #[test]
 fn a_plan_that_stays_where_it_is_has_no_motion() {
     let model = cell(vec![table()]);
-    let found = Panda::new().plan_to(&model, &start(), &[start()], &PlanOptions::default()).unwrap();
+    let found = ArmGeometry::panda().plan_to(&model, &start(), &[start()], &PlanOptions::default()).unwrap();
     assert!(found.ways.is_empty() && motions(&found).is_empty());
 }
 
 #[test]
 fn a_way_leads_over_the_wall_and_touches_nothing() {
-    let panda = Panda::new();
+    let panda = ArmGeometry::panda();
     let model = cell(vec![table(), wall()]);
     let goal = top_grasp(0.5, -0.3, 0.15, 0.0);
     let mut costs = Vec::new();
@@ -123,7 +125,7 @@ fn an_approach_ends_at_the_grasp_and_may_touch_what_is_allowed() {
     let grasp = top_grasp(0.5, -0.3, 0.03, 0.0);
     let with = |model: &CollisionModel, on_approach: &CollisionModel| {
         let approach = StraightApproach { length_m: 0.1, model: on_approach };
-        Panda::new().plan(model, &start(), &[grasp], Some(&approach), &PlanOptions::default())
+        ArmGeometry::panda().plan(model, &start(), &[grasp], Some(&approach), &PlanOptions::default())
     };
     let mut allowed = model.clone();
     allowed.allow(Body::HAND, "part").unwrap();
@@ -131,13 +133,14 @@ fn an_approach_ends_at_the_grasp_and_may_touch_what_is_allowed() {
     let path = found.approach.as_ref().unwrap();
     assert!((path.distance_m() - 0.1).abs() < 1e-9);
     assert_eq!(path.start(), &found.waypoints[found.waypoints.len() - 1]);
-    assert!(pose_error(&Panda::new().forward(path.end()), &grasp).norm() < 1e-8);
+    assert!(pose_error(&ArmGeometry::panda().forward(path.end()), &grasp).norm() < 1e-8);
     // A plate over the part, between the fingers' way and the part.
     let plate = obstacle("plate", Shape::Box { half_m: [0.06, 0.06, 0.003] }, [0.5, -0.3, 0.1]);
     let mut covered = cell(vec![table(), plate, model.obstacles()[2].clone()]);
     covered.allow(Body::HAND, "part").unwrap();
     let approach = StraightApproach { length_m: 0.2, model: &covered };
-    let error = Panda::new().plan(&covered, &start(), &[grasp], Some(&approach), &PlanOptions::default()).unwrap_err();
+    let error =
+        ArmGeometry::panda().plan(&covered, &start(), &[grasp], Some(&approach), &PlanOptions::default()).unwrap_err();
     let text = error.to_string();
     assert!(matches!(error, PlanError::ApproachBlocked { share, .. } if share > 0.2 && share < 0.9), "{text}");
     assert!(text.contains("the hand is") && text.contains("plate"), "{text}");
@@ -148,10 +151,10 @@ fn a_held_part_is_carried_around_obstacles() {
     let goal = top_grasp(0.5, -0.3, 0.3, 0.0);
     let shelf = obstacle("shelf", Shape::Box { half_m: [0.25, 0.6, 0.01] }, [0.55, -0.3, 0.19]);
     let mut model = cell(vec![table(), shelf]);
-    let free = Panda::new().plan(&model, &ready_pose(), &[goal], None, &PlanOptions::default());
+    let free = ArmGeometry::panda().plan(&model, &ready_pose(), &[goal], None, &PlanOptions::default());
     assert!(free.is_ok(), "{free:?}");
     model.hold(&[Capsule::new([0.0, 0.0, 0.0], [0.0, 0.0, 0.15], 0.02)]).unwrap();
-    let error = Panda::new().plan(&model, &ready_pose(), &[goal], None, &PlanOptions::default()).unwrap_err();
+    let error = ArmGeometry::panda().plan(&model, &ready_pose(), &[goal], None, &PlanOptions::default()).unwrap_err();
     assert!(error.to_string().contains("the held part is") && error.to_string().contains("shelf"), "{error}");
 }
 
@@ -160,7 +163,7 @@ fn bad_input_is_named() {
     let goal = top_grasp(0.5, -0.3, 0.15, 0.0);
     let empty = cell(vec![table()]);
     let refused = |model: &CollisionModel, start: &JointVector, goals: &[Isometry3<f64>]| {
-        Panda::new().plan(model, start, goals, None, &PlanOptions::default()).unwrap_err().to_string()
+        ArmGeometry::panda().plan(model, start, goals, None, &PlanOptions::default()).unwrap_err().to_string()
     };
     let ball = |at| cell(vec![table(), obstacle("ball", Shape::Capsule { radius_m: 0.1, half_length_m: 0.0 }, at)]);
 
@@ -188,7 +191,7 @@ fn bad_input_is_named() {
     assert!(refused(&empty, &start(), &[]).contains("at least one goal"));
     for (margin_m, name) in [(0.0, "margin_m"), (f64::NAN, "margin_m"), (1.0, "margin_m")] {
         let options = PlanOptions { margin_m, ..PlanOptions::default() };
-        let error = Panda::new().plan(&empty, &start(), &[goal], None, &options).unwrap_err();
+        let error = ArmGeometry::panda().plan(&empty, &start(), &[goal], None, &options).unwrap_err();
         assert!(error.to_string().contains(name), "{error}");
     }
 }
@@ -197,7 +200,7 @@ fn bad_input_is_named() {
 fn obstacles_that_make_no_sense_are_refused() {
     let refused = |shape, pose: Isometry3<f64>| {
         let obstacle = Obstacle { name: "box".to_owned(), shape, base_from_obstacle: pose };
-        CollisionModel::new(vec![obstacle], 0.08).unwrap_err().to_string()
+        CollisionModel::new(&ArmGeometry::panda(), vec![obstacle], 0.08).unwrap_err().to_string()
     };
     let one = Isometry3::identity();
     assert!(
@@ -205,9 +208,9 @@ fn obstacles_that_make_no_sense_are_refused() {
     );
     assert!(refused(Shape::Cylinder { radius_m: -0.1, half_length_m: 1.0 }, one).contains("found -0.1"));
     assert!(refused(Shape::Plane, Isometry3::translation(f64::NAN, 0.0, 0.0)).contains("must be finite"));
-    let twice = CollisionModel::new(vec![table(), table()], 0.08).unwrap_err().to_string();
+    let twice = CollisionModel::new(&ArmGeometry::panda(), vec![table(), table()], 0.08).unwrap_err().to_string();
     assert!(twice.contains("named \"table\""), "{twice}");
-    assert!(CollisionModel::new(Vec::new(), f64::NAN).is_err());
+    assert!(CollisionModel::new(&ArmGeometry::panda(), Vec::new(), f64::NAN).is_err());
 }
 
 #[test]

@@ -9,7 +9,7 @@ use sdg_kinematics::{JointLimits, NUM_JOINTS, Trajectory, ready_pose};
 /// The pace of rehearsals, the fastest that there is.
 fn motion() -> CheckedMotion {
     let end = ready_pose() + JointVector::from([0.8, 0.2, -0.3, 0.3, 0.4, -0.2, 0.9]);
-    let limits = JointLimits::franka().scaled(0.6, 0.4, 0.2).unwrap();
+    let limits = JointLimits::panda().scaled(0.6, 0.4, 0.2).unwrap();
     SafetyLimits::default().check(Trajectory::point_to_point(&ready_pose(), &end, &limits).unwrap()).unwrap()
 }
 

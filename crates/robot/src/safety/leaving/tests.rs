@@ -1,7 +1,7 @@
 use super::*;
 use crate::safety::WorkspaceBox;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
-use sdg_kinematics::{CartesianLimits, IkOptions, JointLimits, LineOptions, ready_pose};
+use sdg_kinematics::{ArmGeometry, CartesianLimits, IkOptions, JointLimits, LineOptions, ready_pose};
 
 const AT_M: [f64; 2] = [0.45, 0.10];
 /// The finger tips reach 4 mm below the tcp, and 1 mm is to be left: from here on the hand is lower than allowed.
@@ -18,7 +18,7 @@ fn tcp(x: f64, y: f64, z: f64) -> Isometry3<f64> {
 }
 
 fn at(x: f64, y: f64, z: f64) -> JointVector {
-    Panda::new().inverse(&tcp(x, y, z), &ready_pose(), &IkOptions::default()).unwrap().q
+    ArmGeometry::panda().inverse(&tcp(x, y, z), &ready_pose(), &IkOptions::default()).unwrap().q
 }
 
 fn felt(lowest_m: f64) -> FeltBelow {
@@ -26,16 +26,16 @@ fn felt(lowest_m: f64) -> FeltBelow {
 }
 
 fn line(start: &JointVector, to: &Isometry3<f64>) -> Trajectory {
-    let path = Panda::new().straight_path(start, to, &LineOptions::default()).unwrap();
-    let slow = CartesianLimits::franka().scaled(0.1, 0.1, 0.05).unwrap();
-    Trajectory::along_path(path, &JointLimits::franka(), &slow).unwrap()
+    let path = ArmGeometry::panda().straight_path(start, to, &LineOptions::default()).unwrap();
+    let slow = CartesianLimits::panda().scaled(0.1, 0.1, 0.05).unwrap();
+    Trajectory::along_path(path, &JointLimits::panda(), &slow).unwrap()
 }
 
 /// Whether a straight motion from one place of the tcp to another is allowed after a way down to `lowest_m`.
 fn check(felt: Option<&FeltBelow>, from: [f64; 3], to: [f64; 3]) -> Result<(), Violation> {
     let start = at(from[0], from[1], from[2]);
     let motion = line(&start, &tcp(to[0], to[1], to[2]));
-    limits().starting_at(&Panda::new(), &start, felt).check(motion).map(|_| ())
+    limits().starting_at(&start, felt).check(motion).map(|_| ())
 }
 
 #[test]
@@ -73,11 +73,11 @@ fn neither_sideways_nor_down_nor_from_elsewhere_nor_deeper_than_was_felt() {
 fn a_motion_down_to_where_something_was_felt_is_refused() {
     let ([x, y], lowest_m) = (AT_M, LOWEST_ALLOWED_M - 0.004);
     let (start, end) = (at(x, y, lowest_m), at(x, y, lowest_m));
-    let panda = Panda::new();
+    let panda = ArmGeometry::panda();
     let up = panda.inverse(&tcp(x, y, 0.05), &start, &IkOptions::default()).unwrap().q;
-    let slow = JointLimits::franka().scaled(0.1, 0.1, 0.1).unwrap();
+    let slow = JointLimits::panda().scaled(0.1, 0.1, 0.1).unwrap();
     // A motion down from above: its start is not below, so that nothing is lowered for it.
     let down = Trajectory::point_to_point(&up, &end, &slow).unwrap();
-    let error = limits().starting_at(&panda, &up, Some(&felt(lowest_m))).check(down).unwrap_err();
+    let error = limits().starting_at(&up, Some(&felt(lowest_m))).check(down).unwrap_err();
     assert!(matches!(error, Violation::Table { .. } | Violation::Workspace { .. }), "{error}");
 }

@@ -2,17 +2,17 @@ use super::*;
 use sdg_kinematics::{IkOptions, LineOptions, ready_pose};
 
 fn point_to_point(change: [f64; 7], scale: [f64; 3]) -> Trajectory {
-    let limits = JointLimits::franka().scaled(scale[0], scale[1], scale[2]).unwrap();
+    let limits = JointLimits::panda().scaled(scale[0], scale[1], scale[2]).unwrap();
     Trajectory::point_to_point(&ready_pose(), &(ready_pose() + JointVector::from(change)), &limits).unwrap()
 }
 
 fn straight_down(to_height_m: f64) -> Trajectory {
-    let panda = Panda::new();
+    let panda = ArmGeometry::panda();
     let mut base_from_tcp = panda.forward(&ready_pose());
     base_from_tcp.translation.z = to_height_m;
     let path = panda.straight_path(&ready_pose(), &base_from_tcp, &LineOptions::default()).unwrap();
-    let cartesian = CartesianLimits::franka().scaled(0.2, 0.1, 0.05).unwrap();
-    Trajectory::along_path(path, &JointLimits::franka(), &cartesian).unwrap()
+    let cartesian = CartesianLimits::panda().scaled(0.2, 0.1, 0.05).unwrap();
+    Trajectory::along_path(path, &JointLimits::panda(), &cartesian).unwrap()
 }
 
 #[test]
@@ -28,7 +28,7 @@ fn a_motion_within_every_limit_is_handed_on_as_it_is() {
 #[test]
 fn just_inside_passes_and_just_outside_is_refused() {
     let trajectory = point_to_point([0.4, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], [0.3, 0.2, 0.05]);
-    let planned = JointLimits::franka().scaled(0.3, 0.2, 0.05).unwrap();
+    let planned = JointLimits::panda().scaled(0.3, 0.2, 0.05).unwrap();
     let limits = |joints| SafetyLimits { joints, ..SafetyLimits::default() };
     assert!(limits(planned.clone()).check(trajectory.clone()).is_ok());
     type Lower = fn(&mut JointLimits);
@@ -51,7 +51,7 @@ fn just_inside_passes_and_just_outside_is_refused() {
 #[test]
 fn the_tcp_has_limits_of_its_own() {
     let trajectory = straight_down(0.20);
-    let planned = CartesianLimits::franka().scaled(0.2, 0.1, 0.05).unwrap();
+    let planned = CartesianLimits::panda().scaled(0.2, 0.1, 0.05).unwrap();
     let limits = |cartesian| SafetyLimits { cartesian, ..SafetyLimits::default() };
     // The path is a straight line between waypoints only: differences of 1 ms see its third derivative jump.
     let mut roomy = planned;
@@ -72,7 +72,7 @@ fn the_tcp_has_limits_of_its_own() {
         }
     }
     let turning = point_to_point([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.5], [0.9, 0.5, 0.2]);
-    let mut slow = CartesianLimits::franka();
+    let mut slow = CartesianLimits::panda();
     slow.angular_velocity_rad_s = 0.5;
     let found = limits(slow).check(turning).unwrap_err().to_string();
     assert!(found.contains("the angular velocity of the tcp is 0.5") && found.contains("rad/s"), "{found}");
@@ -98,7 +98,7 @@ fn table_and_workspace_stop_a_motion_before_it_begins() {
 #[test]
 fn an_arm_that_would_fold_onto_itself_is_stopped_before() {
     let folded = JointVector::from([0.0, -1.7, 0.0, -3.0, 0.0, 0.5, 0.0]);
-    let slow = JointLimits::franka().scaled(0.1, 0.1, 0.1).unwrap();
+    let slow = JointLimits::panda().scaled(0.1, 0.1, 0.1).unwrap();
     let trajectory = Trajectory::point_to_point(&ready_pose(), &folded, &slow).unwrap();
     let open = SafetyLimits { table_height_m: -2.0, ..SafetyLimits::default() };
     let found = open.check(trajectory).unwrap_err();
@@ -107,8 +107,8 @@ fn an_arm_that_would_fold_onto_itself_is_stopped_before() {
 
 #[test]
 fn motions_to_any_place_over_the_table_pass_at_the_default_speed() {
-    let (panda, limits) = (Panda::new(), SafetyLimits::default());
-    let slow = JointLimits::franka().scaled(0.1, 0.07, 0.04).unwrap();
+    let (panda, limits) = (ArmGeometry::panda(), SafetyLimits::default());
+    let slow = JointLimits::panda().scaled(0.1, 0.07, 0.04).unwrap();
     for (x, y, z) in [(0.3, -0.3, 0.4), (0.3, 0.3, 0.2), (0.65, 0.2, 0.1), (0.5, 0.0, 0.05), (0.65, -0.3, 0.3)] {
         let mut base_from_tcp = panda.forward(&ready_pose());
         base_from_tcp.translation = nalgebra::Translation3::new(x, y, z);
@@ -122,7 +122,7 @@ fn motions_to_any_place_over_the_table_pass_at_the_default_speed() {
 fn an_fr3_may_not_do_all_that_a_panda_may() {
     let to = |change: [f64; 7], scale| {
         let end = ready_pose() + JointVector::from(change);
-        Trajectory::point_to_point(&ready_pose(), &end, &JointLimits::franka().scaled(scale, scale, 0.1).unwrap())
+        Trajectory::point_to_point(&ready_pose(), &end, &JointLimits::panda().scaled(scale, scale, 0.1).unwrap())
     };
     // Joint 6 from 1.571 to 0.5 rad: an FR3's ends at 0.541, and must be slow before it; a Panda's ends at -0.018.
     let bent = to([0.0, 0.0, 0.0, 0.0, 0.0, -1.07, 0.0], 0.2).unwrap();
@@ -139,4 +139,27 @@ fn an_fr3_may_not_do_all_that_a_panda_may() {
     SafetyLimits::fr3().check(near_the_end(0.1)).unwrap();
     let refused = SafetyLimits::fr3().check(near_the_end(0.6)).unwrap_err();
     assert!(matches!(refused, Violation::Joint { quantity: "velocity", joint: 1, max, .. } if max < 2.0), "{refused}");
+}
+
+/// What the geometry says of an arm is what its robot holds its client to.
+#[test]
+fn geometry_and_protocol_have_the_same_limits() {
+    for (limits, velocity_m_s) in [(SafetyLimits::default(), 2.0), (SafetyLimits::fr3(), 3.0)] {
+        let (joints, tcp, robot) = (&limits.joints, &limits.cartesian, limits.robot.unwrap());
+        for (found, expected) in [
+            (joints.position_min, robot.q_min),
+            (joints.position_max, robot.q_max),
+            (joints.velocity_max, robot.velocity),
+            (joints.acceleration_max, robot.acceleration),
+            (joints.jerk_max, robot.jerk),
+            (joints.torque_max, robot.torque),
+        ] {
+            assert_eq!(found, JointVector::from(expected));
+        }
+        let (translation, rotation) = (robot.translation, robot.rotation);
+        assert_eq!((tcp.velocity_m_s, translation.velocity), (1.7, velocity_m_s));
+        assert_eq!((tcp.acceleration_m_s2, tcp.jerk_m_s3), (translation.acceleration, translation.jerk));
+        assert_eq!(tcp.angular_velocity_rad_s, rotation.velocity);
+        assert_eq!((tcp.angular_acceleration_rad_s2, tcp.angular_jerk_rad_s3), (rotation.acceleration, rotation.jerk));
+    }
 }

@@ -1,16 +1,17 @@
 //! The sequence with an arm that moves nothing and a part that is shown in some pictures and not in others.
 
 use nalgebra::UnitQuaternion;
-use sdg_kinematics::{Panda, ready_pose};
+use sdg_kinematics::{ArmGeometry, ready_pose};
 
 use super::*;
+use crate::camera_pose::CameraPose;
 use crate::height::ToldHeight;
 use crate::known_target::KnownTarget;
 use crate::perception::PartFinder;
 use crate::planned_arm::{PlannedAction, PlannedArm};
 use crate::robot::Robot;
 use crate::safety::SafetyLimits;
-use crate::sequence::{CameraMount, GraspConfig, GraspOutcome, GraspReport, grasp};
+use crate::sequence::{GraspConfig, GraspOutcome, GraspReport, grasp};
 use crate::watch::Watch;
 
 /// A part whose looks say another height than it has: by its lines of sight it lies where `known` does.
@@ -47,8 +48,12 @@ impl PartFinder<PlannedArm> for Shown {
 /// Marks 16 mm and grasp 9 mm over what the part lies on.
 const HEIGHTS_M: [f64; 2] = [0.016, 0.009];
 
-fn mount() -> CameraMount {
-    CameraMount::Hand { tcp_from_camera: Isometry3::translation(0.072, 0.0, -0.0534) }
+fn tcp_from_camera() -> Isometry3<f64> {
+    Isometry3::translation(0.072, 0.0, -0.0534)
+}
+
+fn camera() -> CameraPose {
+    CameraPose::OnFlange(ArmGeometry::panda().flange_from_tcp() * tcp_from_camera())
 }
 
 fn config(told: Option<ToldHeight>) -> GraspConfig {
@@ -65,16 +70,15 @@ fn part(higher_m: f64) -> GraspTarget {
 
 /// Grasps a part that lies 20 mm higher than the table and is seen 5 mm higher than it lies; the camera's places for the height.
 fn grasped(config: &GraspConfig, shows: &[bool], sees_surface: bool) -> (GraspReport, Vec<Vector3<f64>>, usize) {
-    let mut arm = PlannedArm::new(ready_pose(), 0.08);
+    let mut arm = PlannedArm::new(ArmGeometry::panda(), ready_pose(), 0.08);
     let mut robot = Robot::new(&mut arm, SafetyLimits::default(), Watch::default());
-    let known = KnownTarget::new(Some(part(0.020)), mount(), config);
+    let known = KnownTarget::new(Some(part(0.020)), camera(), config);
     let mut finder = Shown { known, seen: part(0.025), shows: shows.to_vec(), num_sights: 0, sees_surface };
-    let report = grasp(&mut robot, &mut finder, &mut (), mount(), config).unwrap();
+    let report = grasp(&mut robot, &mut finder, &mut (), camera(), config).unwrap();
     let num_sights = finder.num_sights;
-    let CameraMount::Hand { tcp_from_camera } = mount() else { unreachable!() };
     let places = arm.actions().iter().filter_map(|action| match action {
         PlannedAction::Motion(motion) => {
-            Some((Panda::new().forward(motion.end()) * tcp_from_camera).translation.vector)
+            Some((ArmGeometry::panda().forward(motion.end()) * tcp_from_camera()).translation.vector)
         }
         _ => None,
     });
@@ -151,11 +155,11 @@ fn parts_near_the_camera_are_told() {
 
 #[test]
 fn a_camera_beside_the_robot_measures_nothing() {
-    let mut arm = PlannedArm::new(ready_pose(), 0.08);
+    let mut arm = PlannedArm::new(ArmGeometry::panda(), ready_pose(), 0.08);
     let mut robot = Robot::new(&mut arm, SafetyLimits::default(), Watch::default());
     let look_outs = vec![crate::LookOut::Joints(ready_pose())];
     let config = GraspConfig { look_outs, ..config(None) };
-    let mut known = KnownTarget::new(Some(part(0.020)), CameraMount::Base, &config);
-    let report = grasp(&mut robot, &mut known, &mut (), CameraMount::Base, &config).unwrap();
+    let mut known = KnownTarget::new(Some(part(0.020)), CameraPose::InBase(Isometry3::identity()), &config);
+    let report = grasp(&mut robot, &mut known, &mut (), CameraPose::InBase(Isometry3::identity()), &config).unwrap();
     assert_eq!((report.outcome, report.height), (GraspOutcome::Held, None));
 }

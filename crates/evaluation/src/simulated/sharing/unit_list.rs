@@ -13,7 +13,7 @@ use super::super::cell::{Cell, Marks, attempts_of};
 use super::super::units::Unit;
 
 /// Larger than the plan of a hundred thousand units.
-const MAX_PLAN_BYTES: u64 = 64 << 20;
+const MAX_LIST_BYTES: u64 = 64 << 20;
 
 /// Which kind of work a unit is: the first word of its name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -62,7 +62,7 @@ pub(crate) enum Work<'a> {
 
 /// A unit of work under its name.
 #[derive(Debug, Clone)]
-pub struct PlannedUnit<'a> {
+pub struct ListedUnit<'a> {
     pub name: String,
     /// Names of the units that must be done before.
     pub after: Vec<String>,
@@ -72,7 +72,7 @@ pub struct PlannedUnit<'a> {
 }
 
 /// All units: teachings, pictures, grasps, grasps without the check, speed. Each stands behind those that it waits for.
-pub fn planned_units<'a>(models: &[ModelKind], objects: &'a [ObjectSpec], unverified: bool) -> Vec<PlannedUnit<'a>> {
+pub fn all_units<'a>(models: &[ModelKind], objects: &'a [ObjectSpec], unverified: bool) -> Vec<ListedUnit<'a>> {
     let mut networks: Vec<ModelKind> = Vec::new();
     for network in models.iter().map(|model| model.taught_as()) {
         if !networks.contains(&network) {
@@ -90,7 +90,7 @@ pub fn planned_units<'a>(models: &[ModelKind], objects: &'a [ObjectSpec], unveri
         for &model in &networks {
             let cell = Cell { model, object: &object.name };
             let files = vec![cell.model_file(Marks::Shipped), cell.teaching_file(Marks::Shipped)];
-            units.push(PlannedUnit {
+            units.push(ListedUnit {
                 name: teaching(cell),
                 after: Vec::new(),
                 files,
@@ -101,7 +101,7 @@ pub fn planned_units<'a>(models: &[ModelKind], objects: &'a [ObjectSpec], unveri
     for object in objects {
         let files = cells(object).flat_map(|cell| [cell.file("look"), cell.picture_file()]).collect();
         let work = Work::Unit(Unit::Look(object));
-        units.push(PlannedUnit { name: format!("look-{}", object.name), after: teachings(object), files, work });
+        units.push(ListedUnit { name: format!("look-{}", object.name), after: teachings(object), files, work });
     }
     for way in [Verification::ByShape, Verification::Off] {
         for object in objects {
@@ -111,7 +111,7 @@ pub fn planned_units<'a>(models: &[ModelKind], objects: &'a [ObjectSpec], unveri
                     Verification::Off => (unverified && cell.model.has_network(), "-unverified"),
                 };
                 if is_planned {
-                    units.push(PlannedUnit {
+                    units.push(ListedUnit {
                         name: format!("grasp-{cell}{suffix}"),
                         after: vec![teaching(cell)],
                         files: vec![cell.file(&attempts_of(way))],
@@ -124,27 +124,27 @@ pub fn planned_units<'a>(models: &[ModelKind], objects: &'a [ObjectSpec], unveri
     for object in objects {
         let files = cells(object).map(|cell| cell.file("speed")).collect();
         let (name, after) = (format!("time-{}", object.name), teachings(object));
-        units.push(PlannedUnit { name, after, files, work: Work::Time(object) });
+        units.push(ListedUnit { name, after, files, work: Work::Time(object) });
     }
     units
 }
 
 /// A plan as a folder keeps it, so that whoever watches need not know the arguments.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct SavedPlan {
+pub struct UnitList {
     pub units: Vec<SavedUnit>,
 }
 
-/// A unit of a [`SavedPlan`].
+/// A unit of a [`UnitList`].
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SavedUnit {
     pub name: String,
     pub after: Vec<String>,
 }
 
-impl SavedPlan {
-    pub fn new(units: &[PlannedUnit]) -> Self {
-        let saved = |unit: &PlannedUnit| SavedUnit { name: unit.name.clone(), after: unit.after.clone() };
+impl UnitList {
+    pub fn new(units: &[ListedUnit]) -> Self {
+        let saved = |unit: &ListedUnit| SavedUnit { name: unit.name.clone(), after: unit.after.clone() };
         Self { units: units.iter().map(saved).collect() }
     }
 
@@ -177,7 +177,7 @@ impl SavedPlan {
         }
         let mut known = std::collections::HashSet::new();
         for path in sdg_files::entries(&plans)? {
-            let plan: Self = serde_json::from_slice(&sdg_files::read(&path, MAX_PLAN_BYTES)?)
+            let plan: Self = serde_json::from_slice(&sdg_files::read(&path, MAX_LIST_BYTES)?)
                 .with_context(|| format!("{}: expected a plan of an evaluation", path.display()))?;
             all.units.extend(plan.units.into_iter().filter(|unit| known.insert(unit.name.clone())));
         }
@@ -201,7 +201,7 @@ mod tests {
     #[test]
     fn units_have_names_and_wait_for_their_teachings() {
         let objects = objects();
-        let units = planned_units(&[ModelKind::B, ModelKind::C, ModelKind::S], &objects, true);
+        let units = all_units(&[ModelKind::B, ModelKind::C, ModelKind::S], &objects, true);
         let listed: Vec<String> =
             units.iter().map(|unit| format!("{} < {}", unit.name, unit.after.join(" "))).collect();
         assert_eq!(
@@ -234,7 +234,7 @@ mod tests {
     #[test]
     fn no_two_units_write_one_file() {
         let objects = objects();
-        let units = planned_units(&ModelKind::ALL, &objects, true);
+        let units = all_units(&ModelKind::ALL, &objects, true);
         let mut files: Vec<&String> = units.iter().flat_map(|unit| &unit.files).collect();
         let all = files.len();
         files.sort_unstable();
@@ -245,12 +245,12 @@ mod tests {
     #[test]
     fn plans_of_a_folder_are_one() {
         let (folder, objects) = (tempfile::tempdir().unwrap(), objects());
-        assert!(SavedPlan::read_all(folder.path()).unwrap().units.is_empty());
-        let some = SavedPlan::new(&planned_units(&[ModelKind::S], &objects[..1], false));
-        let all = SavedPlan::new(&planned_units(&[ModelKind::S], &objects, false));
+        assert!(UnitList::read_all(folder.path()).unwrap().units.is_empty());
+        let some = UnitList::new(&all_units(&[ModelKind::S], &objects[..1], false));
+        let all = UnitList::new(&all_units(&[ModelKind::S], &objects, false));
         for plan in [&some, &all, &all] {
             plan.save(folder.path()).unwrap();
         }
-        assert_eq!(SavedPlan::read_all(folder.path()).unwrap().units.len(), all.units.len());
+        assert_eq!(UnitList::read_all(folder.path()).unwrap().units.len(), all.units.len());
     }
 }

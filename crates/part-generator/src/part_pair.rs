@@ -35,14 +35,14 @@ pub(crate) fn centroid(relief: &Relief) -> [f32; 2] {
 }
 
 /// Two parts, each with the place that the turn keeps.
-pub(crate) struct Comparison<'a> {
+pub(crate) struct PartPair<'a> {
     a: (&'a Relief, [f32; 2]),
     b: (&'a Relief, [f32; 2]),
     height_tolerance_mm: f32,
     same_material: Vec<bool>,
 }
 
-impl<'a> Comparison<'a> {
+impl<'a> PartPair<'a> {
     /// Compares `a` with `b`, whose centres lie on each other.
     pub fn new(a: &'a Relief, center_a: [f32; 2], b: &'a Relief, center_b: [f32; 2]) -> Self {
         let same_material = a
@@ -132,7 +132,7 @@ fn look_distance(one: &Material, other: &Material) -> f32 {
 
 /// Which turns about its middle leave a part looking as it was.
 pub(crate) fn symmetry(relief: &Relief, center: [f32; 2]) -> RotationalSymmetry {
-    let comparison = Comparison::new(relief, center, relief, center);
+    let comparison = PartPair::new(relief, center, relief, center);
     // Turns that no fold up to 40 has in common.
     if [7.0f32, 17.0, 31.0, 53.0, 101.0, 149.0].iter().all(|degrees| comparison.is_same(degrees.to_radians())) {
         return RotationalSymmetry::Full;
@@ -183,7 +183,7 @@ mod tests {
         let same = |holes: &[f32]| {
             let mirrored: Vec<f32> = holes.iter().map(|angle| 180.0 - angle).collect();
             let (one, other) = (disc(holes, metal()), disc(&mirrored, metal()));
-            Comparison::new(&one, centroid(&one), &other, centroid(&other)).is_same_at_some_turn()
+            PartPair::new(&one, centroid(&one), &other, centroid(&other)).is_same_at_some_turn()
         };
         assert!(same(&[0.0, 100.0]));
         assert!(!same(&[0.0, 60.0, 200.0]));

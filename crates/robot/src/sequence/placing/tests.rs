@@ -8,7 +8,7 @@ use crate::safety::{CheckedMotion, SafetyLimits};
 use crate::sequence::LookOut;
 use crate::watch::Watch;
 use sdg_kinematics::collision::{Obstacle, Shape};
-use sdg_kinematics::{Panda, ready_pose};
+use sdg_kinematics::{ArmGeometry, ready_pose};
 
 /// A planned arm whose part slides by so much in its own frame when the hand closes on it, and stays where it is let go.
 struct Cell {
@@ -22,11 +22,15 @@ struct Cell {
 
 impl Cell {
     fn tcp(&mut self) -> Isometry3<f64> {
-        Panda::new().forward(&self.arm.state().unwrap().q)
+        ArmGeometry::panda().forward(&self.arm.state().unwrap().q)
     }
 }
 
 impl Arm for Cell {
+    fn geometry(&self) -> &ArmGeometry {
+        self.arm.geometry()
+    }
+
     fn state(&mut self) -> Result<ArmState> {
         self.arm.state()
     }
@@ -93,7 +97,7 @@ fn lying(x: f64, y: f64, yaw_rad: f64) -> Isometry3<f64> {
 
 fn cell(slide: Isometry3<f64>) -> Cell {
     Cell {
-        arm: PlannedArm::new(ready_pose(), 0.08),
+        arm: PlannedArm::new(ArmGeometry::panda(), ready_pose(), 0.08),
         base_from_part: lying(0.5, 0.1, 0.4),
         slide,
         tcp_from_part: None,
@@ -117,9 +121,10 @@ fn config() -> GraspConfig {
     }
 }
 
-fn run(cell: &mut Cell, config: &GraspConfig, goal: &PlaceGoal, placing: &PlacingConfig) -> PlaceReport {
+fn run(cell: &mut Cell, config: &GraspConfig, goal: &PlaceGoal, placing: &PlacingConfig) -> PlacingReport {
     let mut robot = Robot::new(cell, SafetyLimits::default(), Watch::default());
-    grasp_and_place(&mut robot, &mut Truth, &mut (), CameraMount::Base, config, goal, placing).unwrap()
+    grasp_and_place(&mut robot, &mut Truth, &mut (), CameraPose::InBase(Isometry3::identity()), config, goal, placing)
+        .unwrap()
 }
 
 fn planar(x: f64, y: f64, angle_rad: f64) -> Isometry3<f64> {
@@ -132,7 +137,7 @@ fn a_part_lies_where_it_was_to_lie() {
         let mut cell = cell(Isometry3::identity());
         let goal = tray().goal(number).unwrap();
         let report = run(&mut cell, &config(), &goal, &PlacingConfig::default());
-        assert_eq!(report.outcome, PlaceOutcome::Placed, "{report:?}");
+        assert_eq!(report.outcome, PlacingOutcome::Placed, "{report:?}");
         assert_eq!(report.touched.len(), 1);
         let error = beside(&goal.base_from_part(0.02, 0.0), &cell.base_from_part, RotationalSymmetry::None);
         assert!(error.distance_m() < 1e-4 && error.angle_rad.abs() < 1e-4, "{error:?}");
@@ -148,13 +153,14 @@ fn a_part_that_slides_in_the_hand_is_taken_again_and_lies_right() {
     let mut cell = cell(slide);
     let goal = tray().goal(2).unwrap();
     let report = run(&mut cell, &config(), &goal, &PlacingConfig::default());
-    assert_eq!(report.outcome, PlaceOutcome::Placed, "{report:?}");
+    assert_eq!(report.outcome, PlacingOutcome::Placed, "{report:?}");
     assert_eq!(report.errors.len(), 2);
     assert!(report.errors[0].distance_m() > 0.004 && report.errors[1].distance_m() < 2e-4, "{report:?}");
     // Where it is not taken again it lies beside its place, and that is said.
     let mut once = super::tests::cell(slide);
     let never = PlacingConfig { max_corrections: 0, ..PlacingConfig::default() };
-    let PlaceOutcome::Failed { step: GraspStep::Check, why } = run(&mut once, &config(), &goal, &never).outcome else {
+    let PlacingOutcome::Failed { step: GraspStep::Check, why } = run(&mut once, &config(), &goal, &never).outcome
+    else {
         panic!("{:?}", once.base_from_part)
     };
     assert!(why.contains("5.1 mm and 4.6° beside its place, at most 3.0 mm and 3.0°"), "{why}");
@@ -167,7 +173,7 @@ fn turns_that_cannot_be_seen_do_not_count() {
     let placing = PlacingConfig { symmetry: RotationalSymmetry::Fold(2), ..PlacingConfig::default() };
     let goal = place.goal(1).unwrap();
     let report = run(&mut cell, &config(), &goal, &placing);
-    assert_eq!(report.outcome, PlaceOutcome::Placed, "{report:?}");
+    assert_eq!(report.outcome, PlacingOutcome::Placed, "{report:?}");
     let error = beside(&goal.base_from_part(0.0, 0.0), &cell.base_from_part, placing.symmetry);
     assert!(error.angle_rad.abs() < 1e-4, "{error:?}");
 }
@@ -177,7 +183,7 @@ fn where_nothing_is_felt_the_part_stays_in_the_hand() {
     let mut cell = cell(Isometry3::identity());
     cell.touches = false;
     let report = run(&mut cell, &config(), &tray().goal(1).unwrap(), &PlacingConfig::default());
-    let PlaceOutcome::Failed { step: GraspStep::PutDown, why } = &report.outcome else { panic!("{report:?}") };
+    let PlacingOutcome::Failed { step: GraspStep::PutDown, why } = &report.outcome else { panic!("{report:?}") };
     assert!(why.contains("nothing was felt") && why.contains("still held"), "{why}");
     assert_eq!(cell.loads_kg, [0.3]);
     assert!(matches!(cell.arm.actions().last(), Some(PlannedAction::Down { .. })), "{:?}", cell.arm.actions().last());
@@ -188,7 +194,7 @@ fn a_place_out_of_reach_is_said_before_the_part_is_carried() {
     let mut cell = cell(Isometry3::identity());
     let far = Place { at_m: [0.9, -0.6], ..tray() };
     let report = run(&mut cell, &config(), &far.goal(1).unwrap(), &PlacingConfig::default());
-    let PlaceOutcome::Failed { step: GraspStep::Carry, why } = &report.outcome else { panic!("{report:?}") };
+    let PlacingOutcome::Failed { step: GraspStep::Carry, why } = &report.outcome else { panic!("{report:?}") };
     assert!(why.contains("no way to \"tray, cell 1\"") && why.contains("out of reach"), "{why}");
 }
 
@@ -197,7 +203,7 @@ fn in_a_bin_a_part_lies_anyhow() {
     let bin = Place { kind: PlaceKind::Bin { size_m: [0.1, 0.1] }, ..tray() };
     let slid = planar(0.02, 0.0, 0.5);
     let report = run(&mut cell(slid), &config(), &bin.goal(1).unwrap(), &PlacingConfig::default());
-    assert_eq!(report.outcome, PlaceOutcome::Placed, "{report:?}");
+    assert_eq!(report.outcome, PlacingOutcome::Placed, "{report:?}");
     assert_eq!(report.errors.len(), 1);
 }
 
@@ -212,8 +218,9 @@ fn the_whole_sequence_goes_around_what_stands_in_the_cell() {
     let mut cell = cell(Isometry3::identity());
     let goal = tray().goal(1).unwrap();
     let report = run(&mut cell, &surrounded, &goal, &PlacingConfig::default());
-    assert_eq!(report.outcome, PlaceOutcome::Placed, "{report:?}");
-    let model = crate::surroundings::collision_model(-1.0, std::slice::from_ref(&wall), 0.08).unwrap();
+    assert_eq!(report.outcome, PlacingOutcome::Placed, "{report:?}");
+    let model =
+        crate::surroundings::collision_model(&ArmGeometry::panda(), -1.0, std::slice::from_ref(&wall), 0.08).unwrap();
     let mut checker = sdg_kinematics::collision::Checker::new(&model, 1e-3);
     let motions = cell.arm.actions().iter().filter_map(|action| match action {
         PlannedAction::Motion(motion) => Some(motion),
@@ -229,7 +236,7 @@ fn the_whole_sequence_goes_around_what_stands_in_the_cell() {
     let inside = Place { at_m: [0.5, -0.1], ..tray() };
     let report =
         run(&mut super::tests::cell(Isometry3::identity()), &surrounded, &inside.goal(1).unwrap(), &Default::default());
-    let PlaceOutcome::Failed { step: GraspStep::Carry, why } = &report.outcome else { panic!("{report:?}") };
+    let PlacingOutcome::Failed { step: GraspStep::Carry, why } = &report.outcome else { panic!("{report:?}") };
     assert!(why.contains("wall"), "{why}");
 }
 
@@ -246,13 +253,21 @@ fn a_tray_without_room_is_refused_before_anything_moves() {
     let mut robot = Robot::new(&mut cell, SafetyLimits::default(), Watch::default());
     let known = GraspConfig { part: Some(bar()), ..config() };
     let placing = PlacingConfig::default();
-    let ended = grasp_and_place(&mut robot, &mut Truth, &mut (), CameraMount::Base, &known, &narrow, &placing);
+    let ended = grasp_and_place(
+        &mut robot,
+        &mut Truth,
+        &mut (),
+        CameraPose::InBase(Isometry3::identity()),
+        &known,
+        &narrow,
+        &placing,
+    );
     let error = ended.unwrap_err();
     assert!(!error.latches() && error.to_string().contains("expected a pitch of 80 x 47 mm"), "{error}");
     assert!(cell.arm.actions().is_empty());
     // Without its outline: once it was found, and before it is taken.
     let report = run(&mut cell, &config(), &narrow, &placing);
-    let PlaceOutcome::Failed { step: GraspStep::Detect, why } = &report.outcome else { panic!("{report:?}") };
+    let PlacingOutcome::Failed { step: GraspStep::Detect, why } = &report.outcome else { panic!("{report:?}") };
     assert!(why.contains("the part is 20 mm wide between the fingers"), "{why}");
     assert_eq!(cell.base_from_part, lying(0.5, 0.1, 0.4));
 }
@@ -265,9 +280,9 @@ fn a_part_is_put_between_parts_that_lie_and_not_onto_one() {
     let known = GraspConfig { part: Some(bar()), lying: others, ..config() };
     let mut cell = cell(planar(0.003, 0.001, 0.02));
     let report = run(&mut cell, &known, &goal, &PlacingConfig::default());
-    assert_eq!(report.outcome, PlaceOutcome::Placed, "{report:?}");
+    assert_eq!(report.outcome, PlacingOutcome::Placed, "{report:?}");
     let onto = GraspConfig { lying: vec![part(&goal)], ..known };
     let report = run(&mut super::tests::cell(Isometry3::identity()), &onto, &goal, &PlacingConfig::default());
-    let PlaceOutcome::Failed { step: GraspStep::Detect, why } = &report.outcome else { panic!("{report:?}") };
+    let PlacingOutcome::Failed { step: GraspStep::Detect, why } = &report.outcome else { panic!("{report:?}") };
     assert!(why.contains("in \"tray, cell 1\" lies a part already"), "{why}");
 }

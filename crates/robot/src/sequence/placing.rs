@@ -16,14 +16,15 @@ use super::carry::{Aim, BELOW_M, SOFT_WAY_M};
 use super::held_part::shape_of;
 use super::look::HOVER_SHIFTS_M;
 use super::reach::above;
-use super::{CameraMount, GraspConfig, GraspOutcome, GraspReport, SETTLE_SECS, SURE, Sequence, Steps, Stop, fails_at};
+use super::{GraspConfig, GraspOutcome, GraspReport, SETTLE_SECS, SURE, Sequence, Steps, Stop, fails_at};
 use crate::arm::{Arm, CompliantArm};
 use crate::arm_state::{HandCommand, Load};
+use crate::camera_pose::CameraPose;
 use crate::error::Result;
 use crate::grasp_target::GraspTarget;
 use crate::lying_part::LyingPart;
 use crate::perception::{GraspStep, PartFinder, StepObserver};
-use crate::place::{PlaceError, PlaceGoal};
+use crate::place::{PlaceGoal, PlaceOffset};
 use crate::robot::Robot;
 use crate::room::{release_opening_m, same_turns_rad};
 use crate::touch::{TouchDown, Touched};
@@ -75,7 +76,7 @@ impl Default for PlacingConfig {
 
 /// How placing ended.
 #[derive(Debug, Clone, PartialEq)]
-pub enum PlaceOutcome {
+pub enum PlacingOutcome {
     /// The part lies where it was to lie.
     Placed,
     /// A step failed, of the grasp or of placing.
@@ -89,15 +90,15 @@ pub enum PlaceOutcome {
 
 /// How placing ended, with what was measured on the way.
 #[derive(Debug, Clone, PartialEq)]
-pub struct PlaceReport {
+pub struct PlacingReport {
     /// The first grasp.
     pub grasp: GraspReport,
     /// How it ended.
-    pub outcome: PlaceOutcome,
+    pub outcome: PlacingOutcome,
     /// What was felt each time the part was put down, and on soft approaches after the first.
     pub touched: Vec<Touched>,
     /// How far the part lay beside its place by each look; for a bin from its middle. None where the part was not seen in a bin.
-    pub errors: Vec<PlaceError>,
+    pub errors: Vec<PlaceOffset>,
 }
 
 /// Grasps the part once and puts it down. A cell of a tray must have room for the part and for the fingers that let it go among the parts in the
@@ -109,31 +110,31 @@ pub fn grasp_and_place<A: CompliantArm>(
     robot: &mut Robot<'_, A>,
     finder: &mut dyn PartFinder<A>,
     observer: &mut dyn StepObserver<A>,
-    mount: CameraMount,
+    camera: CameraPose,
     config: &GraspConfig,
     goal: &PlaceGoal,
     placing: &PlacingConfig,
-) -> Result<PlaceReport> {
+) -> Result<PlacingReport> {
     placing.touch_down.validate()?;
     if let Some(part) = &config.part {
         goal.check_room(part, placing.symmetry, placing.release_margin_m)?;
     }
-    let mut sequence = Sequence::yielding(robot, finder, observer, mount, config);
+    let mut sequence = Sequence::yielding(robot, finder, observer, camera, config);
     let outcome = sequence.grasp(|sequence, target| sequence.prepare(target, goal, placing))?;
     let grasp = sequence.grasp_report(outcome);
     let mut errors = Vec::new();
     let outcome = match &grasp.outcome {
-        GraspOutcome::Failed { step, why } => PlaceOutcome::Failed { step: *step, why: why.clone() },
+        GraspOutcome::Failed { step, why } => PlacingOutcome::Failed { step: *step, why: why.clone() },
         GraspOutcome::Held => match sequence.place(goal, placing, &mut errors) {
-            Ok(()) => PlaceOutcome::Placed,
-            Err(Stop::Failed(step, why)) => PlaceOutcome::Failed { step, why },
+            Ok(()) => PlacingOutcome::Placed,
+            Err(Stop::Failed(step, why)) => PlacingOutcome::Failed { step, why },
             Err(Stop::Error(error)) => return Err(error),
         },
     };
-    Ok(PlaceReport { grasp, outcome, touched: std::mem::take(&mut sequence.touched), errors })
+    Ok(PlacingReport { grasp, outcome, touched: std::mem::take(&mut sequence.report.touched), errors })
 }
 
-impl PlaceOutcome {
+impl PlacingOutcome {
     /// Whether the part lies where it was to lie.
     pub fn is_placed(&self) -> bool {
         *self == Self::Placed
@@ -144,16 +145,16 @@ impl<A: Arm> Sequence<'_, '_, A> {
     /// Refuses a part that has no room in its place by what is known now, and keeps off what may lie around.
     fn prepare(&mut self, target: &GraspTarget, goal: &PlaceGoal, placing: &PlacingConfig) -> Steps<()> {
         let table_height_m = self.surface_height_m();
-        let Some(part) = shape_of(target, table_height_m, self.config) else { return Ok(()) };
+        let Some(part) = shape_of(target, table_height_m, self.cell.config) else { return Ok(()) };
         goal.check_room(&part, placing.symmetry, placing.release_margin_m)
             .map_err(|error| Stop::Failed(GraspStep::Detect, error.to_string()))?;
         let taken = LyingPart { base_from_part: target.base_from_tcp, shape: part.clone() };
-        self.lying.take(&target.base_from_tcp);
+        self.known.lying.take(&target.base_from_tcp);
         let there = |base_from_part| LyingPart { base_from_part, shape: part.clone() };
         let height_m = goal.surface_m + part.grasp_height_m();
         let placed = there(goal.base_from_part(height_m, 0.0));
         if goal.bin_m.is_none()
-            && let Some(other) = self.lying.all().iter().find(|other| other.overlaps(&placed))
+            && let Some(other) = self.known.lying.all().iter().find(|other| other.overlaps(&placed))
         {
             let p = other.base_from_part.translation;
             let why = format!("in \"{}\" lies a part already, at ({:.3}, {:.3}) m", goal.name, p.x, p.y);
@@ -161,22 +162,22 @@ impl<A: Arm> Sequence<'_, '_, A> {
         }
         // What is taken from where a cell is shows that nothing else lies there.
         for neighbour in goal.neighbours_in_base(height_m).map(there).filter(|part| !part.overlaps(&taken)) {
-            self.lying.suppose(neighbour);
+            self.known.lying.suppose(neighbour);
         }
         Ok(())
     }
 
-    fn place(&mut self, goal: &PlaceGoal, placing: &PlacingConfig, errors: &mut Vec<PlaceError>) -> Steps<()> {
+    fn place(&mut self, goal: &PlaceGoal, placing: &PlacingConfig, errors: &mut Vec<PlaceOffset>) -> Steps<()> {
         let (mut num_corrections, mut slid) = (0, Isometry3::identity());
         loop {
             let aim = self.carry(goal, placing.symmetry, self.release_opening_m(placing), &slid)?;
             self.put_down(&aim, placing)?;
             let q = self.robot.state()?.q;
-            let base_from_tcp = self.robot.panda().forward(&q);
-            let shape = self.held.as_ref().and_then(|held| held.shape.clone());
+            let base_from_tcp = self.robot.geometry().forward(&q);
+            let shape = self.known.held.as_ref().and_then(|held| held.shape.clone());
             let part_from_tcp = self.release(placing)?;
             let lies = shape.map(|shape| LyingPart { base_from_part: aim.base_from_part, shape });
-            lies.into_iter().for_each(|part| self.lying.put(part));
+            lies.into_iter().for_each(|part| self.known.lying.put(part));
             let found = match (self.look_at(goal, &aim.base_from_part, placing)?, goal.bin_m) {
                 (Some(found), _) => found,
                 // In a bin a part lies anyhow, under others, too.
@@ -207,20 +208,20 @@ impl<A: Arm> Sequence<'_, '_, A> {
                 )));
             }
             num_corrections += 1;
-            self.lying.take(&aim.base_from_part);
+            self.known.lying.take(&aim.base_from_part);
             slid = slip(&aim.base_from_part, &found.base_from_tcp, &base_from_tcp, &part_from_tcp, &error);
             // The hand is turned as it let the part go, where its fingers had room.
             let mut target =
                 GraspTarget { base_from_tcp: as_aimed(&aim.base_from_part, &found.base_from_tcp, &error), ..found };
-            target.base_from_tcp.translation.z = match self.config.height {
+            target.base_from_tcp.translation.z = match self.cell.config.height {
                 // The place is told, and what lies in it was measured before it was taken.
                 Some(_) => aim.base_from_part.translation.z,
                 // Perception takes the part to lie on the table.
                 None => found.base_from_tcp.translation.z + goal.surface_m - self.robot.limits().table_height_m,
             };
-            self.surface_m = self.config.height.map(|_| goal.surface_m);
+            self.known.surface_m = self.cell.config.height.map(|_| goal.surface_m);
             // It was looked at from above, and others lie beside it: the hand opens no wider than to let go.
-            self.opening_margin_m = placing.release_margin_m;
+            self.known.opening_margin_m = placing.release_margin_m;
             self.take(&target)?;
         }
     }
@@ -247,15 +248,15 @@ impl<A: Arm> Sequence<'_, '_, A> {
         let opening_m = self.release_opening_m(placing);
         self.robot.start_hand(HandCommand::Move { opening_m, speed_m_s: RELEASING_SPEED_M_S })?;
         self.robot.finish_hand()?;
-        let part_from_tcp = self.held.take().map_or_else(Isometry3::identity, |held| held.part_from_tcp);
-        if self.config.load.is_some() {
+        let part_from_tcp = self.known.held.take().map_or_else(Isometry3::identity, |held| held.part_from_tcp);
+        if self.cell.config.load.is_some() {
             self.robot.set_load(Load::NONE)?;
         }
         self.robot.wait(RELEASED_SECS)?;
         self.passed(GraspStep::Release)?;
         let start = self.robot.commanded()?;
         let path = self.way_up(&start, placing.retreat_m)?;
-        let planned = self.robot.plan_along(&path, &self.config.pace.approach_limits());
+        let planned = self.robot.plan_along(&path, &self.cell.config.pace.approach_limits(self.robot.geometry()));
         let motion = fails_at(GraspStep::Release, planned)?;
         self.follow(motion, GraspStep::Release)?;
         Ok(part_from_tcp)
@@ -263,11 +264,11 @@ impl<A: Arm> Sequence<'_, '_, A> {
 
     /// How far the hand opens to let go what it closed on, m.
     fn release_opening_m(&self, placing: &PlacingConfig) -> f64 {
-        release_opening_m(self.closed.map_or(0.0, |hand| hand.opening_m), placing.release_margin_m)
+        release_opening_m(self.known.closed.map_or(0.0, |hand| hand.opening_m), placing.release_margin_m)
     }
 
     fn way_up(&self, start: &JointVector, retreat_m: f64) -> Steps<JointPath> {
-        let base_from_tcp = self.robot.panda().forward(start);
+        let base_from_tcp = self.robot.geometry().forward(start);
         let mut up_m = retreat_m;
         loop {
             match self.free_line(start, &above(&base_from_tcp, up_m))? {
@@ -292,17 +293,17 @@ impl<A: Arm> Sequence<'_, '_, A> {
             .step_by(num_skipped)
             .map(|turn_rad| base_from_part * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), turn_rad))
             .collect();
-        self.picture_time = None;
+        self.known.picture_time = None;
         let table_height_m = self.robot.limits().table_height_m;
         for (look, shift_m) in HOVER_SHIFTS_M.into_iter().enumerate() {
-            let arrived = match (&self.mount, self.config.look_outs.first()) {
-                (CameraMount::Hand { .. }, _) => self.hover(&grasps, shift_m, GraspStep::Check),
-                (CameraMount::Base, Some(look_out)) if look == 0 => {
-                    let q = look_out.configuration(self.robot.panda(), &self.mount, table_height_m)?;
+            let arrived = match (&self.cell.camera, self.cell.config.look_outs.first()) {
+                (CameraPose::OnFlange(_), _) => self.hover(&grasps, shift_m, GraspStep::Check),
+                (CameraPose::InBase(_), Some(look_out)) if look == 0 => {
+                    let q = look_out.configuration(self.robot.geometry(), &self.cell.camera, table_height_m)?;
                     self.move_freely(&q, GraspStep::Check)?;
                     Ok(self.robot.wait(SETTLE_SECS)?)
                 }
-                (CameraMount::Base, _) => break,
+                (CameraPose::InBase(_), _) => break,
             };
             match arrived {
                 Err(stop) if look == 0 || self.robot.latched().is_some() => return Err(stop),
@@ -319,7 +320,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
                 }
             };
             if let Some(found) = found.filter(|found| found.score >= SURE && is_here(found)) {
-                self.picture_time = self.finder.picture_time();
+                self.known.picture_time = self.finder.picture_time();
                 return Ok(Some(found));
             }
         }
@@ -336,7 +337,7 @@ fn fails(why: String) -> Stop {
     Stop::Failed(GraspStep::Check, why)
 }
 
-fn told(error: &PlaceError) -> String {
+fn told(error: &PlaceOffset) -> String {
     format!("{:.1} mm and {:.1}°", error.distance_m() * 1e3, error.angle_rad.abs().to_degrees())
 }
 
@@ -346,9 +347,9 @@ fn yaw(base_from_tcp: &Isometry3<f64>) -> Angle {
 }
 
 /// How far a part lies beside its place.
-fn beside(place: &Isometry3<f64>, found: &Isometry3<f64>, symmetry: RotationalSymmetry) -> PlaceError {
+fn beside(place: &Isometry3<f64>, found: &Isometry3<f64>, symmetry: RotationalSymmetry) -> PlaceOffset {
     let apart = place.inverse() * Point3::from(found.translation.vector);
-    PlaceError { beside_m: [apart.x, apart.y], angle_rad: symmetry.visible(yaw(found) - yaw(place)).radians() }
+    PlaceOffset { beside_m: [apart.x, apart.y], angle_rad: symmetry.visible(yaw(found) - yaw(place)).radians() }
 }
 
 /// Whether a part is inside of a bin, seen from above.
@@ -359,7 +360,7 @@ fn inside(goal: &PlaceGoal, found: &Isometry3<f64>, [along_m, across_m]: [f64; 2
 }
 
 /// The pose that was found, without the turns that cannot be seen: as near as it can be to the one that was aimed at.
-fn as_aimed(place: &Isometry3<f64>, found: &Isometry3<f64>, error: &PlaceError) -> Isometry3<f64> {
+fn as_aimed(place: &Isometry3<f64>, found: &Isometry3<f64>, error: &PlaceOffset) -> Isometry3<f64> {
     let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), error.angle_rad);
     Isometry3::from_parts(found.translation, turn * place.rotation)
 }
@@ -370,7 +371,7 @@ fn slip(
     found: &Isometry3<f64>,
     base_from_tcp: &Isometry3<f64>,
     part_from_tcp: &Isometry3<f64>,
-    error: &PlaceError,
+    error: &PlaceOffset,
 ) -> Isometry3<f64> {
     let moved = as_aimed(place, found, error).inverse() * base_from_tcp * part_from_tcp.inverse();
     let along = moved.rotation * Vector3::x();

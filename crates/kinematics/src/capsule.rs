@@ -2,8 +2,6 @@
 
 use nalgebra::{Isometry3, Point3};
 
-use super::shape::clamp;
-
 /// All points within `radius_m` of the segment from `from` to `to`, in the frame of a body, m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Capsule {
@@ -52,7 +50,7 @@ impl Capsule {
 /// # Source
 /// C. Ericson, *Real-Time Collision Detection*, 5.1.9; written without branches, so that it can be computed in lanes.
 #[inline(always)]
-pub(super) fn nearest_shares(u: [f64; 3], v: [f64; 3], w: [f64; 3]) -> (f64, f64) {
+pub(crate) fn nearest_shares(u: [f64; 3], v: [f64; 3], w: [f64; 3]) -> (f64, f64) {
     /// Squared lengths below this belong to points, m².
     const POINT: f64 = 1e-18;
     /// Segments whose angle has a smaller squared sine are parallel: any share of the first will do, and the distance is at most a
@@ -69,6 +67,12 @@ pub(super) fn nearest_shares(u: [f64; 3], v: [f64; 3], w: [f64; 3]) -> (f64, f64
     let s = if is_parallel { 0.0 } else { crossing };
     let t = clamp((uv * s + vw) / vv, 0.0, 1.0);
     (clamp((uv * t - uw) / uu, 0.0, 1.0), t)
+}
+
+#[inline(always)]
+pub(crate) fn clamp(x: f64, low: f64, high: f64) -> f64 {
+    let x = if x > low { x } else { low };
+    if x < high { x } else { high }
 }
 
 #[cfg(test)]

@@ -4,15 +4,14 @@ use nalgebra::Isometry3;
 use sdg_calibration::{CalibratedCamera, Frame};
 use sdg_geometry::{PinholeCamera, PosedCamera};
 use sdg_grasp::CameraOverTable;
-use sdg_kinematics::Panda;
-use sdg_robot::workcell::Mounting;
-use sdg_robot::{CameraMount, CameraPose};
+use sdg_robot::CameraPose;
+use sdg_robot::workcell::Mount;
 
 use crate::error::{CellError, Result};
 
 /// A calibrated camera and where it is.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PlacedCamera {
+pub struct MountedCamera {
     /// The lens and the size of its pictures.
     pub intrinsics: PinholeCamera,
     /// Where it is fixed.
@@ -21,19 +20,17 @@ pub struct PlacedCamera {
     pub table_height_m: f64,
 }
 
-impl PlacedCamera {
+impl MountedCamera {
     /// The camera of a file, mounted as a workcell says.
     ///
     /// # Errors
     /// [`CellError::NotOnHand`] and [`CellError::NotInBase`] for a file without the pose that the mounting needs.
-    pub fn new(camera: &CalibratedCamera, mounting: Mounting, table_height_m: f64) -> Result<Self> {
-        let pose = match (mounting, camera.flange_from_camera, &camera.table) {
-            (Mounting::Hand, Some(flange_from_camera), _) => CameraPose::OnFlange(flange_from_camera),
-            (Mounting::Hand, None, _) => return Err(CellError::NotOnHand),
-            (Mounting::Base, _, Some(table)) if table.frame == Frame::Base => {
-                CameraPose::InBase(table.frame_from_camera)
-            }
-            (Mounting::Base, ..) => return Err(CellError::NotInBase),
+    pub fn new(camera: &CalibratedCamera, mount: Mount, table_height_m: f64) -> Result<Self> {
+        let pose = match (mount, camera.flange_from_camera, &camera.table) {
+            (Mount::Hand, Some(flange_from_camera), _) => CameraPose::OnFlange(flange_from_camera),
+            (Mount::Hand, None, _) => return Err(CellError::NotOnHand),
+            (Mount::Base, _, Some(table)) if table.frame == Frame::Base => CameraPose::InBase(table.frame_from_camera),
+            (Mount::Base, ..) => return Err(CellError::NotInBase),
         };
         Ok(Self { intrinsics: camera.intrinsics, pose, table_height_m })
     }
@@ -41,16 +38,6 @@ impl PlacedCamera {
     /// Width and height of its pictures.
     pub fn size_px(&self) -> [u32; 2] {
         [self.intrinsics.width, self.intrinsics.height]
-    }
-
-    /// The camera's mount, as the grasp sequence takes it.
-    pub fn mount(&self) -> CameraMount {
-        match self.pose {
-            CameraPose::OnFlange(flange_from_camera) => {
-                CameraMount::Hand { tcp_from_camera: Panda::new().flange_from_tcp().inverse() * flange_from_camera }
-            }
-            CameraPose::InBase(_) => CameraMount::Base,
-        }
     }
 
     /// The camera over the table, in the robot's base, while the flange is at `base_from_flange`.

@@ -20,7 +20,7 @@ impl LinkInertia {
     }
 
     /// Fixes another body to this one.
-    pub(super) fn add(&mut self, other: &Self, self_from_other: &Isometry3<f64>) {
+    pub(crate) fn add(&mut self, other: &Self, self_from_other: &Isometry3<f64>) {
         let turn = self_from_other.rotation.to_rotation_matrix();
         let center_m = (self_from_other * nalgebra::Point3::from(other.center_m)).coords;
         let turned = turn.matrix() * other.inertia * turn.matrix().transpose();
@@ -38,7 +38,7 @@ impl LinkInertia {
 
     /// Force (N) and torque about the link's origin (N·m) that give the body its motion: the origin's acceleration, the turn and its rate, all
     /// in the link's axes.
-    pub(super) fn force_and_torque(
+    pub(crate) fn force_and_torque(
         &self,
         acceleration: &Vector3<f64>,
         turning: &Vector3<f64>,

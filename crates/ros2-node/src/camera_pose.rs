@@ -16,9 +16,9 @@ use crate::lines::Lines;
 /// How often a thread looks whether it is to end.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
 
-/// Where the camera's place comes from.
+/// Where the camera's pose comes from.
 #[derive(Debug, Clone)]
-pub enum PlaceSource {
+pub enum CameraPoseSource {
     /// Nowhere: detections have no poses.
     Unknown,
     /// The camera's file.
@@ -40,36 +40,36 @@ struct Known {
 }
 
 /// Follows tf and camera_info in threads.
-pub(super) struct CameraPlace {
-    source: PlaceSource,
+pub(super) struct CameraPoseReader {
+    source: CameraPoseSource,
     known: Arc<Mutex<Known>>,
     is_stopped: Arc<AtomicBool>,
     threads: Vec<JoinHandle<()>>,
 }
 
-impl CameraPlace {
+impl CameraPoseReader {
     pub(super) fn open(
         node: &mut Node,
-        source: PlaceSource,
+        source: CameraPoseSource,
         max_age_secs: f64,
         lines: &Arc<Lines>,
     ) -> Result<Self, RosError> {
         let known = Arc::new(Mutex::new(Known { transforms: Transforms::new(max_age_secs), sent: None }));
         let is_stopped = Arc::<AtomicBool>::default();
-        let mut place = Self { source, known, is_stopped, threads: Vec::new() };
+        let mut reader = Self { source, known, is_stopped, threads: Vec::new() };
         let infos = node.subscribe::<CameraInfo>("camera_info", Qos::SENSORS)?;
-        place.spawn(lines, move |known| {
+        reader.spawn(lines, move |known| {
             let Some(received) = infos.receive(LOOK_EVERY)? else { return Ok(()) };
             let read = camera_info::read_camera_info(&received.message);
             lock(known).sent = Some(read.as_ref().copied().map_err(ToString::to_string));
             read.map(drop)
         });
-        if let PlaceSource::Transforms { .. } = place.source {
+        if let CameraPoseSource::Transforms { .. } = reader.source {
             for (topic, qos, is_static) in
                 [("/tf", Qos::TRANSFORMS, false), ("/tf_static", Qos::STATIC_TRANSFORMS, true)]
             {
                 let messages = node.subscribe::<TfMessage>(topic, qos)?;
-                place.spawn(lines, move |known| {
+                reader.spawn(lines, move |known| {
                     let Some(received) = messages.receive(LOOK_EVERY)? else { return Ok(()) };
                     match lock(known).transforms.add(&received.message, is_static) {
                         0 => Ok(()),
@@ -82,7 +82,7 @@ impl CameraPlace {
                 });
             }
         }
-        Ok(place)
+        Ok(reader)
     }
 
     fn spawn(&mut self, lines: &Arc<Lines>, receive: impl Fn(&Mutex<Known>) -> Result<(), RosError> + Send + 'static) {
@@ -101,15 +101,15 @@ impl CameraPlace {
         let known = lock(&self.known);
         let refused = |expected: &str, found: String| RosError::CameraInfo { expected: expected.to_owned(), found };
         match &self.source {
-            PlaceSource::Unknown => Ok(None),
-            PlaceSource::File(over_table) => {
+            CameraPoseSource::Unknown => Ok(None),
+            CameraPoseSource::File(over_table) => {
                 // A camera_info that cannot be read says nothing against the file.
                 if let Some(Ok(sent)) = &known.sent {
                     camera_info::check_same_camera(&over_table.camera.intrinsics, sent)?;
                 }
                 Ok(Some(*over_table))
             }
-            PlaceSource::Transforms { base_frame, table_height_m, intrinsics } => {
+            CameraPoseSource::Transforms { base_frame, table_height_m, intrinsics } => {
                 let intrinsics = match (intrinsics, &known.sent) {
                     (Some(of_file), Some(Ok(sent))) => {
                         camera_info::check_same_camera(of_file, sent)?;
@@ -132,7 +132,7 @@ fn lock(known: &Mutex<Known>) -> MutexGuard<'_, Known> {
     known.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-impl Drop for CameraPlace {
+impl Drop for CameraPoseReader {
     fn drop(&mut self) {
         self.is_stopped.store(true, Ordering::SeqCst);
         for thread in self.threads.drain(..) {
