@@ -104,6 +104,10 @@ def lead_screw(length=40, starts=2, left=False):
                  (14, cylinder(4.2), "steel"), (1, cone(4.2, 3.4), "steel"))  # fmt: skip
 
 
+def auger(length=30, depth=2.6):
+    return lathe((11, cylinder(5.5), "cast"), (length, thread(9, 7, depth, 1, False, 0.18), "cast"), (16, cylinder(5), "cast"), (1, cone(5, 4), "cast"))
+
+
 def pin(groove=14, length=40):
     return lathe((1, cone(3.6, 4.4), "blackox"), (groove, cylinder(4.4), "blackox"), (2.2, cylinder(3.4), "blackox"),
                  (length - groove - 12, cylinder(4.4), "blackox"), (9, cylinder(6.2), "blackox"), (0.8, cone(6.2, 5.4), "blackox"))  # fmt: skip
@@ -130,6 +134,7 @@ PARTS = dict(
     r_leadscrew=rolling(
         lead_screw, (410, 52), [("longer", lambda: lead_screw(54)), ("one start", lambda: lead_screw(40, 1)), ("left hand", lambda: lead_screw(40, 2, True))]
     ),
+    r_auger=rolling(auger, (390, 50), [("longer", lambda: auger(42)), ("shorter", lambda: auger(21)), ("flat thread", lambda: auger(30, 1.0))]),
     r_pin=rolling(pin, (340, 46), [("groove moved", lambda: pin(20)), ("longer", lambda: pin(14, 50)), ("groove at the end", lambda: pin(5))]),
     r_plug=rolling(plug, (390, 50), [("shorter ribs", lambda: plug(8)), ("larger hexagon", lambda: plug(14, 23.0)), ("longer ribs", lambda: plug(20))]),
     r_thumb=rolling(thumb_screw, (350, 55), [("longer", lambda: thumb_screw(10, 36)), ("flat head", lambda: thumb_screw(5)), ("shorter", lambda: thumb_screw(10, 18))]),

@@ -8,9 +8,10 @@ use nalgebra::{Point2, Rotation2, Vector2};
 use sdg_geometry::{GraspLine, Mask, Polygon};
 
 /// The least share of the part that its mirror image covers, its least length over its mean width, and how much of the light's
-/// variance must be explained by the place across the axis. Six rendered parts of revolution and a photographed screw have 0.96, 3.4 and
-/// 0.39 at least; of the 13 flat parts that are as symmetric and as slender none has more than 0.19 of the last.
-const MIN_SYMMETRY: f64 = 0.93;
+/// variance must be explained by the place across the axis. Seven rendered parts of revolution and a photographed screw have 0.92 (a deep
+/// thread with one start, whose sides differ), 3.4 and 0.39 at least; of the flat parts that are as symmetric and as slender none has more
+/// than 0.19 of the last.
+const MIN_SYMMETRY: f64 = 0.85;
 const MIN_SLENDERNESS: f64 = 2.5;
 const MIN_EXPLAINED: f64 = 0.28;
 /// How the light must at least change across the axis, as a standard deviation over the mean. Chosen by hand.
