@@ -81,7 +81,7 @@ impl Prepared {
             (&resized, marks.resized(cutout_scale))
         };
         let search = ShapeSearch::new(cutout, &marks.region(), config)?;
-        let round_top = RoundTop::new(cutout, &marks);
+        let round_top = search.revolution().map(|revolution| RoundTop::new(revolution, &marks));
         let marks_shift = if round_top.is_some() { None } else { MarksShift::new(cutout, &marks, &config.shape) };
         Ok(Self { search, marks_shift, round_top })
     }

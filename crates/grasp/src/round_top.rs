@@ -4,7 +4,6 @@
 //! own radius there. How far a camera sees them shifted follows from that; what surrounds them looks different in every roll and tells
 //! nothing.
 
-use image::RgbImage;
 use nalgebra::Point2;
 use sdg_geometry::PlanarSimilarity;
 use sdg_shape::Revolution;
@@ -21,11 +20,10 @@ pub(crate) struct RoundTop {
 }
 
 impl RoundTop {
-    /// `marks` are in pixels of `cutout`. `None` for any other part.
-    pub(crate) fn new(cutout: &RgbImage, marks: &TaughtMarks) -> Option<Self> {
-        let outline = marks.outline.as_ref()?;
-        let rise = Revolution::of(cutout, outline)?.radius_beside(&marks.grasp);
-        Some(Self { rise, photo_middle: marks.photo_middle.map_or(marks.grasp.center(), Point2::from) })
+    /// `marks` are in pixels of the photo that shows the axis.
+    pub(crate) fn new(revolution: &Revolution, marks: &TaughtMarks) -> Self {
+        let rise = revolution.radius_beside(&marks.grasp);
+        Self { rise, photo_middle: marks.photo_middle.map_or(marks.grasp.center(), Point2::from) }
     }
 
     /// `image_from_cutout` shifted to where the camera sees the marks.

@@ -32,6 +32,8 @@ const START_STEP: f64 = 3.0;
 /// time; chosen by hand, not measured.
 const MAX_ROUNDS: usize = 5;
 const STILL: f64 = 0.01;
+/// Steps that differ by less, in level pixels, end in the same place. Chosen by hand, for time.
+const SAME_PLACE: f64 = 0.02;
 
 /// A pose and how many of the points found a crest there.
 pub(crate) struct Snapped {
@@ -69,13 +71,10 @@ pub(crate) fn snap_from(
         let reach = if round == 1 { FIRST_REACH } else { LATER_REACH };
         let sightings = gather(level, matched, &best.pose, reach);
         let (step, score) = if round == 1 {
-            starts(is_free, first)
-                .into_iter()
-                .map(|start| fit_offsets(&sightings, is_free, start, &WIDTHS))
-                .max_by(|a, b| a.1.total_cmp(&b.1))
-                .unwrap_or((Vector4::zeros(), 0.0))
+            best_fit(&sightings, is_free, starts(is_free, first))
         } else {
-            fit_offsets(&sightings, is_free, Vector4::zeros(), &WIDTHS[2..])
+            let step = fit_offsets(&sightings, is_free, Vector4::zeros(), &WIDTHS[2..]);
+            (step, consensus_at(&sightings, &step))
         };
         let units = step_units(level, matched, &best.pose);
         let moved = best.pose.moved([0, 1, 2, 3].map(|k| step[k] * units[k]));
@@ -139,21 +138,22 @@ impl<const N: usize> Sighting<N> {
         let len = 2 * reach + 3;
         let middle = (reach + 1) as f32;
         let floor = matched.image_level.floor();
-        let mut strengths = [0.0f32; MAX_LEN];
+        // Of the gradient's strength: roots are taken of crests alone.
+        let mut squares = [0.0f32; MAX_LEN];
         let mut trusts = [0.0f32; MAX_LEN];
         for k in 0..len {
             let t = k as f32 - middle;
             // Beyond the border there is no crest.
             if let Some([dx, dy, energy]) = matched.image_level.bilinear(at[0] + t * normal[0], at[1] + t * normal[1]) {
                 trusts[k] = (dx * double[0] + dy * double[1]).max(0.0);
-                strengths[k] = (trusts[k] * (energy + floor)).sqrt();
+                squares[k] = trusts[k] * (energy + floor);
             }
         }
         for k in 1..len - 1 {
-            let (before, here, after) = (strengths[k - 1], strengths[k], strengths[k + 1]);
-            if here < before || here <= after || trusts[k] < MIN_TRUST {
+            if squares[k] < squares[k - 1] || squares[k] <= squares[k + 1] || trusts[k] < MIN_TRUST {
                 continue;
             }
+            let [before, here, after] = [squares[k - 1], squares[k], squares[k + 1]].map(f32::sqrt);
             let distance = f64::from(k as f32 - middle + parabola_peak(before, here, after));
             let crest = (distance, f64::from(trusts[k]));
             if self.num_crests < MAX_CRESTS {
@@ -187,6 +187,22 @@ impl<const N: usize> Sighting<N> {
 fn kernel(x: f64) -> f64 {
     let rest = (1.0 - x * x / 9.0).max(0.0);
     rest * rest
+}
+
+/// The step of most consensus from any of the starts; those that have come to the same place go on as one.
+fn best_fit(sightings: &[Sighting<4>], is_free: [bool; 4], mut steps: Vec<Vector4<f64>>) -> (Vector4<f64>, f64) {
+    for width in &WIDTHS {
+        let mut fitted: Vec<Vector4<f64>> = Vec::with_capacity(steps.len());
+        for step in steps {
+            let step = fit_offsets(sightings, is_free, step, std::slice::from_ref(width));
+            if fitted.iter().all(|other| (other - step).amax() > SAME_PLACE) {
+                fitted.push(step);
+            }
+        }
+        steps = fitted;
+    }
+    let scored = steps.into_iter().map(|step| (step, consensus_at(sightings, &step)));
+    scored.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((Vector4::zeros(), 0.0))
 }
 
 /// No movement, and one step each way by shift and by scale.
@@ -231,13 +247,19 @@ fn normal_equations<const N: usize>(
     (SMatrix::from_fn(|i, j| lower[i][j]), SVector::from(right))
 }
 
-/// Iteratively re-weighted least squares from `start`, narrowing; the step and its consensus.
+/// Weighted share of the sightings that have a crest at a step.
+pub(crate) fn consensus_at<const N: usize>(sightings: &[Sighting<N>], step: &SVector<f64, N>) -> f64 {
+    let width = WIDTHS[WIDTHS.len() - 1];
+    sightings.iter().map(|sighting| sighting.weight * sighting.best_crest(step, width).1).sum()
+}
+
+/// Iteratively re-weighted least squares from `start`, narrowing.
 pub(crate) fn fit_offsets<const N: usize>(
     sightings: &[Sighting<N>],
     is_free: [bool; N],
     start: SVector<f64, N>,
     widths: &[f64],
-) -> (SVector<f64, N>, f64)
+) -> SVector<f64, N>
 where
     Const<N>: DimMin<Const<N>, Output = Const<N>>,
 {
@@ -256,7 +278,5 @@ where
             step += cholesky.solve(&right);
         }
     }
-    let width = WIDTHS[WIDTHS.len() - 1];
-    let score = sightings.iter().map(|s| s.weight * s.best_crest(&step, width).1).sum();
-    (step, score)
+    step
 }

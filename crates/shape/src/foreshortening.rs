@@ -7,7 +7,7 @@
 use nalgebra::{Matrix2, Point2, SVector, Vector2};
 use sdg_geometry::{Angle, PlanarSimilarity};
 
-use crate::consensus::{EdgePlace, FIRST_REACH, LATER_REACH, Sighting, WIDTHS, fit_offsets};
+use crate::consensus::{EdgePlace, FIRST_REACH, LATER_REACH, Sighting, WIDTHS, consensus_at, fit_offsets};
 use crate::gradient_field::GradientField;
 use crate::pose::Pose;
 use crate::template::{MatchedLevel, ShapeTemplate, TemplateLevel};
@@ -93,7 +93,7 @@ fn starts() -> impl Iterator<Item = Matrix2<f64>> {
 
 fn consensus(level: &TemplateLevel, matched: &MatchedLevel<'_>, pose: &Affine) -> Option<f64> {
     let sightings = gather(level, matched, pose, LATER_REACH)?;
-    Some(fit_offsets(&sightings, [false; 6], SVector::zeros(), &WIDTHS[2..]).1)
+    Some(consensus_at(&sightings, &SVector::zeros()))
 }
 
 /// Moved onto the crests nearby; the pose and its consensus.
@@ -103,7 +103,8 @@ fn follow(level: &TemplateLevel, matched: &MatchedLevel<'_>, mut pose: Affine) -
     for round in 0..ROUNDS {
         let (reach, widths) = if round == 0 { (FIRST_REACH, &WIDTHS[..]) } else { (LATER_REACH, &WIDTHS[1..]) };
         let sightings = gather(level, matched, &pose, reach)?;
-        let (step, found) = fit_offsets(&sightings, [true; 6], SVector::zeros(), widths);
+        let step = fit_offsets(&sightings, [true; 6], SVector::zeros(), widths);
+        let found = consensus_at(&sightings, &step);
         let per_radius = Matrix2::new(step[2], step[3], step[4], step[5]) / radius(level, pixel, &pose);
         pose.center += pixel * Vector2::new(step[0], step[1]);
         pose.linear = (Matrix2::identity() + per_radius) * pose.linear;

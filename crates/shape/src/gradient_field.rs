@@ -82,8 +82,33 @@ pub(crate) type DirectionSample = [f32; 3];
 pub(crate) struct GradientLevel {
     width: usize,
     height: usize,
-    samples: Vec<DirectionSample>,
+    /// Each with a fourth number, so that it is read at once.
+    samples: Vec<[f32; 4]>,
     floor: f32,
+    reading: Reading,
+}
+
+/// What every reading between pixels needs.
+#[derive(Debug, Clone, Copy)]
+struct Reading {
+    /// Width and height, and the last pixel of each.
+    size: [f32; 2],
+    last: [f32; 2],
+    /// The last pixel that has a neighbour, and how far away that is.
+    last_pair: [i32; 2],
+    step: [usize; 2],
+}
+
+impl Reading {
+    fn new(width: usize, height: usize) -> Self {
+        let sides = [width, height];
+        Self {
+            size: sides.map(|side| side as f32),
+            last: sides.map(|side| side.saturating_sub(1) as f32),
+            last_pair: sides.map(|side| side.saturating_sub(2) as i32),
+            step: [usize::from(width > 1), if height > 1 { width } else { 0 }],
+        }
+    }
 }
 
 impl GradientLevel {
@@ -92,11 +117,11 @@ impl GradientLevel {
         let mut samples = structure_tensors(planes);
         let floor = config.min_gradient.powi(2) + config.noise_factor * quiet_energy(&samples);
         for sample in &mut samples {
-            let [tr, vx, vy] = *sample;
+            let [tr, vx, vy, _] = *sample;
             let scale = 1.0 / (tr + floor);
-            *sample = [vx * scale, vy * scale, tr];
+            *sample = [vx * scale, vy * scale, tr, 0.0];
         }
-        Self { width, height, samples, floor }
+        Self { width, height, samples, floor, reading: Reading::new(width, height) }
     }
 
     pub(crate) fn width(&self) -> usize {
@@ -108,7 +133,7 @@ impl GradientLevel {
     }
 
     /// The samples of a row, from left to right.
-    pub(crate) fn row(&self, row: usize) -> &[DirectionSample] {
+    pub(crate) fn row(&self, row: usize) -> &[[f32; 4]] {
         &self.samples[row * self.width..][..self.width]
     }
 
@@ -118,46 +143,46 @@ impl GradientLevel {
     }
 
     /// Sample of the pixel that holds `(x, y)` in level pixels, `None` outside.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn nearest(&self, x: f32, y: f32) -> Option<DirectionSample> {
-        if x >= 0.0 && y >= 0.0 {
-            let (col, row) = (x as usize, y as usize);
-            if col < self.width && row < self.height {
-                return Some(self.samples[row * self.width + col]);
-            }
+        let [width, height] = self.reading.size;
+        if !(x >= 0.0 && y >= 0.0 && x < width && y < height) {
+            return None;
         }
-        None
+        // No image has so many pixels a side that 32 bits would not hold them; 64 take several times as long.
+        let [dx, dy, energy, _] = self.samples[y as i32 as usize * self.width + x as i32 as usize];
+        Some([dx, dy, energy])
     }
 
     /// Bilinear sample at `(x, y)` in level pixels, `None` outside the image.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn bilinear(&self, x: f32, y: f32) -> Option<DirectionSample> {
-        if !(x >= 0.0 && y >= 0.0 && x <= self.width as f32 && y <= self.height as f32) {
+        let Reading { size, last, last_pair, step } = self.reading;
+        if !(x >= 0.0 && y >= 0.0 && x <= size[0] && y <= size[1]) {
             return None;
         }
         // Within half a pixel of the border the border pixel's value is repeated.
-        let u = (x - 0.5).clamp(0.0, (self.width - 1) as f32);
-        let v = (y - 0.5).clamp(0.0, (self.height - 1) as f32);
-        let col = (u as usize).min(self.width.saturating_sub(2));
-        let row = (v as usize).min(self.height.saturating_sub(2));
+        let u = (x - 0.5).max(0.0).min(last[0]);
+        let v = (y - 0.5).max(0.0).min(last[1]);
+        let (col, row) = ((u as i32).min(last_pair[0]), (v as i32).min(last_pair[1]));
         let (fx, fy) = (u - col as f32, v - row as f32);
-        let right = usize::from(self.width > 1);
-        let below = if self.height > 1 { self.width } else { 0 };
-        let at = row * self.width + col;
-        let (a, b) = (self.samples[at], self.samples[at + right]);
-        let (c, d) = (self.samples[at + below], self.samples[at + below + right]);
-        let mut out = [0.0; 3];
-        for k in 0..3 {
+        let at = row as usize * self.width + col as usize;
+        let upper = self.samples.get(at..=at + step[0])?;
+        let lower = self.samples.get(at + step[1]..=at + step[1] + step[0])?;
+        let (a, b, c, d) = (upper[0], upper[upper.len() - 1], lower[0], lower[lower.len() - 1]);
+        let mut out = [0.0; 4];
+        for k in 0..4 {
             let top = a[k] + fx * (b[k] - a[k]);
             let bottom = c[k] + fx * (d[k] - c[k]);
             out[k] = top + fy * (bottom - top);
         }
-        Some(out)
+        let [dx, dy, energy, _] = out;
+        Some([dx, dy, energy])
     }
 }
 
 /// Energy of the pixels of the quiet quarter, read from at most a few thousand of them.
-fn quiet_energy(samples: &[DirectionSample]) -> f32 {
+fn quiet_energy(samples: &[[f32; 4]]) -> f32 {
     // A prime stride does not fall in step with rows or with a periodic texture.
     let stride = (samples.len() / 4096).max(1) | 1;
     let mut energies: Vec<f32> = samples.iter().step_by(stride).map(|s| s[0]).collect();
@@ -212,8 +237,8 @@ const PAD: usize = 2;
 /// The 5-tap binomial filter in both directions multiplies by this much. Derived: 16 × 16.
 const BLUR_GAIN: f32 = 256.0;
 
-/// `[tr, v.x, v.y]` of every pixel, row by row through rings of three rows that stay in the cache.
-fn structure_tensors(planes: &Planes) -> Vec<DirectionSample> {
+/// `[tr, v.x, v.y, 0]` of every pixel, row by row through rings of three rows that stay in the cache.
+fn structure_tensors(planes: &Planes) -> Vec<[f32; 4]> {
     let (width, height) = (planes.width, planes.height);
     let mut samples = Vec::with_capacity(width * height);
     if width == 0 || height == 0 {
@@ -334,7 +359,7 @@ fn emit_smoothed(
     row: isize,
     rows: isize,
     vertical: &mut TensorRow,
-    samples: &mut Vec<DirectionSample>,
+    samples: &mut Vec<[f32; 4]>,
 ) {
     let line = |y: isize| &ring[(y.clamp(0, rows - 1) % 3) as usize];
     let (above, here, below) = (line(row - 1), line(row), line(row + 1));
@@ -350,6 +375,6 @@ fn emit_smoothed(
     smooth(&mut vertical.vy, &above.vy, &here.vy, &below.vy);
     let across = |v: &[f32], x: usize| 0.25 * (v[x - 1] + v[x + 1]) + 0.5 * v[x];
     samples.extend(
-        (PAD..PAD + width).map(|x| [across(&vertical.tr, x), across(&vertical.vx, x), across(&vertical.vy, x)]),
+        (PAD..PAD + width).map(|x| [across(&vertical.tr, x), across(&vertical.vx, x), across(&vertical.vy, x), 0.0]),
     );
 }

@@ -22,15 +22,19 @@ impl<'a> PixelCell<'a> {
     #[inline]
     pub(crate) fn at(image: &'a RgbImage, point: &Point2<f64>) -> Option<Self> {
         let (x, y) = (point.x - 0.5, point.y - 0.5);
-        let (left, top) = (x.floor(), y.floor());
         let [width, height] = [image.width(), image.height()];
-        if !(left >= 0.0 && top >= 0.0 && left + 1.0 < f64::from(width) && top + 1.0 < f64::from(height)) {
+        if !(x >= 0.0 && y >= 0.0 && x < f64::from(width) && y < f64::from(height)) {
+            return None;
+        }
+        // Rounded down, as neither is negative: without SSE4 `floor` is a call.
+        let (left, top) = (x as i32, y as i32);
+        if left as u32 + 1 >= width || top as u32 + 1 >= height {
             return None;
         }
         let at = 3 * (top as usize * width as usize + left as usize);
         let raw = image.as_raw();
         let (upper, lower) = (&raw[at..][..6], &raw[at + 3 * width as usize..][..6]);
-        Some(Self { upper, lower, along: x - left, below: y - top })
+        Some(Self { upper, lower, along: x - f64::from(left), below: y - f64::from(top) })
     }
 
     /// The colour in single precision.

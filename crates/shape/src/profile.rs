@@ -29,6 +29,7 @@ pub(crate) struct Profile {
     middle: Point2<f64>,
     /// As long as the part.
     axis: Vector2<f64>,
+    pub(crate) revolution: Revolution,
 }
 
 impl Profile {
@@ -36,7 +37,7 @@ impl Profile {
     pub(crate) fn of(image: &RgbImage, outline: &Polygon, config: &ShapeConfig) -> Option<Self> {
         let revolution = Revolution::of(image, outline)?;
         let template = ShapeTemplate::of_outline(image, outline, config).ok()?;
-        Some(Self { template, middle: outline.bounds().center(), axis: revolution.axis() })
+        Some(Self { template, middle: outline.bounds().center(), axis: revolution.axis(), revolution })
     }
 
     /// How well the edges along the outline agree at a pose, in `[0, 1]`.

@@ -19,6 +19,8 @@ const MIN_CHANGE: f64 = 0.06;
 /// The axis is looked for so far about the main axis of the outline, in degrees and in shares of the greatest width. Chosen by hand.
 const TURNS: (i32, f64) = (12, 0.5);
 const OFFSETS: (i32, f64) = (6, 0.005);
+/// Pixels that the axis is looked for by. Chosen for time.
+const AXIS_PIXELS: usize = 1000;
 /// Pieces along the axis and across it in which the light is averaged; those nearest to the outline show the background.
 const ALONG: usize = 40;
 const ACROSS: usize = 8;
@@ -42,13 +44,21 @@ impl Revolution {
     /// # Units and frames
     /// `outline` is in pixels of `cutout`.
     pub fn of(cutout: &RgbImage, outline: &Polygon) -> Option<Self> {
+        // Most parts are not slender, which is seen at once.
+        let bounds = outline.bounds();
+        let longest = bounds.width().hypot(bounds.height());
+        if longest * longest < MIN_SLENDERNESS * outline.area() {
+            return None;
+        }
         let mask = outline.rasterize(cutout.width(), cutout.height());
         let pixels: Vec<Point2<f64>> = (0..cutout.height())
             .flat_map(|y| (0..cutout.width()).map(move |x| (x, y)))
             .filter(|&(x, y)| mask.get(x, y))
             .map(|(x, y)| Point2::new(f64::from(x) + 0.5, f64::from(y) + 0.5))
             .collect();
-        let (on_axis, axis) = axis_of_symmetry(&mask, &pixels)?;
+        // Spread over the part by a stride that falls in step with no row.
+        let few: Vec<Point2<f64>> = pixels.iter().step_by((pixels.len() / AXIS_PIXELS).max(1) | 1).copied().collect();
+        let (on_axis, axis) = axis_of_symmetry(&mask, &few)?;
         let pixels_by_axis: Vec<[f64; 2]> = pixels.iter().map(|at| by_axis(at, &on_axis, &axis)).collect();
         let made = Self { on_axis, axis, pixels: pixels_by_axis };
         let brightness = |at: &Point2<f64>| {
@@ -154,12 +164,9 @@ fn axis_of_symmetry(mask: &Mask, pixels: &[Point2<f64>]) -> Option<(Point2<f64>,
             let on_axis = middle + f64::from(offset) * OFFSETS.1 * width * left;
             let is_covered = |at: &&Point2<f64>| {
                 let mirrored = **at - 2.0 * by_axis(at, &on_axis, &axis)[1] * left;
-                let (x, y) = (mirrored.x.floor(), mirrored.y.floor());
-                x >= 0.0
-                    && y >= 0.0
-                    && x < f64::from(mask.width())
-                    && y < f64::from(mask.height())
-                    && mask.get(x as u32, y as u32)
+                let (x, y) = (mirrored.x, mirrored.y);
+                let is_inside = x >= 0.0 && y >= 0.0 && x < f64::from(mask.width()) && y < f64::from(mask.height());
+                is_inside && mask.get(x as u32, y as u32)
             };
             let share = pixels.iter().filter(is_covered).count() as f64 / count.max(1.0);
             if share > best.0 {

@@ -51,7 +51,7 @@ fn resembling(
 ) -> Vec<PlanarSimilarity> {
     let about_middle = (0..NUM_TURNS).map(|k| {
         let turn = Angle::from_radians(k as f64 * std::f64::consts::TAU / NUM_TURNS as f64);
-        template.refine(field, &PlanarSimilarity::about(middles[0], middles[1], turn, 1.0)).image_from_demonstration
+        template.captured(field, &PlanarSimilarity::about(middles[0], middles[1], turn, 1.0), &REACH)
     });
     let mut fits: Vec<(PlanarSimilarity, f64)> = about_middle
         .chain(further.iter().copied())

@@ -35,6 +35,7 @@ use crate::likeness::Likeness;
 use crate::parallel;
 use crate::pose::Pose;
 use crate::profile::Profile;
+use crate::revolution::Revolution;
 use crate::search::bank::Bank;
 use crate::search::responses::{PITCH, Responses};
 use crate::search::sweep::{Start, sweep};
@@ -311,6 +312,11 @@ impl ShapeSearch {
     /// The edges that poses are refined by.
     pub fn template(&self) -> &ShapeTemplate {
         &self.template
+    }
+
+    /// The axis of a part of revolution; `None` for any other part.
+    pub fn revolution(&self) -> Option<&Revolution> {
+        self.profile.as_ref().map(|profile| &profile.revolution)
     }
 
     /// The demonstration over an image.
