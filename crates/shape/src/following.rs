@@ -57,6 +57,18 @@ impl ShapeTemplate {
         pose.to_similarity(self.center)
     }
 
+    /// As [`Self::captured`] at the coarsest level alone; the pose and how well it agrees there.
+    pub(crate) fn captured_coarsely(
+        &self,
+        field: &GradientField,
+        start: &PlanarSimilarity,
+        reach: &Reach,
+    ) -> (PlanarSimilarity, f64) {
+        let start = Pose::from_similarity(start, self.center);
+        let (pose, agreement) = self.climb_coarsest(field, &reach.about(start), start);
+        (pose.to_similarity(self.center), agreement)
+    }
+
     /// Moves a pose that may be further off onto the edges: climbed and snapped at every level, about five times slower than
     /// [`Self::snapped`]. Deterministic.
     ///

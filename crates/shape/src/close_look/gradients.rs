@@ -163,18 +163,17 @@ pub(super) fn cell_of(pixel: usize, side: usize) -> usize {
 /// Means over a cell and its eight neighbours, of sums in cells; beyond the frame there is nothing.
 fn window_means(cells: &[f32], side: usize) -> Vec<f32> {
     let across = side / CELL;
-    let mut rows = vec![0.0; cells.len()];
-    for (row, sums) in cells.chunks_exact(across).zip(rows.chunks_exact_mut(across)) {
+    let mut row_sums = vec![0.0; cells.len() + 2 * across];
+    let mut padded = vec![0.0; across + 2];
+    for (row, sums) in cells.chunks_exact(across).zip(row_sums[across..].chunks_exact_mut(across)) {
+        padded[1..=across].copy_from_slice(row);
         for (x, sum) in sums.iter_mut().enumerate() {
-            *sum = row[x.saturating_sub(1)..(x + 2).min(across)].iter().sum();
+            *sum = padded[x] + padded[x + 1] + padded[x + 2];
         }
     }
     let pixels = (9 * CELL * CELL) as f32;
-    let sum = |i: usize| {
-        let (x, y) = (i % across, i / across);
-        (y.saturating_sub(1)..(y + 2).min(across)).map(|y| rows[y * across + x]).sum::<f32>() / pixels
-    };
-    (0..cells.len()).map(sum).collect()
+    let (above, here, below) = (&row_sums, &row_sums[across..], &row_sums[2 * across..]);
+    (0..cells.len()).map(|i| (above[i] + here[i] + below[i]) / pixels).collect()
 }
 
 /// Brightness from 0 to 255; where there is no picture, that of the nearest pixel of the row, or of the row above.

@@ -20,8 +20,10 @@ use crate::following::Reach;
 use crate::gradient_field::GradientField;
 use crate::template::ShapeTemplate;
 
-/// Turns at which the rival is laid over the photo, and how many of the best are tried in pictures.
+/// Turns at which the rival is laid over the photo, how many of them are followed to the full size, and how many of the best are tried in
+/// pictures.
 const NUM_TURNS: usize = 36;
+const NUM_FOLLOWED: usize = 14;
 const NUM_STARTS: usize = 4;
 /// Starts are at least so far apart, the second as a share of the edges' mean distance from the middle.
 const APART_RAD: f64 = 0.2;
@@ -49,10 +51,13 @@ fn resembling(
     further: &[PlanarSimilarity],
     counts: impl Fn(&PlanarSimilarity, f64) -> bool,
 ) -> Vec<PlanarSimilarity> {
-    let about_middle = (0..NUM_TURNS).map(|k| {
+    let turns = (0..NUM_TURNS).map(|k| {
         let turn = Angle::from_radians(k as f64 * std::f64::consts::TAU / NUM_TURNS as f64);
-        template.captured(field, &PlanarSimilarity::about(middles[0], middles[1], turn, 1.0), &REACH)
+        template.captured_coarsely(field, &PlanarSimilarity::about(middles[0], middles[1], turn, 1.0), &REACH)
     });
+    let mut turns: Vec<(PlanarSimilarity, f64)> = turns.collect();
+    turns.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let about_middle = turns.iter().take(NUM_FOLLOWED).map(|(pose, _)| template.captured(field, pose, &REACH));
     let mut fits: Vec<(PlanarSimilarity, f64)> = about_middle
         .chain(further.iter().copied())
         .map(|pose| (pose, template.agreement(field, &pose)))
@@ -167,11 +172,19 @@ impl Rival {
 impl CloseUp {
     /// How much of the photo's edges this one differs in where it lies on it by `photo_from_own`.
     fn share_differing(&self, photo: &CloseUp, photo_from_own: &PlanarSimilarity) -> f64 {
-        self.duel(photo, &photo.gradients, &photo_from_own.inverse()).share
+        self.laid_over(photo, &photo_from_own.inverse()).share(photo)
     }
 
     /// The photo against this one, which lies there by `own_from_photo`.
     fn duel(&self, photo: &CloseUp, seen: &Gradients, own_from_photo: &PlanarSimilarity) -> RivalFit {
+        let both = self.laid_over(photo, own_from_photo);
+        let fit = both.photos.fit(&photo.expected, seen);
+        let rivals_fit = both.rivals.fit(&both.expected, seen);
+        RivalFit { margin: f64::from(fit - rivals_fit), fit: f64::from(rivals_fit), share: both.share(photo) }
+    }
+
+    /// This one in the photo's frame, and where the two differ.
+    fn laid_over(&self, photo: &CloseUp, own_from_photo: &PlanarSimilarity) -> LaidOver {
         let depth: Vec<f32> = photo.frame.pixels().map(|at| self.depth_at(photo, at, own_from_photo)).collect();
         let colors = photo.frame.sampled_sparsely(&self.image, own_from_photo);
         let gradients = Gradients::new(&colors, SIDE, |i| depth[i] > -3.0);
@@ -179,14 +192,8 @@ impl CloseUp {
         // As pictures, each shows its part alone.
         let of_rival = gradients.only(|i| depth[i] > -4.0);
         let of_photo = photo.gradients.clone().only(|i| photo.depth[i] > -4.0);
-        let (weight, fit) = differing(&photo.expected, &of_rival, seen);
-        let (rivals_weight, rivals_fit) = differing(&expected, &of_photo, seen);
-        let all: f32 = photo.expected.energy.iter().sum();
-        RivalFit {
-            margin: f64::from(fit - rivals_fit),
-            fit: f64::from(rivals_fit),
-            share: f64::from((weight + rivals_weight) / all.max(f32::MIN_POSITIVE)),
-        }
+        let photos = Differing::new(&photo.expected, &of_rival);
+        LaidOver { photos, rivals: Differing::new(&expected, &of_photo), expected }
     }
 
     /// How far a pixel of the photo's frame lies inside this one's outline.
@@ -198,15 +205,44 @@ impl CloseUp {
     }
 }
 
-/// The edges that `expected` has and `other` lacks: how many, and how they correlate with what is seen.
-fn differing(expected: &Expected, other: &Gradients, seen: &Gradients) -> (f32, f32) {
-    let strongest = expected.energy.iter().fold(0.0f32, |a, b| a.max(*b));
-    let (with_other, with_picture) = (expected.fit(other), expected.fit(seen));
-    let (mut weight, mut fit) = (0.0, 0.0);
-    for i in (0..with_other.len()).filter(|&i| expected.energy[i] > MIN_EDGES * strongest) {
-        let differs = expected.energy[i] * (SAME - with_other[i]).clamp(0.0, 1.0);
-        weight += differs;
-        fit += differs * with_picture[i];
+/// A rival in the photo's frame.
+struct LaidOver {
+    expected: Expected,
+    /// The photo's edges that the rival lacks, and the rival's that the photo lacks.
+    photos: Differing,
+    rivals: Differing,
+}
+
+impl LaidOver {
+    /// How much they differ in, as a share of the photo's edges.
+    fn share(&self, photo: &CloseUp) -> f64 {
+        let all: f32 = photo.expected.energy.iter().sum();
+        f64::from((self.photos.sum() + self.rivals.sum()) / all.max(f32::MIN_POSITIVE))
     }
-    (weight, fit / weight.max(f32::MIN_POSITIVE))
+}
+
+/// The edges that one has and another lacks, by window.
+struct Differing {
+    windows: Vec<(usize, f32)>,
+}
+
+impl Differing {
+    fn new(expected: &Expected, other: &Gradients) -> Self {
+        let strongest = expected.energy.iter().fold(0.0f32, |a, b| a.max(*b));
+        let with_other = expected.fit(other);
+        let counting = (0..with_other.len()).filter(|&i| expected.energy[i] > MIN_EDGES * strongest);
+        let windows = counting.map(|i| (i, expected.energy[i] * (SAME - with_other[i]).clamp(0.0, 1.0))).collect();
+        Self { windows }
+    }
+
+    fn sum(&self) -> f32 {
+        self.windows.iter().map(|(_, differs)| differs).sum()
+    }
+
+    /// How they correlate with what is seen.
+    fn fit(&self, expected: &Expected, seen: &Gradients) -> f32 {
+        let with_picture = expected.fit(seen);
+        let fit: f32 = self.windows.iter().map(|&(i, differs)| differs * with_picture[i]).sum();
+        fit / self.sum().max(f32::MIN_POSITIVE)
+    }
 }
