@@ -136,21 +136,25 @@ impl Page {
         self.browser.screenshot(&repository().join(format!("target/browser-test/annotate-{name}.png"))).unwrap();
     }
 
-    /// What axe-core finds wrong with the page as it is now.
     pub fn assert_accessible(&self, about: &str) {
-        let path = repository().join("target/browser-test/npm/node_modules/axe-core/axe.min.js");
-        let axe =
-            std::fs::read_to_string(&path).unwrap_or_else(|_| panic!("make test-browser installs {}", path.display()));
-        self.browser.run(&format!("if (!window.axe) {{ {axe}\n }}"), &[]).unwrap();
-        let script = "return axe.run(document).then((found) => found.violations.map((v) =>
-            `${v.id} (${v.help}): ${v.nodes.map((n) => n.target.join(' ')).join(', ')}`))";
-        let violations = self.browser.run(script, &[]).unwrap();
-        assert_eq!(violations, json!([]), "{about}");
+        assert_accessible(&self.browser, about);
     }
 
     pub fn assert_quiet(&self) {
         assert_eq!(self.browser.console_errors().unwrap(), [""; 0]);
     }
+}
+
+/// What axe-core finds wrong with a page as it is now.
+pub fn assert_accessible(browser: &Browser, about: &str) {
+    let path = repository().join("target/browser-test/npm/node_modules/axe-core/axe.min.js");
+    let axe =
+        std::fs::read_to_string(&path).unwrap_or_else(|_| panic!("make test-browser installs {}", path.display()));
+    browser.run(&format!("if (!window.axe) {{ {axe}\n }}"), &[]).unwrap();
+    let script = "return axe.run(document).then((found) => found.violations.map((v) =>
+            `${v.id} (${v.help}): ${v.nodes.map((n) => n.target.join(' ')).join(', ')}`))";
+    let violations = browser.run(script, &[]).unwrap();
+    assert_eq!(violations, json!([]), "{about}");
 }
 
 fn serve(folder: &TempDir, arguments: &[String]) -> (Child, String) {

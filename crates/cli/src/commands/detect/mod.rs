@@ -24,10 +24,9 @@ use crate::json_line::json_line;
 
 /// Every image gets its line; one that cannot be read gets its error, and the next one its turn.
 pub fn run(args: &DetectArgs) -> Result<Outcome> {
-    if args.from.is_none() && (args.frames.is_some() || args.every_frame) {
-        return Err(
-            Usage("--frames and --every-frame: expected live pictures (--from), found images".to_owned()).into()
-        );
+    if args.from.is_none() {
+        let own = [("--frames", args.frames.is_some()), ("--every-frame", args.every_frame)];
+        args.request.refuse_without_camera(&own, "images")?;
     }
     if args.from.is_some() && !args.images.is_empty() {
         return Err(Usage("--from: expected live pictures instead of images, found images as well".to_owned()).into());
