@@ -6,6 +6,8 @@ export const state = {
   /** The folder, where the session is a project; versions of the model, oldest first. */
   project: null,
   models: [],
+  /** Whether the camera of the photos is calibrated: the size of the part in them is known then. */
+  isCalibrated: false,
   /** Photos of the part: what the server tells of each, and `past`, `future` of its marks as JSON. */
   images: [],
   current: 0,

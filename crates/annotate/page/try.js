@@ -7,6 +7,7 @@ import { MIN_SHOWN, numbered } from "./overlay.js";
 import { openImage, openTrialPicture, removeTrialPicture } from "./strip.js";
 import { changed, isLive, state, trialPicture } from "./store.js";
 import { openTab } from "./tabs.js";
+import { teach } from "./teach.js";
 import { toast } from "./toast.js";
 
 const by = (id) => document.getElementById(id);
@@ -101,6 +102,13 @@ async function accept(marks, { correct }) {
   changed();
 }
 
+/** Teaches as before, with what was added since, and shows how it goes. */
+function teachAgain() {
+  openTab("teach");
+  by("tab-teach").focus();
+  teach();
+}
+
 /** Says that the part is not in this picture, or takes that back. */
 async function setAbsent(target, absent) {
   try {
@@ -178,7 +186,7 @@ function renderFound() {
     found.append(text("p", `A demonstration now: ${state.images[index]?.name}.`), button("Look at its marks", () => {
       openTab("mark");
       openImage(index);
-    }), button("Teach again", () => openTab("teach"), "primary"));
+    }), button("Teach again", teachAgain, "primary"));
   } else if (!shown.is_absent) {
     found.append(button("The part is not here", () => setAbsent(shown, true), accepted.length ? "" : "plain"));
   }
@@ -186,6 +194,7 @@ function renderFound() {
     const nothing = { box: null, grasp: null, outline: null };
     found.append(text("p", "If the part is there, mark it: it then learns from this picture, too."), button("Mark it by hand…", () => accept(nothing, { correct: true })));
   }
+  if (shown.is_absent) found.append(button("Teach again", teachAgain, "primary"));
   found.append(button("Take this picture out", () => removeTrialPicture(shown), "plain"));
   const more = shown.detections.filter((d) => !d.is_accepted && (state.showRefused || !isShown(d, shown))).length;
   if (refused && (more || state.showRefused)) {
@@ -209,7 +218,9 @@ export function renderTry() {
   by("try-intro").textContent = !isTaught()
     ? "Nothing is taught yet. Teach a model first; pictures can be added already."
     : state.trialPictures.length
-      ? "Each picture is looked at as it comes in. Score 0.5 decides."
+      ? state.models.find((model) => model.is_current)?.is_stale
+        ? "This model is old: photos, marks or pictures without the part have changed since. Teach again to use them."
+        : "Each picture is looked at as it comes in. Score 0.5 decides."
       : "Add pictures that were taken as the first one was, with the part lying in other ways.";
   renderFound();
   lookAtAll();

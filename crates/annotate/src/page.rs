@@ -23,6 +23,7 @@ const FILES: &[(&str, &str, &str)] = &[
     ("server_end.js", SCRIPT, include_str!("../page/server_end.js")),
     ("samples.js", SCRIPT, include_str!("../page/samples.js")),
     ("store.js", SCRIPT, include_str!("../page/store.js")),
+    ("symmetry.js", SCRIPT, include_str!("../page/symmetry.js")),
     ("strip.js", SCRIPT, include_str!("../page/strip.js")),
     ("tabs.js", SCRIPT, include_str!("../page/tabs.js")),
     ("teach.js", SCRIPT, include_str!("../page/teach.js")),
@@ -41,8 +42,8 @@ pub fn file(name: &str) -> Option<(&'static str, &'static str)> {
 mod tests {
     use super::*;
 
-    /// Issue 19: the page stays under 250 KB.
-    const MAX_BYTES: usize = 250_000;
+    /// Issue 47: the page stays below 190 KB.
+    const MAX_BYTES: usize = 190_000;
 
     #[test]
     fn the_page_is_small() {

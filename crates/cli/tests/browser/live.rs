@@ -94,7 +94,7 @@ fn take_and_mark(page: &Page) {
 
 fn teach(page: &Page) {
     page.click("#tab-teach");
-    page.click("[name=model][value=S]");
+    page.choose_model("S");
     page.click("#teach-start");
     patiently(page, "a model", "return document.getElementById('teach-outcome').innerText.includes('Written to')");
 }

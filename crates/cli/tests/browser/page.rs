@@ -73,6 +73,22 @@ impl Page {
         self.browser.find(css).unwrap().click().unwrap();
     }
 
+    /// Opens what is folded.
+    pub fn unfold(&self, css: &str) {
+        if self.browser.run("return document.querySelector(arguments[0]).open", &[json!(css)]).unwrap() == json!(false)
+        {
+            self.click(&format!("{css} > summary"));
+        }
+    }
+
+    /// Chooses a model to teach; all but C are folded.
+    pub fn choose_model(&self, letter: &str) {
+        if letter != "C" {
+            self.unfold("#other-models");
+        }
+        self.click(&format!("[name=model][value={letter}]"));
+    }
+
     /// Writes over what a field shows, by keys alone: the page may write a field that is not in focus at any time, and
     /// one that is not shown yet takes no focus.
     pub fn fill(&self, css: &str, text: &str) {

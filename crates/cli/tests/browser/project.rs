@@ -33,7 +33,7 @@ fn shown(page: &Page) {
 
 fn teach_s(page: &Page, count: usize) {
     page.click("#tab-teach");
-    page.click("[name=model][value=S]");
+    page.choose_model("S");
     page.click("#teach-start");
     let taught = format!("return document.querySelectorAll('#version-list li').length === {count}");
     patiently(page, "a version", &taught);
@@ -122,8 +122,17 @@ fn a_refused_one_says_why_and_is_learnt_from() {
         "the version to be stale",
         "return document.getElementById('version-list').innerText.includes('stale')",
     );
+    page.wait_for("the old result", "return !document.getElementById('teach-old').hidden");
     page.screenshot("project-2-stale");
     page.assert_accessible("versions");
+    // In the last step, too, "Teach again" teaches.
+    page.click("#tab-try");
+    assert!(page.text("#try-intro").contains("This model is old"), "{}", page.text("#try-intro"));
+    let again = "[...document.querySelectorAll('#found button')].find((b) => b.innerText === 'Teach again').click()";
+    page.browser.run(again, &[]).unwrap();
+    let taught = "return document.querySelectorAll('#version-list li').length === 2
+        && document.getElementById('teach-old').hidden && !document.getElementById('go-try').hidden";
+    patiently(&page, "another version", taught);
     page.assert_quiet();
 }
 
@@ -283,6 +292,12 @@ fn that_an_outline_has_no_holes_is_said() {
     assert!((after / area - 1.0).abs() < 0.05, "{after} of {area}");
     page.screenshot("project-10-hole");
     page.assert_accessible("a click in a hole");
+    // A round outline raises the question whether the part looks the same when turned.
+    page.click("#tab-teach");
+    page.wait_for("the question", "return document.getElementById('symmetry').open");
+    assert!(page.text("#symmetry-why").contains("any turn"), "{}", page.text("#symmetry-why"));
+    page.screenshot("project-12-symmetry");
+    page.assert_accessible("the question of turns");
     page.assert_quiet();
 }
 
