@@ -1,6 +1,7 @@
 // The camera: its newest picture on the stage, photos taken of it, and the taught model tried on it again and again.
 
 import { api } from "./api.js";
+import { offBecause } from "./buttons.js";
 import { adopt } from "./editing.js";
 import { numbered } from "./overlay.js";
 import { openImage, showCurrent } from "./strip.js";
@@ -189,7 +190,7 @@ function renderShooting() {
   by("mark-work").hidden = isShooting;
   by("camera-button").hidden = !state.camera;
   by("back-to-photos").hidden = !state.images.length;
-  by("take").disabled = !live.isUsable || Boolean(live.taking);
+  offBecause(by("take"), live.taking ? "The photo is being taken" : !live.isUsable && "The camera shows no usable picture");
   setText(by("shoot-where"), live.nextPhoto ? `It is written to ${live.nextPhoto}.` : "");
 }
 
@@ -210,7 +211,7 @@ function renderTrying() {
   if (!state.camera) return;
   by("live-toggle").textContent = !state.tryingLive ? "Back to the live picture" : live.paused ? "Go on" : "Pause";
   by("live-keep").hidden = !state.tryingLive;
-  by("live-keep").disabled = live.number === null;
+  offBecause(by("live-keep"), live.number === null && "The camera has shown no picture yet");
   const isFound = state.tryingLive && live.isUsable && live.detections && !live.failed;
   by("live-error").hidden = !state.tryingLive || !live.failed;
   setText(by("live-error"), live.failed ?? "");

@@ -53,6 +53,9 @@ export function changed() {
 export const image = () => state.images[state.current];
 export const marks = () => image().marks;
 export const trialPicture = () => state.trialPictures[state.trial];
+/** Whether a photo has all the marks that a teaching needs. */
+export const isComplete = ({ marks: { box, outline, grasp } }) => Boolean((box || outline) && grasp);
+export const isAnyMarked = () => state.images.some(isComplete);
 export const size = () => [image().width, image().height];
 
 /** Whether the stage shows the camera: for the first photo, for a further one, or to try the model. */

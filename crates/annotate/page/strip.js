@@ -3,7 +3,7 @@
 import { api } from "./api.js";
 import { nextTool } from "./editing.js";
 import { toast } from "./toast.js";
-import { changed, image, isLive, marks, state, trialPicture } from "./store.js";
+import { changed, image, isComplete, isLive, state, trialPicture } from "./store.js";
 import { show } from "./view.js";
 
 const strip = document.getElementById("strip");
@@ -120,4 +120,4 @@ export function renderStrip() {
 
 /** For the title of the window. */
 export const shownName = () => (isLive() ? "Live" : (state.tab === "try" ? trialPicture() : image())?.name) ?? "";
-export const isMarked = () => Boolean(image() && (marks().box || marks().outline) && marks().grasp);
+export const isMarked = () => Boolean(image() && isComplete(image()));

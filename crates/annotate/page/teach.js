@@ -1,7 +1,8 @@
 // The third step: teaching, and how it goes.
 
 import { api } from "./api.js";
-import { changed, image, state } from "./store.js";
+import { offBecause } from "./buttons.js";
+import { changed, image, isComplete, state } from "./store.js";
 import { turnsOf } from "./symmetry.js";
 import { toast } from "./toast.js";
 import { figuresText, gradeOf } from "./versions.js";
@@ -183,9 +184,9 @@ function renderFolds() {
   if (outline !== measured) [measured, turns] = [outline, turnsOf(outline)];
   if (turns === asked) return;
   asked = turns;
-  const words = SHAPES.find(([value]) => value === String(turns))[1].toLowerCase();
+  const words = SHAPES.find(([value]) => value === String(turns))[1];
   by("symmetry-why").hidden = turns === 1;
-  by("symmetry-why").textContent = turns === 1 ? "" : `The outline looks the same after a turn (${words}). If the whole part does, choose that.`;
+  by("symmetry-why").textContent = turns === 1 ? "" : `The outline looks like “${words}”. If the whole part does, choose it.`;
   by("symmetry").open = turns !== 1;
 }
 by("teach-form").addEventListener("change", changed);
@@ -202,18 +203,20 @@ function preselect() {
 export function renderTeach() {
   preselect();
   const news = state.teaching;
-  const marked = state.images.filter((i) => (i.marks.box || i.marks.outline) && i.marks.grasp);
+  const marked = state.images.filter(isComplete);
   by("teach-from").textContent = marked.length
     ? `From ${marked.length === 1 ? "the marked photo" : `${marked.length} marked photos`} of “${state.label}”${negativesText()}.`
     : `${state.images.length ? "Mark the part on a photo first" : "Take a photo of the part first and mark it"}: box and grasp.`;
   for (const input of document.querySelectorAll("[name=model]")) {
     const lacks = image()?.advice.models.find((m) => m.model === input.value).lacks ?? [];
     const needsOutline = input.value === "D" && marked.some((i) => !i.marks.outline);
-    input.disabled = needsOutline || (!marked.length && lacks.length > 0);
+    const reason = needsOutline ? "Needs the outline on every marked photo" : !marked.length && lacks.length && `Needs ${new Intl.ListFormat("en").format(lacks)}`;
+    offBecause(input, reason);
+    input.closest("label").title = reason || "";
     if (input.disabled && input.checked && marked.length) document.querySelector("[name=model][value=C]").checked = true;
   }
   const start = by("teach-start");
-  start.disabled = isRunning() || !marked.length;
+  offBecause(start, !marked.length && "Mark box and grasp on a photo first");
   start.textContent = news.status === "done" ? "Teach again" : "Teach";
   renderFolds();
   renderProgress(news);

@@ -1,6 +1,7 @@
 // The fourth step: the taught model on other pictures. What it got right, or is put right, becomes a demonstration.
 
 import { api } from "./api.js";
+import { button } from "./buttons.js";
 import { adopt } from "./editing.js";
 import { poseText } from "./live.js";
 import { MIN_SHOWN, numbered } from "./overlay.js";
@@ -119,13 +120,6 @@ async function setAbsent(target, absent) {
     toast(error.message);
   }
   changed();
-}
-
-function button(text, action, classes = "") {
-  const made = document.createElement("button");
-  Object.assign(made, { textContent: text, className: classes });
-  made.addEventListener("click", action);
-  return made;
 }
 
 function text(tag, content, classes = "") {

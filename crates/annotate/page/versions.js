@@ -1,6 +1,7 @@
 // The models taught so far: what each is worth, which one is in use, two of them compared.
 
 import { api } from "./api.js";
+import { button } from "./buttons.js";
 import { changed, state } from "./store.js";
 import { toast } from "./toast.js";
 
@@ -34,12 +35,6 @@ export function gradeOf({ figures }) {
   const alarms = (figures.false_alarms[0] + figures.wrong) / Math.max(figures.false_alarms[1] + figures.found[1], 1);
   if (found < 0.7 || alarms > 0.2) return "poor";
   return found < 0.9 || alarms > 0.05 ? "doubtful" : "good";
-}
-
-function button(text, action) {
-  const made = Object.assign(document.createElement("button"), { type: "button", textContent: text });
-  made.addEventListener("click", action);
-  return made;
 }
 
 async function use(id) {

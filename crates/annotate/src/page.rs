@@ -12,6 +12,7 @@ const FILES: &[(&str, &str, &str)] = &[
     ("page.css", STYLE, include_str!("../page/page.css")),
     ("icon.svg", ICON, include_str!("../page/icon.svg")),
     ("api.js", SCRIPT, include_str!("../page/api.js")),
+    ("buttons.js", SCRIPT, include_str!("../page/buttons.js")),
     ("editing.js", SCRIPT, include_str!("../page/editing.js")),
     ("geometry.js", SCRIPT, include_str!("../page/geometry.js")),
     ("gestures.js", SCRIPT, include_str!("../page/gestures.js")),

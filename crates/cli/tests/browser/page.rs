@@ -125,7 +125,7 @@ impl Page {
     /// Waits until what was just done is shown, sent and answered.
     pub fn settle(&self) {
         let script = "return new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(
-            !document.getElementById('propose').disabled && document.getElementById('saved').innerText !== 'Saving…'))))";
+            document.getElementById('propose').innerText !== 'Looking…' && document.getElementById('saved').innerText !== 'Saving…'))))";
         self.wait_for("the page to settle", script);
     }
 

@@ -15,6 +15,28 @@ fn from_a_photo_to_a_taught_model_and_another_demonstration() {
     assert_light(&page);
     page.assert_accessible("empty page");
     page.screenshot("1-empty");
+    // What needs marks is off, and says why.
+    let off = |css: &str| {
+        let script = "const b = document.querySelector(arguments[0]); return b.disabled ? b.title : 'on'";
+        page.browser.run(script, &[css.into()]).unwrap()
+    };
+    for css in ["#propose", "[data-tool=in]", "[data-tool=out]", "#panel-mark [data-next=samples]"] {
+        assert_eq!(off(css), "Draw a box around the part first", "{css}");
+    }
+    assert_eq!(off("#delete"), "Select a mark first");
+    page.click("#tab-samples");
+    page.settle_frames();
+    assert_eq!(off("#other-samples"), "Draw a box around the part first");
+    assert_eq!(off("#panel-samples [data-next=teach]"), "Mark box and grasp on a photo first");
+    page.assert_accessible("samples of nothing");
+    page.click("#tab-teach");
+    page.settle_frames();
+    assert_eq!(off("#teach-start"), "Mark box and grasp on a photo first");
+    page.unfold("#other-models");
+    assert_eq!(off("[name=model][value=D]"), "Needs the box, the grasp, and the outline");
+    page.assert_accessible("teaching from nothing");
+    page.click("#other-models > summary");
+    page.click("#tab-mark");
     page.click("#tab-try");
     page.assert_accessible("trying before anything is taught");
     page.click("#tab-mark");
@@ -44,6 +66,8 @@ fn mark(page: &Page) {
     page.fill("#label", "pendulum");
     page.draw_box();
     let boxed = page.saved();
+    let is_on = "return !document.querySelector('#panel-mark [data-next=samples]').disabled";
+    page.wait_for("the way on", is_on);
     let close = |a: f64, b: f64| (a - b).abs() < 1.5;
     assert!(close(boxed.bbox.x1, BOX[0]) && close(boxed.bbox.y2, BOX[3]), "{:?}", boxed.bbox);
     assert_eq!(boxed.label, "pendulum");

@@ -295,7 +295,7 @@ fn that_an_outline_has_no_holes_is_said() {
     // A round outline raises the question whether the part looks the same when turned.
     page.click("#tab-teach");
     page.wait_for("the question", "return document.getElementById('symmetry').open");
-    assert!(page.text("#symmetry-why").contains("any turn"), "{}", page.text("#symmetry-why"));
+    assert!(page.text("#symmetry-why").contains("Any turn"), "{}", page.text("#symmetry-why"));
     page.screenshot("project-12-symmetry");
     page.assert_accessible("the question of turns");
     page.assert_quiet();
