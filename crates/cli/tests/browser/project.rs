@@ -88,8 +88,42 @@ fn several_found_ones_have_numbers() {
     let tags =
         "return [...document.querySelectorAll('#overlay .tag')].map((tag) => tag.textContent.slice(0, 2)).sort()";
     assert_eq!(page.browser.run(tags, &[]).unwrap(), json!(["1:", "2:"]));
+    let places = "return [...document.querySelectorAll('#found .pose')].map((p) => p.innerText)";
+    for place in page.browser.run(places, &[]).unwrap().as_array().unwrap() {
+        let place = place.as_str().unwrap();
+        assert!(place.starts_with("x ") && place.contains(" px, ") && place.contains('°'), "{place}");
+    }
     page.screenshot("project-11-two");
     page.assert_accessible("two found");
+
+    // The least score decides, in the list, in the picture and in the row.
+    let count = page.text("#least-score-count");
+    assert!(count.starts_with("Found 2 of ") && count.contains("at 0.50, in 1 of 1 pictures"), "{count}");
+    let slide =
+        "const s = document.getElementById('least-score'); s.value = arguments[0]; s.dispatchEvent(new Event('input'))";
+    page.browser.run(slide, &[json!("1")]).unwrap();
+    page.wait_for("nothing", "return document.getElementById('found').innerText.includes('Nothing is accepted')");
+    let count = page.text("#least-score-count");
+    assert!(count.starts_with("Found 0 of ") && count.contains("--min-score 1.00"), "{count}");
+    assert!(page.text("#strip").contains("nothing found"), "{}", page.text("#strip"));
+    page.screenshot("project-13-least-score");
+    page.assert_accessible("nothing at the highest least score");
+    page.browser.run(slide, &[json!("0.5")]).unwrap();
+
+    // Another picture, with nothing in it, comes first when the row is sorted.
+    try_picture(&page, "empty.png", &RgbImage::from_pixel(640, 480, Rgb([140, 140, 135])));
+    let row = "return [...document.querySelectorAll('#strip button')].map((b) => b.children[1].innerText)";
+    assert_eq!(page.browser.run(row, &[]).unwrap(), json!(["two.png", "empty.png"]));
+    for by in ["score", "state"] {
+        let sort = "const s = document.getElementById('sort-pictures'); s.value = arguments[0]; s.dispatchEvent(new Event('change'))";
+        page.browser.run(sort, &[json!("added")]).unwrap();
+        page.browser.run(sort, &[json!(by)]).unwrap();
+        page.settle_frames();
+        assert_eq!(page.browser.run(row, &[]).unwrap(), json!(["empty.png", "two.png"]), "{by}");
+    }
+    page.click("#strip li:nth-child(2) button");
+    page.wait_for("the other picture", "return document.getElementById('photo').alt === 'Photo two.png'");
+    page.screenshot("project-14-sorted");
     page.assert_quiet();
 }
 
@@ -106,6 +140,12 @@ fn a_refused_one_says_why_and_is_learnt_from() {
     let dots = "return document.querySelectorAll('#overlay .differs path').length";
     assert!(page.browser.run(dots, &[]).unwrap().as_u64().unwrap() > 0, "where it differs is shown");
     page.screenshot("project-1-refused");
+    page.click("#show-differences");
+    page.settle_frames();
+    assert_eq!(page.browser.run(dots, &[]).unwrap(), json!(0), "what differs can be switched off");
+    page.assert_accessible("without the marks of what differs");
+    page.click("#show-differences");
+    page.settle_frames();
     page.assert_accessible("a refused detection");
     page.click(".found button");
     page.wait_for(
