@@ -89,24 +89,25 @@ export function renderVersions() {
     item.className = gradeOf(model.summary);
     const when = new Date(model.taught_secs * 1000).toLocaleString();
     const title = Object.assign(document.createElement("b"), { textContent: `${model.id + 1}: ${model.summary.model}, ${when}` });
-    const marks = [model.is_current && "in use", model.is_stale && "stale: photos, marks or negatives have changed since"].filter(Boolean);
-    const note = Object.assign(document.createElement("span"), { className: "stale", textContent: marks.join("; ") });
+    const notes = [];
+    if (model.is_current) notes.push(Object.assign(document.createElement("span"), { className: "used", textContent: "in use" }));
+    if (model.is_stale) notes.push(Object.assign(document.createElement("span"), { className: "stale", textContent: "stale: photos, marks or pictures without the part have changed since" }));
     const of = `${model.photos} photo${model.photos === 1 ? "" : "s"}${model.negatives ? `, ${model.negatives} without the part` : ""}. `;
     const figures = Object.assign(document.createElement("small"), { textContent: of + briefFigures(model.summary) });
     const row = Object.assign(document.createElement("div"), { className: "row" });
     if (!model.is_current) row.append(button("Use this one", () => use(model.id)));
     if (models.length > 1) {
-      const label = document.createElement("label");
+      const label = Object.assign(document.createElement("label"), { className: "check" });
       const box = Object.assign(document.createElement("input"), { type: "checkbox", checked: chosen.includes(model.id) });
       box.addEventListener("change", () => {
         chosen = box.checked ? [...chosen, model.id].slice(-2) : chosen.filter((id) => id !== model.id);
         changed();
       });
-      label.append(box, " Compare");
+      label.append(box, "Compare");
       row.append(label);
       if (chosen.length === 2 && chosen[1] === model.id) row.append(button("Compare the two", compare));
     }
-    item.append(title, note, figures, row);
+    item.append(title, ...notes, figures, row);
     return item;
   }));
 }

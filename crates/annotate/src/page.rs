@@ -52,6 +52,31 @@ mod tests {
         assert!(bytes < MAX_BYTES, "{bytes} bytes");
     }
 
+    /// The values of a property of this name in the page's CSS, and of those that begin with it.
+    fn values(property: &str) -> Vec<&'static str> {
+        let css = FILES.iter().find(|(name, ..)| *name == "page.css").unwrap().2;
+        let declarations = css.split(['{', '}', ';']).filter_map(|declaration| declaration.split_once(": "));
+        let named = declarations.filter(|(name, _)| {
+            let name = name.trim();
+            name == property || name.strip_prefix(property).is_some_and(|rest| rest.starts_with('-'))
+        });
+        named.map(|(_, value)| value).collect()
+    }
+
+    #[test]
+    fn sizes_and_spaces_are_those_of_the_style() {
+        const SPACES_PX: [i32; 7] = [2, 4, 8, 12, 16, 24, 40];
+        for size in values("font-size") {
+            assert!(size.starts_with("var(--"), "font-size: {size}");
+        }
+        for value in ["gap", "padding", "margin"].into_iter().flat_map(values) {
+            for px in value.split([' ', '(', ')', ',']).filter_map(|word| word.strip_suffix("px")) {
+                let px: i32 = px.parse().unwrap();
+                assert!(SPACES_PX.contains(&px.abs()), "a space of {px} px: {value}");
+            }
+        }
+    }
+
     #[test]
     fn every_file_that_the_page_asks_for_is_there_and_none_beside() {
         let texts = || FILES.iter().map(|&(.., text)| text).chain([INDEX]);

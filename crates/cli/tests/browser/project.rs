@@ -214,6 +214,17 @@ fn a_picture_without_the_part_is_kept_and_versions_are_compared_after_opening_ag
     let compared = "const text = document.getElementById('compared').innerText;
         return text.includes('other.png') && text.includes('empty.png') && text";
     patiently(&page, "the table", compared);
+    // Each checkbox is beside its word, and the button in the card; "in use" is no warning.
+    let layout = "const cards = [...document.querySelectorAll('#version-list li')];
+        const middle = (r) => (r.top + r.bottom) / 2, rect = (e) => e.getBoundingClientRect();
+        const word = (label) => { const range = document.createRange(); range.selectNode(label.lastChild); return rect(range); };
+        const beside = cards.every((card) => { const label = card.querySelector('label');
+            return Math.abs(middle(rect(label.firstChild)) - middle(word(label))) < 4; });
+        const inside = cards.every((card) => [...card.querySelectorAll('button')].every((b) =>
+            rect(b).right <= rect(card).right && rect(b).bottom <= rect(card).bottom));
+        return [beside, inside, document.querySelector('.used').innerText, getComputedStyle(document.querySelector('.used')).color !==
+            getComputedStyle(document.querySelector('.stale')).color]";
+    assert_eq!(page.browser.run(layout, &[]).unwrap(), json!([true, true, "in use", true]));
     page.screenshot("project-4-compared");
     page.assert_accessible("two versions compared");
     page.click("#version-list li:nth-child(1) button");
