@@ -1,10 +1,12 @@
 // The camera: its newest picture on the stage, photos taken of it, and the taught model tried on it again and again.
 
 import { api } from "./api.js";
+import { offBecause } from "./buttons.js";
 import { adopt } from "./editing.js";
+import { gripperOf } from "./geometry.js";
 import { numbered } from "./overlay.js";
 import { openImage, showCurrent } from "./strip.js";
-import { changed, isLive, state } from "./store.js";
+import { changed, isFound, isLive, state } from "./store.js";
 import { toast } from "./toast.js";
 import { replacePicture } from "./view.js";
 
@@ -164,6 +166,14 @@ function setText(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
 
+/** Where a grasp is, in words: in pixels of the picture, and over the table where a camera tells. */
+export function placeText({ marks, pose }) {
+  const { center, angle, width } = gripperOf(marks.grasp);
+  const [x, y] = center.map((v) => v.toFixed(1));
+  const inPicture = `x ${x}, y ${y} px, ${((angle * 180) / Math.PI).toFixed(1)}°, jaws ${width.toFixed(1)} px apart`;
+  return pose ? `${inPicture}\n${poseText(pose)}` : inPicture;
+}
+
 /** A grasp over the table, in words. */
 export function poseText({ frame, position_mm, yaw_deg, opening_mm, sigma_mm, sigma_deg }) {
   const [x, y, z] = position_mm.map((v) => v.toFixed(1));
@@ -189,17 +199,17 @@ function renderShooting() {
   by("mark-work").hidden = isShooting;
   by("camera-button").hidden = !state.camera;
   by("back-to-photos").hidden = !state.images.length;
-  by("take").disabled = !live.isUsable || Boolean(live.taking);
+  offBecause(by("take"), live.taking ? "The photo is being taken" : !live.isUsable && "The camera shows no usable picture");
   setText(by("shoot-where"), live.nextPhoto ? `It is written to ${live.nextPhoto}.` : "");
 }
 
 function cards(detections) {
-  const accepted = detections.filter((d) => d.is_accepted);
+  const accepted = detections.filter(isFound);
   if (!accepted.length) {
     const best = detections[0];
     return [["There is nothing to grasp.", best ? `best ${best.score.toFixed(2)}` : "", ""]];
   }
-  const told = accepted.slice(0, MAX_TOLD).map((d, i) => [numbered("Found the part", i, accepted.length), `score ${d.score.toFixed(2)}`, d.pose ? poseText(d.pose) : ""]);
+  const told = accepted.slice(0, MAX_TOLD).map((d, i) => [numbered("Found the part", i, accepted.length), `score ${d.score.toFixed(2)}`, placeText(d)]);
   if (accepted.length > MAX_TOLD) told.push([`And ${accepted.length - MAX_TOLD} more`, "", ""]);
   return told;
 }
@@ -210,13 +220,13 @@ function renderTrying() {
   if (!state.camera) return;
   by("live-toggle").textContent = !state.tryingLive ? "Back to the live picture" : live.paused ? "Go on" : "Pause";
   by("live-keep").hidden = !state.tryingLive;
-  by("live-keep").disabled = live.number === null;
-  const isFound = state.tryingLive && live.isUsable && live.detections && !live.failed;
+  offBecause(by("live-keep"), live.number === null && "The camera has shown no picture yet");
+  const isAnswered = state.tryingLive && live.isUsable && live.detections && !live.failed;
   by("live-error").hidden = !state.tryingLive || !live.failed;
   setText(by("live-error"), live.failed ?? "");
-  const time = isFound ? `Looked for ${Math.max(1, Math.round(live.seconds * 1000))} ms.` : state.hasModel ? "Looking…" : "Teach a model first: it then looks for the part here.";
+  const time = isAnswered ? `Looked for ${Math.max(1, Math.round(live.seconds * 1000))} ms.` : state.hasModel ? "Looking…" : "Teach a model first: it then looks for the part here.";
   setText(by("live-time"), live.failed || !state.tryingLive || (live.fault && !live.isUsable) ? "" : time);
-  const told = isFound ? cards(live.detections) : [];
+  const told = isAnswered ? cards(live.detections) : [];
   const text = JSON.stringify(told);
   if (by("live-found").dataset.shown === text) return;
   by("live-found").dataset.shown = text;
@@ -231,8 +241,8 @@ function renderTrying() {
     return item;
   }));
   // Told to those who do not see the page when the number changes only; the figures change with every frame.
-  const count = live.detections?.filter((d) => d.is_accepted).length ?? 0;
-  setText(by("live-status"), isFound ? `${count} found` : "");
+  const count = live.detections?.filter(isFound).length ?? 0;
+  setText(by("live-status"), isAnswered ? `${count} found` : "");
 }
 
 export function renderLive() {

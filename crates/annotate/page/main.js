@@ -56,6 +56,7 @@ try {
     modelPath: session.model_path,
     project: session.project,
     models: session.models,
+    isCalibrated: session.is_calibrated,
     hasModel: session.models.some((model) => model.is_current),
     images: session.images.map(adopt),
     trialPictures: session.trial_pictures.map((trial) => ({ ...trial, detections: null })),

@@ -1,6 +1,7 @@
 // The first step's panel: what to mark next, in numbers too, what looks odd, and what it is enough for.
 
 import { api } from "./api.js";
+import { offBecause } from "./buttons.js";
 import { clear, commit, deleteSelected, proposeOutline, redo, setGripper, setTool, swapEnds, turnToFit, undo } from "./editing.js";
 import { gripperOf } from "./geometry.js";
 import { changed, image, isMarking, marks, state } from "./store.js";
@@ -101,9 +102,12 @@ function renderTodo() {
   }
   by("turn-around").hidden = by("turn-to-fit").hidden = by("finger").hidden = !grasp;
   by("remove-photo").hidden = state.images.length < 2;
-  for (const tool of ["in", "out"]) document.querySelector(`button[data-tool=${tool}]`).disabled = !box && !outline;
+  const noBox = !box && !outline && "Draw a box around the part first";
+  for (const tool of ["in", "out"]) offBecause(document.querySelector(`button[data-tool=${tool}]`), noBox);
+  offBecause(by("turn-to-fit"), noBox);
+  offBecause(document.querySelector("#panel-mark [data-next=samples]"), noBox);
   by("grasp-numbers").hidden = !grasp;
-  by("propose").disabled = state.proposing;
+  offBecause(by("propose"), state.proposing ? "The outline is looked for" : noBox);
   by("propose").lastChild.textContent = state.proposing ? "Looking…" : outline ? "Find it anew" : "Find it";
   if (!grasp) return;
   const { angle, width, length } = gripperOf(grasp);
@@ -200,9 +204,9 @@ function renderTools() {
   for (const button of document.querySelectorAll("button[data-tool]")) {
     button.setAttribute("aria-pressed", String(button.dataset.tool === state.tool));
   }
-  by("undo").disabled = !image()?.past.length;
-  by("redo").disabled = !image()?.future.length;
-  by("delete").disabled = !(state.draft || (state.selected && image()?.marks[state.selected]));
+  offBecause(by("undo"), !image()?.past.length && "There is nothing to undo");
+  offBecause(by("redo"), !image()?.future.length && "There is nothing to redo");
+  offBecause(by("delete"), !(state.draft || (state.selected && image()?.marks[state.selected])) && "Select a mark first");
   by("mark-tools").hidden = by("edit-tools").hidden = !marking;
   by("stage").dataset.tool = marking ? state.tool : "select";
   const text = marking ? hint() : "";

@@ -1,7 +1,7 @@
 // Marks as they are drawn over the photo. Elements are kept from frame to frame, so that a handle in focus stays so.
 
 import { add, boundsOf, boxPolygon, direction, gripperOf, quarter, sub, times } from "./geometry.js";
-import { image, isLive, isMarking, marks, state, trialPicture } from "./store.js";
+import { image, isFound, isLive, isMarking, marks, state, trialPicture } from "./store.js";
 import { toScreen } from "./view.js";
 
 const SVG = "http://www.w3.org/2000/svg";
@@ -175,7 +175,7 @@ export const numbered = (text, i, count) => (count > 1 ? `${i + 1}: ${text}` : t
 
 /** A grasp that a model found: drawn alike, but not to be taken hold of. */
 function drawDetection(detection, i, count) {
-  const parent = group(`found${i}`, detection.is_accepted ? "" : "refused");
+  const parent = group(`found${i}`, isFound(detection) ? "" : "refused");
   const { outline, grasp, box } = detection.marks;
   if (outline) {
     const within = element(`found${i}/outline`, "g", { class: "outline" }, parent);
@@ -198,10 +198,10 @@ export function renderOverlay() {
     // What was found in an old picture is not there now.
     const inLive = state.live.isUsable ? state.live.detections : null;
     const detections = isLive() ? inLive : trialPicture()?.detections;
-    const shown = detections?.filter((d, i) => d.is_accepted || state.showRefused || (!isLive() && i === 0 && d.score >= MIN_SHOWN)) ?? [];
+    const shown = detections?.filter((d, i) => isFound(d) || state.showRefused || (!isLive() && i === 0 && d.score >= MIN_SHOWN)) ?? [];
     // Worst first, so that the best is on top.
     shown.map((d, i) => [d, i]).reverse().forEach(([d, i]) => {
-      if (d.refusal) drawDifferences(d.refusal, i);
+      if (d.refusal && !isFound(d) && state.showDifferences) drawDifferences(d.refusal, i);
       drawDetection(d, i, shown.length);
     });
   } else if (image() && !isLive()) {

@@ -1,7 +1,8 @@
 // The second step: a sheet of samples made from the marks.
 
 import { api } from "./api.js";
-import { image, state } from "./store.js";
+import { offBecause } from "./buttons.js";
+import { image, isAnyMarked, state } from "./store.js";
 
 const COUNT = 12;
 const sheet = document.getElementById("sheet");
@@ -16,6 +17,9 @@ document.getElementById("other-samples").addEventListener("click", () => {
 /** Shows samples of the marks as they are; pictures are asked for anew only when the marks have changed. */
 export function renderSamples() {
   if (state.tab !== "samples") return;
+  const isBoxed = image() && (image().marks.box || image().marks.outline);
+  offBecause(document.getElementById("other-samples"), !isBoxed && "Draw a box around the part first");
+  offBecause(document.querySelector("#panel-samples [data-next=teach]"), !isAnyMarked() && "Mark box and grasp on a photo first");
   if (!image()) {
     problem.hidden = false;
     problem.textContent = "There is nothing to show yet: take a photo of the part first.";

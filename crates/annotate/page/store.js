@@ -6,6 +6,8 @@ export const state = {
   /** The folder, where the session is a project; versions of the model, oldest first. */
   project: null,
   models: [],
+  /** Whether the camera of the photos is calibrated: the size of the part in them is known then. */
+  isCalibrated: false,
   /** Photos of the part: what the server tells of each, and `past`, `future` of its marks as JSON. */
   images: [],
   current: 0,
@@ -27,6 +29,11 @@ export const state = {
   tryingLive: true,
   /** The frame on the stage, with its `detections` where the model is tried, and what is wrong with the camera. */
   live: { number: null, url: null, size: null, detections: null, failed: null, fault: null, isUsable: false, paused: false },
+  /** What scores so much is found. */
+  minScore: 0.5,
+  /** The order of the pictures to try in their row: as they were added, by score, by state. */
+  sortedBy: "added",
+  showDifferences: true,
   teaching: { status: "idle", losses: [], validations: [] },
   /** The part of the photo in view: screen = photo · scale + [x, y]. */
   view: { scale: 1, x: 0, y: 0, fitted: true },
@@ -51,6 +58,11 @@ export function changed() {
 export const image = () => state.images[state.current];
 export const marks = () => image().marks;
 export const trialPicture = () => state.trialPictures[state.trial];
+/** Whether a photo has all the marks that a teaching needs. */
+export const isComplete = ({ marks: { box, outline, grasp } }) => Boolean((box || outline) && grasp);
+export const isAnyMarked = () => state.images.some(isComplete);
+/** Whether a detection counts as found at the least score that is chosen. */
+export const isFound = (detection) => detection.score >= state.minScore;
 export const size = () => [image().width, image().height];
 
 /** Whether the stage shows the camera: for the first photo, for a further one, or to try the model. */

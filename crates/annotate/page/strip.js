@@ -3,7 +3,7 @@
 import { api } from "./api.js";
 import { nextTool } from "./editing.js";
 import { toast } from "./toast.js";
-import { changed, image, isLive, marks, state, trialPicture } from "./store.js";
+import { changed, image, isComplete, isFound, isLive, state, trialPicture } from "./store.js";
 import { show } from "./view.js";
 
 const strip = document.getElementById("strip");
@@ -90,8 +90,18 @@ function words(entry, trying) {
   if (entry.is_absent) return "✓ part not here";
   if (entry.detecting) return "looking…";
   if (!entry.detections) return "not tried";
-  const count = entry.detections.filter((d) => d.is_accepted).length;
+  const count = entry.detections.filter(isFound).length;
   return count ? `${count} found` : "nothing found";
+}
+
+/** The numbers of the pictures in the order of the row; those that were not looked at yet come last. */
+function order(entries, trying) {
+  const numbers = entries.map((_, i) => i);
+  if (!trying || state.sortedBy === "added") return numbers;
+  const best = ({ detections }) => (detections ? detections[0]?.score ?? 0 : 2);
+  const rank = ({ detections }) => (!detections ? 2 : detections.some(isFound) ? 1 : 0);
+  const key = state.sortedBy === "score" ? best : rank;
+  return numbers.sort((a, b) => key(entries[a]) - key(entries[b]) || a - b);
 }
 
 export function renderStrip() {
@@ -101,14 +111,20 @@ export function renderStrip() {
   strip.hidden = state.tab === "samples" ? state.images.length < 2 : trying || isLive() ? !entries.length : entries.length < 2;
   const current = trying ? state.trial : state.current;
   while (strip.children.length > entries.length) strip.lastChild.remove();
-  entries.forEach((entry, i) => {
-    let item = strip.children[i];
+  order(entries, trying).forEach((i, place) => {
+    const entry = entries[i];
+    let item = strip.children[place];
     if (!item) {
       item = document.createElement("li");
       item.innerHTML = '<button><img alt="" loading="lazy"><span></span><span></span></button>';
-      item.firstChild.addEventListener("click", () => (state.tab === "try" ? openTrialPicture(i) : openImage(i)));
+      item.firstChild.addEventListener("click", () => {
+        const index = Number(item.dataset.index);
+        if (state.tab === "try") openTrialPicture(index);
+        else openImage(index);
+      });
       strip.append(item);
     }
+    item.dataset.index = i;
     const [picture, name, word] = item.firstChild.children;
     const url = trying ? api.trialPictureUrl(entry.id) : api.imageUrl(entry.id);
     if (picture.getAttribute("src") !== url) picture.src = url;
@@ -120,4 +136,4 @@ export function renderStrip() {
 
 /** For the title of the window. */
 export const shownName = () => (isLive() ? "Live" : (state.tab === "try" ? trialPicture() : image())?.name) ?? "";
-export const isMarked = () => Boolean(image() && (marks().box || marks().outline) && marks().grasp);
+export const isMarked = () => Boolean(image() && isComplete(image()));

@@ -15,12 +15,14 @@ export function openTab(name) {
   if (String(before) !== String([name === "try", isLive()])) showCurrent();
   changed();
   document.querySelector(".panel").scrollTop = 0;
-  if (name === "teach") refreshVersions();
+  if (name === "teach" || name === "try") refreshVersions();
 }
 
 /** Which versions are stale depends on marks that were changed since. */
 async function refreshVersions() {
   try {
+    // First the marks that are on their way.
+    while (state.images.some((photo) => photo.saving)) await new Promise((resolve) => setTimeout(resolve, 50));
     state.models = (await api.session()).models;
     changed();
   } catch {
@@ -58,6 +60,7 @@ export function renderTabs() {
     tab(name).classList.toggle("done", Boolean(done[name]) && !open);
     document.getElementById(`panel-${name}`).hidden = !open;
   }
+  document.querySelector("main").dataset.tab = state.tab;
   const samples = state.tab === "samples";
   document.getElementById("stage").hidden = samples;
   document.getElementById("tools").hidden = samples;

@@ -1,14 +1,16 @@
 // The third step: teaching, and how it goes.
 
 import { api } from "./api.js";
-import { changed, image, state } from "./store.js";
+import { offBecause } from "./buttons.js";
+import { changed, image, isComplete, state } from "./store.js";
+import { turnsOf } from "./symmetry.js";
 import { toast } from "./toast.js";
 import { figuresText, gradeOf } from "./versions.js";
 
 const by = (id) => document.getElementById(id);
 const POLL_MS = 400;
 const MODELS = [
-  ["C", "Keypoints", "The best all-round. Half a minute."],
+  ["C", "Keypoints (recommended)", "The best all-round. Half a minute."],
   ["S", "Shape", "No network. Ready in seconds; weaker when the part is partly hidden."],
   ["A", "Crop", "Box, and the turn from the crop in it. About a minute."],
   ["B", "Box", "As C, but grips the middle of the box."],
@@ -38,15 +40,23 @@ for (const [letter, name, says] of MODELS) {
   item.innerHTML = `<input type="radio" name="model" value="${letter}"><span><b>${letter}</b> ${name}</span><small></small>`;
   item.lastChild.textContent = says;
   item.firstChild.checked = letter === "C";
-  by("models").append(item);
+  if (letter === "C") by("models").insertBefore(item, by("other-models"));
+  else by("other-models").append(item);
 }
 
 const isRunning = () => ["running", "stopping"].includes(state.teaching.status);
 const seconds = (s) => (s < 90 ? `${Math.round(s)} s` : `${Math.floor(s / 60)} min ${Math.round(s % 60)} s`);
 const percent = (share) => `${Math.round(share * 100)}\u00a0%`;
 
-by("teach-form").addEventListener("submit", async (event) => {
+by("teach-form").addEventListener("submit", (event) => {
   event.preventDefault();
+  teach();
+});
+
+/** Teaches as the form says. */
+export async function teach() {
+  if (isRunning()) return;
+  preselect();
   const number = (id) => (by(id).value === "" ? null : by(id).valueAsNumber);
   const minutes = number("budget");
   const request = {
@@ -54,17 +64,19 @@ by("teach-form").addEventListener("submit", async (event) => {
     time_budget_secs: minutes === null ? null : minutes * 60,
     steps: number("steps"),
     symmetry: Number(new FormData(by("teach-form")).get("symmetry")),
+    fixed_height: by("fixed-height").checked && !state.isCalibrated,
     seed: number("seed") ?? 1,
   };
   by("teach-error").hidden = true;
   try {
     state.teaching = await api.teach(request);
+    document.querySelector(".panel").scrollTop = 0;
     watch();
   } catch (error) {
     state.teaching = { ...state.teaching, status: "failed", error: error.message };
   }
   changed();
-});
+}
 
 by("teach-stop").addEventListener("click", async () => {
   state.teaching = await api.stopTeaching().catch(() => state.teaching);
@@ -147,8 +159,37 @@ function renderOutcome(news) {
   if (outcome.textContent !== text) outcome.textContent = text;
   by("teach-error").hidden = news.status !== "failed";
   by("teach-error").textContent = news.error ?? "";
+  const isOld = news.status === "done" && Boolean(state.models.at(-1)?.is_stale);
+  outcome.classList.toggle("outdated", isOld);
+  by("teach-old").hidden = !isOld;
+  const old = isOld ? "This result is old: photos, marks or pictures without the part have changed since. Teach again." : "";
+  if (by("teach-old").textContent !== old) by("teach-old").textContent = old;
   by("go-try").hidden = news.status !== "done";
+  by("go-try").classList.toggle("primary", !isOld);
+  by("teach-start").classList.toggle("primary", news.status !== "done" || isOld);
 }
+
+const chosen = (name) => document.querySelector(`[name=${name}]:checked`);
+
+/** What is folded says what it holds; a question is opened when the outline raises it. */
+let [measured, turns, asked] = [null, 1, 1];
+function renderFolds() {
+  const model = MODELS.find(([letter]) => letter === chosen("model").value);
+  const other = model[0] === "C" ? "Other models" : `Other models: ${model[0]} ${model[1]} is chosen`;
+  const [, shape] = SHAPES.find(([value]) => value === chosen("symmetry").value);
+  by("other-models").firstElementChild.textContent = other;
+  by("symmetry").firstElementChild.textContent = `Looks the same when turned? ${shape}`;
+  by("fixed-height-choice").hidden = state.isCalibrated;
+  const outline = image()?.marks.outline ?? null;
+  if (outline !== measured) [measured, turns] = [outline, turnsOf(outline)];
+  if (turns === asked) return;
+  asked = turns;
+  const words = SHAPES.find(([value]) => value === String(turns))[1];
+  by("symmetry-why").hidden = turns === 1;
+  by("symmetry-why").textContent = turns === 1 ? "" : `The outline looks like “${words}”. If the whole part does, choose it.`;
+  by("symmetry").open = turns !== 1;
+}
+by("teach-form").addEventListener("change", changed);
 
 /** The model taught last is the one that is chosen. */
 let preselected = false;
@@ -162,20 +203,22 @@ function preselect() {
 export function renderTeach() {
   preselect();
   const news = state.teaching;
-  const marked = state.images.filter((i) => (i.marks.box || i.marks.outline) && i.marks.grasp);
+  const marked = state.images.filter(isComplete);
   by("teach-from").textContent = marked.length
     ? `From ${marked.length === 1 ? "the marked photo" : `${marked.length} marked photos`} of “${state.label}”${negativesText()}.`
     : `${state.images.length ? "Mark the part on a photo first" : "Take a photo of the part first and mark it"}: box and grasp.`;
   for (const input of document.querySelectorAll("[name=model]")) {
     const lacks = image()?.advice.models.find((m) => m.model === input.value).lacks ?? [];
     const needsOutline = input.value === "D" && marked.some((i) => !i.marks.outline);
-    input.disabled = needsOutline || (!marked.length && lacks.length > 0);
+    const reason = needsOutline ? "Needs the outline on every marked photo" : !marked.length && lacks.length && `Needs ${new Intl.ListFormat("en").format(lacks)}`;
+    offBecause(input, reason);
+    input.closest("label").title = reason || "";
     if (input.disabled && input.checked && marked.length) document.querySelector("[name=model][value=C]").checked = true;
   }
   const start = by("teach-start");
-  start.disabled = isRunning() || !marked.length;
+  offBecause(start, !marked.length && "Mark box and grasp on a photo first");
   start.textContent = news.status === "done" ? "Teach again" : "Teach";
-  start.classList.toggle("primary", news.status !== "done");
+  renderFolds();
   renderProgress(news);
   renderOutcome(news);
 }

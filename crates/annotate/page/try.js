@@ -1,12 +1,14 @@
 // The fourth step: the taught model on other pictures. What it got right, or is put right, becomes a demonstration.
 
 import { api } from "./api.js";
+import { button } from "./buttons.js";
 import { adopt } from "./editing.js";
-import { poseText } from "./live.js";
+import { placeText } from "./live.js";
 import { MIN_SHOWN, numbered } from "./overlay.js";
 import { openImage, openTrialPicture, removeTrialPicture } from "./strip.js";
-import { changed, isLive, state, trialPicture } from "./store.js";
+import { changed, isFound, isLive, state, trialPicture } from "./store.js";
 import { openTab } from "./tabs.js";
+import { teach } from "./teach.js";
 import { toast } from "./toast.js";
 
 const by = (id) => document.getElementById(id);
@@ -37,6 +39,19 @@ for (const kind of ["dragover", "dragleave", "drop"]) {
     }
   });
 }
+
+by("least-score").addEventListener("input", () => {
+  state.minScore = by("least-score").valueAsNumber;
+  changed();
+});
+by("sort-pictures").addEventListener("change", () => {
+  state.sortedBy = by("sort-pictures").value;
+  changed();
+});
+by("show-differences").addEventListener("change", () => {
+  state.showDifferences = by("show-differences").checked;
+  changed();
+});
 
 async function addPictures(files) {
   const pictures = files.filter((file) => PICTURE.test(file.name));
@@ -101,6 +116,13 @@ async function accept(marks, { correct }) {
   changed();
 }
 
+/** Teaches as before, with what was added since, and shows how it goes. */
+function teachAgain() {
+  openTab("teach");
+  by("tab-teach").focus();
+  teach();
+}
+
 /** Says that the part is not in this picture, or takes that back. */
 async function setAbsent(target, absent) {
   try {
@@ -113,13 +135,6 @@ async function setAbsent(target, absent) {
   changed();
 }
 
-function button(text, action, classes = "") {
-  const made = document.createElement("button");
-  Object.assign(made, { textContent: text, className: classes });
-  made.addEventListener("click", action);
-  return made;
-}
-
 function text(tag, content, classes = "") {
   return Object.assign(document.createElement(tag), { textContent: content, className: classes });
 }
@@ -128,27 +143,28 @@ function card(detection, i, count, shown) {
   const item = document.createElement("section");
   item.className = "found";
   item.setAttribute("aria-label", `Grasp ${i + 1}`);
-  const title = text("h3", numbered(detection.is_accepted ? "Found the part" : "Refused", i, count));
+  const title = text("h3", numbered(isFound(detection) ? "Found the part" : "Refused", i, count));
   title.append(text("span", `score ${detection.score.toFixed(2)}`, "score"));
   const row = text("div", "", "row");
   if (shown.became === null) {
-    const words = detection.is_accepted ? "Right: learn from it" : "Right all the same: learn from it";
+    const words = isFound(detection) ? "Right: learn from it" : "Right all the same: learn from it";
     row.append(button(words, () => accept(detection.marks, { correct: false })));
     row.append(button("Correct it…", () => accept(detection.marks, { correct: true }), "plain"));
   }
   item.append(title);
-  const { refusal } = detection;
+  const refusal = isFound(detection) ? null : detection.refusal;
+  item.append(text("p", placeText(detection), "pose"));
+  if (!isFound(detection) && !refusal) item.append(text("p", "Why: it scores less than you ask for.", "why"));
   if (refusal) {
     item.append(text("p", `Why: ${refusal.reason}.`, "why"));
     if (refusal.remedy) item.append(text("p", `What would help: ${refusal.remedy}.`));
-    if (refusal.edges.length || refusal.surface.length) {
+    if (state.showDifferences && (refusal.edges.length || refusal.surface.length)) {
       const legend = text("p", "On the picture: ", "legend");
       if (refusal.edges.length) legend.append(text("span", "edges differ", "edges"), " ");
       if (refusal.surface.length) legend.append(text("span", "surface differs", "surface"));
       item.append(legend);
     }
   }
-  if (detection.pose) item.append(text("p", poseText(detection.pose), "pose"));
   item.append(row);
   return item;
 }
@@ -156,14 +172,14 @@ function card(detection, i, count, shown) {
 function renderFound() {
   const found = by("found");
   const shown = isLive() ? null : trialPicture();
-  const wanted = JSON.stringify([shown?.id, shown?.detections, shown?.detecting, shown?.failed, shown?.became, shown?.is_absent, state.showRefused, isTaught()]);
+  const wanted = JSON.stringify([shown?.id, shown?.detections, shown?.detecting, shown?.failed, shown?.became, shown?.is_absent, state.showRefused, state.minScore, state.showDifferences, isTaught()]);
   if (found.dataset.shown === wanted) return;
   found.dataset.shown = wanted;
   found.replaceChildren();
   if (!shown || !isTaught()) return;
   if (shown.failed) return found.append(text("p", shown.failed, "error"));
   if (!shown.detections) return found.append(text("p", "Looking…"));
-  const accepted = shown.detections.filter((d) => d.is_accepted);
+  const accepted = shown.detections.filter(isFound);
   const refused = shown.detections.length - accepted.length;
   const time = `Looked for ${Math.max(1, Math.round(shown.seconds * 1000))} ms. `;
   found.append(text("p", time + (accepted.length ? "" : "Nothing is accepted.")));
@@ -171,14 +187,14 @@ function renderFound() {
     found.append(text("p", "You said that the part is not here: the next teaching uses this picture.", "note"),
       button("The part is here after all", () => setAbsent(shown, false), "plain"));
   }
-  const listed = shown.detections.filter((d) => d.is_accepted || isShown(d, shown));
+  const listed = shown.detections.filter((d) => isFound(d) || isShown(d, shown));
   listed.forEach((detection, i) => found.append(card(detection, i, listed.length, shown)));
   if (shown.became !== null) {
     const index = state.images.findIndex((image) => image.id === shown.became);
     found.append(text("p", `A demonstration now: ${state.images[index]?.name}.`), button("Look at its marks", () => {
       openTab("mark");
       openImage(index);
-    }), button("Teach again", () => openTab("teach"), "primary"));
+    }), button("Teach again", teachAgain, "primary"));
   } else if (!shown.is_absent) {
     found.append(button("The part is not here", () => setAbsent(shown, true), accepted.length ? "" : "plain"));
   }
@@ -186,8 +202,9 @@ function renderFound() {
     const nothing = { box: null, grasp: null, outline: null };
     found.append(text("p", "If the part is there, mark it: it then learns from this picture, too."), button("Mark it by hand…", () => accept(nothing, { correct: true })));
   }
+  if (shown.is_absent) found.append(button("Teach again", teachAgain, "primary"));
   found.append(button("Take this picture out", () => removeTrialPicture(shown), "plain"));
-  const more = shown.detections.filter((d) => !d.is_accepted && (state.showRefused || !isShown(d, shown))).length;
+  const more = shown.detections.filter((d) => !isFound(d) && (state.showRefused || !isShown(d, shown))).length;
   if (refused && (more || state.showRefused)) {
     const words = state.showRefused ? "Hide what was refused" : `Show what was refused (${more})`;
     found.append(button(words, () => {
@@ -203,14 +220,36 @@ export function isShown(detection, { detections }) {
   return detection === detections[0] && detection.score >= MIN_SHOWN;
 }
 
+/** What counts as found, and how much that is. */
+function renderJudge() {
+  const looked = state.trialPictures.filter((trial) => trial.detections);
+  by("judge").hidden = !isTaught() || !(looked.length || state.camera);
+  const least = state.minScore.toFixed(2);
+  by("least-score-value").textContent = least;
+  // What resembles the part hardly at all is no candidate.
+  const places = looked.flatMap((trial) => trial.detections).filter((d) => d.score >= MIN_SHOWN);
+  const inPictures = looked.filter((trial) => trial.detections.some(isFound)).length;
+  const beyond = state.minScore === 0.5 ? "" : ` For “sdg detect”: --min-score ${least}.`;
+  const words = looked.length
+    ? `Found ${places.filter(isFound).length} of ${places.length} at ${least}, in ${inPictures} of ${looked.length} pictures.${beyond}`
+    : "";
+  if (by("least-score-count").textContent !== words) by("least-score-count").textContent = words;
+  by("sort-choice").hidden = state.trialPictures.length < 2;
+  const differs = ({ refusal }) => refusal && (refusal.edges.length || refusal.surface.length);
+  by("differences-choice").hidden = isLive() || !trialPicture()?.detections?.some((d) => !isFound(d) && differs(d));
+}
+
 export function renderTry() {
   if (state.teaching.status === "done") state.hasModel = true;
   if (state.tab !== "try") return;
   by("try-intro").textContent = !isTaught()
     ? "Nothing is taught yet. Teach a model first; pictures can be added already."
     : state.trialPictures.length
-      ? "Each picture is looked at as it comes in. Score 0.5 decides."
+      ? state.models.find((model) => model.is_current)?.is_stale
+        ? "This model is old: photos, marks or pictures without the part have changed since. Teach again to use them."
+        : "Each picture is looked at as it comes in. What reaches the least score is found."
       : "Add pictures that were taken as the first one was, with the part lying in other ways.";
+  renderJudge();
   renderFound();
   lookAtAll();
 }

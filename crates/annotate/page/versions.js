@@ -1,6 +1,7 @@
 // The models taught so far: what each is worth, which one is in use, two of them compared.
 
 import { api } from "./api.js";
+import { button } from "./buttons.js";
 import { changed, state } from "./store.js";
 import { toast } from "./toast.js";
 
@@ -34,12 +35,6 @@ export function gradeOf({ figures }) {
   const alarms = (figures.false_alarms[0] + figures.wrong) / Math.max(figures.false_alarms[1] + figures.found[1], 1);
   if (found < 0.7 || alarms > 0.2) return "poor";
   return found < 0.9 || alarms > 0.05 ? "doubtful" : "good";
-}
-
-function button(text, action) {
-  const made = Object.assign(document.createElement("button"), { type: "button", textContent: text });
-  made.addEventListener("click", action);
-  return made;
 }
 
 async function use(id) {
@@ -94,24 +89,25 @@ export function renderVersions() {
     item.className = gradeOf(model.summary);
     const when = new Date(model.taught_secs * 1000).toLocaleString();
     const title = Object.assign(document.createElement("b"), { textContent: `${model.id + 1}: ${model.summary.model}, ${when}` });
-    const marks = [model.is_current && "in use", model.is_stale && "stale: photos, marks or negatives have changed since"].filter(Boolean);
-    const note = Object.assign(document.createElement("span"), { className: "stale", textContent: marks.join("; ") });
+    const notes = [];
+    if (model.is_current) notes.push(Object.assign(document.createElement("span"), { className: "used", textContent: "in use" }));
+    if (model.is_stale) notes.push(Object.assign(document.createElement("span"), { className: "stale", textContent: "stale: photos, marks or pictures without the part have changed since" }));
     const of = `${model.photos} photo${model.photos === 1 ? "" : "s"}${model.negatives ? `, ${model.negatives} without the part` : ""}. `;
     const figures = Object.assign(document.createElement("small"), { textContent: of + briefFigures(model.summary) });
     const row = Object.assign(document.createElement("div"), { className: "row" });
     if (!model.is_current) row.append(button("Use this one", () => use(model.id)));
     if (models.length > 1) {
-      const label = document.createElement("label");
+      const label = Object.assign(document.createElement("label"), { className: "check" });
       const box = Object.assign(document.createElement("input"), { type: "checkbox", checked: chosen.includes(model.id) });
       box.addEventListener("change", () => {
         chosen = box.checked ? [...chosen, model.id].slice(-2) : chosen.filter((id) => id !== model.id);
         changed();
       });
-      label.append(box, " Compare");
+      label.append(box, "Compare");
       row.append(label);
       if (chosen.length === 2 && chosen[1] === model.id) row.append(button("Compare the two", compare));
     }
-    item.append(title, note, figures, row);
+    item.append(title, ...notes, figures, row);
     return item;
   }));
 }

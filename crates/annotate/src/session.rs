@@ -198,6 +198,7 @@ impl Session {
             trial_pictures: state.trial_ids().map(|id| state.trial_picture_view(id)).collect(),
             model_path: self.model_path(&state).display().to_string(),
             models: state.model_views(),
+            is_calibrated: state.max_opening_px.is_some(),
             project: state.project.as_ref().map(|folder| folder.display().to_string()),
             notes: self.notes.clone(),
             camera: self.live.as_ref().map(|desk| desk.options.address.clone()),

@@ -84,6 +84,9 @@ pub struct TeachRequest {
     /// Equal turns in a whole one; 0 for a part whose turn cannot be seen.
     #[serde(default = "one")]
     pub symmetry: u32,
+    /// The camera is always as far from the part as it was for the photo, so that parts of another size are refused.
+    #[serde(default)]
+    pub fixed_height: bool,
     /// Decides every random choice.
     #[serde(default = "one_seed")]
     pub seed: u64,

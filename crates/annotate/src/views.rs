@@ -111,6 +111,8 @@ pub struct SessionView {
     pub model_path: String,
     /// Versions of the model, oldest first.
     pub models: Vec<ModelView>,
+    /// Whether the camera of the photos is calibrated, so that the part's size is known.
+    pub is_calibrated: bool,
     /// The folder, where the session is a project.
     pub project: Option<String>,
     /// What the person should know of the project; pictures that are gone.

@@ -25,9 +25,11 @@ const MAX_CONNECTIONS: usize = 32;
 /// More than a browser sends.
 const MAX_REQUEST_BYTES: usize = 16 << 10;
 
-const PAGE: &str = "<!doctype html>\n<html lang=\"en\"><meta charset=\"utf-8\"><title>sdg</title>\n\
-                    <style>body{margin:0;background:#222}img{display:block;max-width:100%;margin:auto}</style>\n\
-                    <img src=\"/stream\" alt=\"The live picture\"></html>\n";
+const PAGE: &str = "<!doctype html>\n<html lang=\"en\"><meta charset=\"utf-8\"><title>Live picture · sdg</title>\n\
+                    <meta name=\"viewport\" content=\"width=device-width\">\n\
+                    <style>body{margin:0;background:#222}img{display:block;width:100vw;height:100vh;object-fit:contain}\n\
+                    h1{position:absolute;width:1px;height:1px;margin:0;overflow:hidden;clip-path:inset(50%)}</style>\n\
+                    <main><h1>Live picture</h1><img src=\"/stream\" alt=\"The live picture\"></main></html>\n";
 
 /// A server on 127.0.0.1 that shows the pictures which are published, to any number of browsers.
 ///

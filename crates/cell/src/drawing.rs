@@ -8,6 +8,8 @@ use sdg_report::{
     Color, DetectionMark, Pen, Verdict, draw_box, draw_detection, draw_label, draw_polygon, label_bounds, line_width,
 };
 
+use crate::live_detection::Part;
+
 /// The score from which detections are accepted, where nobody sets another: scores are calibrated so that it separates right from wrong.
 pub const DEFAULT_MIN_SCORE: f64 = 0.5;
 /// The image with every detection drawn on it.
@@ -38,26 +40,38 @@ pub fn draw_detections<'a>(
             }
             continue;
         }
-        let keypoints: Vec<Keypoint> = detection.keypoints.iter().map(|(point, _)| Keypoint::visible(*point)).collect();
-        let verdict = match (detection.score >= min_score, detection.agreement) {
-            (false, _) => Verdict::Refused,
-            (true, Some(_)) => Verdict::Verified,
-            (true, None) => Verdict::Unchecked,
-        };
-        let mark = DetectionMark {
-            bounds: Some(detection.bbox),
-            outline: detection.outline.as_ref(),
-            keypoints: &keypoints,
-            grasp: Some(detection.grasp),
-            score: detection.score,
-            verdict,
-        };
-        draw_detection(drawn, &mark);
+        draw_numbered(drawn, detection, detection.score >= min_score, None);
     }
     let mut taken = Vec::new();
     for (detection, reason) in reasons {
         draw_reason(drawn, detection, reason, &mut taken);
     }
+}
+
+/// Draws the parts that are there in a frame, the best on top, with their numbers and scores.
+pub fn draw_parts(drawn: &mut RgbImage, parts: &[Part], min_score: f64) {
+    for part in parts.iter().rev().filter(|part| part.is_seen(min_score)) {
+        draw_numbered(drawn, &part.found.detection, true, part.track.map(|(number, ..)| number));
+    }
+}
+
+fn draw_numbered(drawn: &mut RgbImage, detection: &GraspDetection, is_accepted: bool, number: Option<u64>) {
+    let keypoints: Vec<Keypoint> = detection.keypoints.iter().map(|(point, _)| Keypoint::visible(*point)).collect();
+    let verdict = match (is_accepted, detection.agreement) {
+        (false, _) => Verdict::Refused,
+        (true, Some(_)) => Verdict::Verified,
+        (true, None) => Verdict::Unchecked,
+    };
+    let mark = DetectionMark {
+        bounds: Some(detection.bbox),
+        outline: detection.outline.as_ref(),
+        keypoints: &keypoints,
+        grasp: Some(detection.grasp),
+        score: detection.score,
+        verdict,
+        number,
+    };
+    draw_detection(drawn, &mark);
 }
 
 /// Colours of the dots where edges and surface differ: apart in lightness, too.

@@ -51,6 +51,9 @@ pub enum Command {
     /// Detect parts in the pictures of a ROS 2 topic and publish their grasps; teach and grasp as services
     #[cfg(feature = "ros2")]
     Ros2(Box<crate::commands::ros2::args::Ros2Args>),
+    /// A node of ROS 2; not in this build, which is without cargo's feature "ros2"
+    #[cfg(not(feature = "ros2"))]
+    Ros2(WithoutRos2Args),
     /// Plan a motion around the obstacles of a workcell, and draw it; nothing moves
     Plan(PlanArgs),
     /// Draw a workcell's file seen from above, with what the arm reaches of its table
@@ -74,6 +77,15 @@ pub enum Command {
     Man(ManArgs),
     /// List the devices that this build and this machine can compute on
     Devices(DevicesArgs),
+}
+
+/// Any arguments of `sdg ros2` in a build without it, which says so.
+#[cfg(not(feature = "ros2"))]
+#[derive(Debug, clap::Args)]
+pub struct WithoutRos2Args {
+    /// Not read.
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true, hide = true)]
+    arguments: Vec<String>,
 }
 
 #[cfg(test)]

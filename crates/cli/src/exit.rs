@@ -11,27 +11,6 @@ use sdg_grasp::GraspError;
 use sdg_inputs::ConfigError;
 use sdg_robot::RobotError;
 
-/// What every help text and manual page ends with.
-pub const EXIT_CODES: &str = "Exit codes:\n  \
-    0  done\n  \
-    1  failed; of several pictures at least one, the others have their results\n  \
-    2  wrong usage\n  \
-    3  ran, but found nothing to grasp\n  \
-    4  taught and written, but the model fails its own held-back samples";
-
-/// The command and all below it, each with the exit codes at the end of its help.
-pub fn with_exit_codes(command: clap::Command) -> clap::Command {
-    let command = match command.get_after_long_help().map(ToString::to_string) {
-        Some(own) => command.after_long_help(format!("{own}\n\n{EXIT_CODES}")),
-        None => command,
-    };
-    let command = match command.get_after_help().map(ToString::to_string) {
-        Some(own) => command.after_help(format!("{own}\n\n{EXIT_CODES}")),
-        None => command.after_help(EXIT_CODES),
-    };
-    command.mut_subcommands(with_exit_codes)
-}
-
 /// How a command ended that did not fail.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
@@ -71,6 +50,16 @@ pub fn without_simulator() -> anyhow::Error {
     let needs = "this sdg was built without the simulator, which demo, rehearse and evaluate (but for --pictures) need: \
                  expected a build with cargo's feature \"simulation\"";
     Usage(needs.to_owned()).into()
+}
+
+/// The error of `sdg ros2` in a build without it.
+#[cfg(not(feature = "ros2"))]
+pub fn without_ros2() -> anyhow::Error {
+    Usage(
+        "ros2: this sdg was built without ROS 2: expected a build with cargo's feature \"ros2\" (docs/ros2.md)"
+            .to_owned(),
+    )
+    .into()
 }
 
 /// 2 for wrong usage, 1 for everything else.

@@ -25,6 +25,7 @@
 pub mod args;
 mod commands;
 mod demonstrations;
+mod examples;
 mod exit;
 mod found_text;
 mod interrupt;
@@ -49,7 +50,7 @@ use crate::exit::Outcome;
 #[doc(hidden)]
 /// The definition of the command line, with what no verb says by itself.
 pub fn command() -> ClapCommand {
-    exit::with_exit_codes(Args::command())
+    examples::with_examples(Args::command())
 }
 
 #[doc(hidden)]
@@ -90,6 +91,8 @@ pub fn run(args: &Args) -> ExitCode {
         Command::Robot(robot) => commands::robot::run(robot),
         #[cfg(feature = "ros2")]
         Command::Ros2(ros2) => commands::ros2::run(ros2),
+        #[cfg(not(feature = "ros2"))]
+        Command::Ros2(_) => Err(exit::without_ros2()),
         Command::Augment(augment) => commands::augment::run(augment),
         Command::Annotation(annotation) => commands::annotation::run(annotation),
         Command::Weights(weights) => commands::weights::run(weights),

@@ -4,6 +4,8 @@ use anyhow::{Context, Result};
 use clap::Args;
 use sdg_camera::{Address, Camera, Encoding, OpenOptions};
 
+use crate::exit::Usage;
+
 /// A camera and what is asked of it.
 #[derive(Debug, Args)]
 pub struct LiveArgs {
@@ -20,13 +22,18 @@ pub struct LiveArgs {
 /// The heading of these options in the help.
 const LIVE: &str = "Live pictures";
 
+/// The size that a V4L2 camera is asked for.
+const DEFAULT_SIZE: (u32, u32) = (640, 480);
+/// The time without a frame after which a camera is stale.
+const DEFAULT_STALL_SECS: f64 = 2.0;
+
 /// What a camera is asked for.
 #[derive(Debug, Args)]
 #[command(next_help_heading = LIVE)]
 pub struct RequestArgs {
-    /// Width and height in pixels that a V4L2 camera is asked for
-    #[arg(long, value_name = "WxH", default_value = "640x480", value_parser = parse_size)]
-    pub size: (u32, u32),
+    /// Width and height in pixels that a V4L2 camera is asked for; without this option, 640x480
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    pub size: Option<(u32, u32)>,
     /// Frames a second that a V4L2 camera is asked for; snapshots a second over HTTP
     #[arg(long, value_name = "N")]
     pub fps: Option<f64>,
@@ -39,9 +46,9 @@ pub struct RequestArgs {
     /// A fixed white balance of a V4L2 camera
     #[arg(long, value_name = "KELVIN")]
     pub white_balance_kelvin: Option<u32>,
-    /// Without a frame for so long a camera is stale
-    #[arg(long, value_name = "SECS", default_value_t = 2.0)]
-    pub stall_secs: f64,
+    /// Without a frame for so long a camera is stale; without this option, for 2 seconds
+    #[arg(long, value_name = "SECS")]
+    pub stall_secs: Option<f64>,
 }
 
 /// The names of encodings on the command line.
@@ -73,17 +80,40 @@ impl LiveArgs {
 }
 
 impl RequestArgs {
+    /// Refuses what only a camera can be asked for, where no camera is given; `own` are a verb's further options of this kind, and
+    /// whether they are given.
+    ///
+    /// # Errors
+    /// [`Usage`], which names the options that are given.
+    pub(crate) fn refuse_without_camera(&self, own: &[(&'static str, bool)], found: &str) -> Result<(), Usage> {
+        let asked = [
+            ("--size", self.size.is_some()),
+            ("--fps", self.fps.is_some()),
+            ("--encoding", self.encoding.is_some()),
+            ("--exposure-ms", self.exposure_ms.is_some()),
+            ("--white-balance-kelvin", self.white_balance_kelvin.is_some()),
+            ("--stall-secs", self.stall_secs.is_some()),
+        ];
+        let given: Vec<_> = own.iter().chain(&asked).filter(|(_, is_given)| *is_given).map(|(name, _)| *name).collect();
+        if given.is_empty() {
+            return Ok(());
+        }
+        Err(Usage(format!("{}: expected live pictures (--from ADDRESS), found {found}", given.join(", "))))
+    }
+
     /// The same for the crate that opens it.
     pub(crate) fn options(&self) -> OpenOptions {
+        let (width, height) = self.size.unwrap_or(DEFAULT_SIZE);
         OpenOptions {
-            width: self.size.0,
-            height: self.size.1,
+            width,
+            height,
             fps: self.fps,
             encoding: self.encoding.map(Encoding::from),
             exposure_secs: self.exposure_ms.map(|ms| ms / 1e3),
             white_balance_kelvin: self.white_balance_kelvin,
             // What is no time at all is refused with its number when the camera is opened.
-            stall_timeout: std::time::Duration::try_from_secs_f64(self.stall_secs).unwrap_or_default(),
+            stall_timeout: std::time::Duration::try_from_secs_f64(self.stall_secs.unwrap_or(DEFAULT_STALL_SECS))
+                .unwrap_or_default(),
             ..OpenOptions::default()
         }
     }
@@ -101,7 +131,7 @@ pub(crate) fn open(address: &Address, options: &OpenOptions) -> Result<Box<dyn C
             Ok(Box::new(camera))
         }
         #[cfg(not(feature = "simulation"))]
-        Address::Sim(_) => Err(crate::exit::Usage(
+        Address::Sim(_) => Err(Usage(
             "--from sim: this sdg was built without the simulator: expected a build with cargo's feature \"simulation\""
                 .to_owned(),
         )
@@ -109,12 +139,12 @@ pub(crate) fn open(address: &Address, options: &OpenOptions) -> Result<Box<dyn C
         #[cfg(feature = "ros2")]
         Address::Ros2(text) => {
             use sdg_ros2::dds::{RosCamera, TopicAddress};
-            let topic: TopicAddress = text.parse().map_err(|why| crate::exit::Usage(format!("--from ros2: {why}")))?;
+            let topic: TopicAddress = text.parse().map_err(|why| Usage(format!("--from ros2: {why}")))?;
             let camera = RosCamera::open(&topic, &address.to_string(), options.stall_timeout).context("--from")?;
             Ok(Box::new(sdg_camera::Watched::new(camera, Some(options.frozen_frames))))
         }
         #[cfg(not(feature = "ros2"))]
-        Address::Ros2(_) => Err(crate::exit::Usage(
+        Address::Ros2(_) => Err(Usage(
             "--from ros2: this sdg was built without ROS 2: expected a build with cargo's feature \"ros2\"".to_owned(),
         )
         .into()),

@@ -17,7 +17,7 @@ use sdg_evaluation::TaughtFile;
 use sdg_evaluation::held_back::HeldBackFigures;
 use sdg_evaluation::{Share, wilson_interval};
 use sdg_geometry::RotationalSymmetry;
-use sdg_grasp::{Advice, GraspModel, PlanarPose, Preset, TeachOptions, TeachingEvent, Verification};
+use sdg_grasp::{Advice, CheckConfig, GraspModel, PlanarPose, Preset, TeachOptions, TeachingEvent, Verification};
 use sdg_inputs::camera_files::CameraFile;
 
 use crate::found_text::{MIN_ADVISED_SCORE, Wording};
@@ -48,6 +48,9 @@ impl GraspTeacher for PageTeacher {
         };
         options.time_budget = request.time_budget();
         options.steps = request.steps;
+        if request.fixed_height {
+            options.size_tolerance = CheckConfig::FIXED_HEIGHT_TOLERANCE;
+        }
         options.negatives.clone_from(&material.negatives);
         let mut demonstrations = Cow::Borrowed(material.demonstrations.as_slice());
         if let Some((camera, [mark, grasp])) = &self.camera {

@@ -76,6 +76,8 @@ fn a_batch_goes_on_past_what_cannot_be_read() {
     let stderr = String::from_utf8(output.stderr).unwrap();
     assert!(stderr.contains("skipped what is no picture: notes.txt"), "{stderr}");
     assert!(stderr.contains("3 of 6 pictures could not be used"), "{stderr}");
+    let summary = stderr.lines().find(|line| line.starts_with("found ")).expect("a summary");
+    assert!(summary.ends_with(" of 3 pictures"), "{summary}");
 }
 
 #[test]
@@ -163,7 +165,7 @@ fn exit_codes_stand_in_help_and_manual_pages() {
         [&["--help"][..], &["detect", "--help"], &["evaluate", "--help"], &["weights", "convert", "-h"], &["man"]]
     {
         let text = stdout(arguments).replace("\\-", "-");
-        assert!(text.contains("ran, but found nothing to grasp"), "{arguments:?}: {text}");
+        assert!(text.contains("2 wrong usage, 3 found nothing, 4 poor model"), "{arguments:?}: {text}");
     }
     let text = stdout(&["evaluate", "--help"]);
     assert!(text.contains("Labelled pictures (--pictures DIR)"), "{text}");

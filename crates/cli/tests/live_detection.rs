@@ -201,7 +201,14 @@ fn what_cannot_be_is_refused() {
     refused(&["--from", "dir:/nowhere"], 1, "/nowhere");
     refused(&["--from", "sim:teapot"], 1, "teapot");
     refused(&["--from", "sim:pendulum", "--draw", "pictures"], 2, "port of 127.0.0.1");
-    refused(&["--frames", "3", "a.png"], 2, "expected live pictures (--from)");
+    refused(&["--from", "sim:pendulum", "--draw", "pictures"], 2, "found \"pictures\"");
+    refused(&["--frames", "3", "a.png"], 2, "--frames: expected live pictures (--from ADDRESS), found images");
+    refused(
+        &["--fps", "10", "--size", "640x480", "a.png"],
+        2,
+        "--size, --fps: expected live pictures (--from ADDRESS)",
+    );
+    refused(&["--stall-secs", "2", "a.png"], 2, "--stall-secs: expected live pictures");
     refused(&["--from", "sim:pendulum", "a.png"], 2, "found images as well");
     refused(&[], 2, "<IMAGE|DIR|->");
 }

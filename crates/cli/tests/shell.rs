@@ -63,6 +63,26 @@ fn manual_pages_mention_every_command() {
 }
 
 #[test]
+fn help_ends_with_examples_and_exit_codes() {
+    for verb in [["detect", "--help"], ["detect", "-h"]] {
+        let help = String::from_utf8(sdg(&verb).stdout).unwrap();
+        assert!(help.contains("Examples:\n  sdg detect --grasp-model part.sdg pictures --draw drawn"), "{help}");
+        let last = help.trim_end().lines().last().unwrap();
+        assert!(last.contains("docs/command-line.md"), "{help}");
+        assert!(help.contains("Exit codes: 0 done, 1 failed"), "{help}");
+    }
+}
+
+#[test]
+#[cfg(not(feature = "ros2"))]
+fn a_build_without_ros_2_says_so() {
+    let refused = sdg(&["ros2", "--grasp-model", "part.sdg"]);
+    assert_eq!(refused.status.code(), Some(2));
+    let stderr = String::from_utf8(refused.stderr).unwrap();
+    assert!(stderr.contains("built without ROS 2") && stderr.lines().count() == 1, "{stderr}");
+}
+
+#[test]
 fn teaching_leaves_a_page() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();

@@ -111,7 +111,8 @@ fn walk(set: &Path, symmetry: &str) -> f64 {
     watch.step("4-samples", 1, |page| page.click("#panel-mark [data-next=samples]"), samples);
     watch.step("5-teach", 1, |page| page.click("#panel-samples [data-next=teach]"), "return true");
     let teach = |page: &Page| {
-        page.click("[name=model][value=S]");
+        page.choose_model("S");
+        page.unfold("#symmetry");
         page.click(&format!("[name=symmetry][value='{symmetry}']"));
         page.click("#teach-start");
     };

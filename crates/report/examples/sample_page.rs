@@ -174,6 +174,7 @@ fn detections() -> Section {
             grasp: Some(PlanarGrasp::from_line(&line, 46.0 * image_from_part.scale)),
             score: if refused { 0.21 } else { 0.97 - 0.01 * idx as f64 },
             verdict: if refused { Verdict::Refused } else { Verdict::Verified },
+            number: None,
         };
         draw_detection(&mut picture, &mark);
         Figure::photo(picture).caption(if refused {

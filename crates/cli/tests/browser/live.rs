@@ -94,7 +94,7 @@ fn take_and_mark(page: &Page) {
 
 fn teach(page: &Page) {
     page.click("#tab-teach");
-    page.click("[name=model][value=S]");
+    page.choose_model("S");
     page.click("#teach-start");
     patiently(page, "a model", "return document.getElementById('teach-outcome').innerText.includes('Written to')");
 }
@@ -172,6 +172,8 @@ fn with_a_calibrated_camera_the_grasp_is_told_in_millimetres() {
     found_at(&page, HOLD);
     let told = page.text("#live-found .pose");
     // By hand from the marks on the photo, which lies straight above: 550 pixels of focal length, 0.564 m above the marks.
+    let (in_picture, told) = told.split_once('\n').unwrap();
+    assert!(in_picture.contains(" px, ") && in_picture.contains('°'), "{in_picture}");
     let number = |name: &str| -> f64 {
         let rest = told.split(name).nth(1).unwrap();
         rest.split([',', ' ']).next().unwrap().parse().unwrap()

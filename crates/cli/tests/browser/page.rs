@@ -73,6 +73,22 @@ impl Page {
         self.browser.find(css).unwrap().click().unwrap();
     }
 
+    /// Opens what is folded.
+    pub fn unfold(&self, css: &str) {
+        if self.browser.run("return document.querySelector(arguments[0]).open", &[json!(css)]).unwrap() == json!(false)
+        {
+            self.click(&format!("{css} > summary"));
+        }
+    }
+
+    /// Chooses a model to teach; all but C are folded.
+    pub fn choose_model(&self, letter: &str) {
+        if letter != "C" {
+            self.unfold("#other-models");
+        }
+        self.click(&format!("[name=model][value={letter}]"));
+    }
+
     /// Writes over what a field shows, by keys alone: the page may write a field that is not in focus at any time, and
     /// one that is not shown yet takes no focus.
     pub fn fill(&self, css: &str, text: &str) {
@@ -109,7 +125,7 @@ impl Page {
     /// Waits until what was just done is shown, sent and answered.
     pub fn settle(&self) {
         let script = "return new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(
-            !document.getElementById('propose').disabled && document.getElementById('saved').innerText !== 'Saving…'))))";
+            document.getElementById('propose').innerText !== 'Looking…' && document.getElementById('saved').innerText !== 'Saving…'))))";
         self.wait_for("the page to settle", script);
     }
 
@@ -136,21 +152,25 @@ impl Page {
         self.browser.screenshot(&repository().join(format!("target/browser-test/annotate-{name}.png"))).unwrap();
     }
 
-    /// What axe-core finds wrong with the page as it is now.
     pub fn assert_accessible(&self, about: &str) {
-        let path = repository().join("target/browser-test/npm/node_modules/axe-core/axe.min.js");
-        let axe =
-            std::fs::read_to_string(&path).unwrap_or_else(|_| panic!("make test-browser installs {}", path.display()));
-        self.browser.run(&format!("if (!window.axe) {{ {axe}\n }}"), &[]).unwrap();
-        let script = "return axe.run(document).then((found) => found.violations.map((v) =>
-            `${v.id} (${v.help}): ${v.nodes.map((n) => n.target.join(' ')).join(', ')}`))";
-        let violations = self.browser.run(script, &[]).unwrap();
-        assert_eq!(violations, json!([]), "{about}");
+        assert_accessible(&self.browser, about);
     }
 
     pub fn assert_quiet(&self) {
         assert_eq!(self.browser.console_errors().unwrap(), [""; 0]);
     }
+}
+
+/// What axe-core finds wrong with a page as it is now.
+pub fn assert_accessible(browser: &Browser, about: &str) {
+    let path = repository().join("target/browser-test/npm/node_modules/axe-core/axe.min.js");
+    let axe =
+        std::fs::read_to_string(&path).unwrap_or_else(|_| panic!("make test-browser installs {}", path.display()));
+    browser.run(&format!("if (!window.axe) {{ {axe}\n }}"), &[]).unwrap();
+    let script = "return axe.run(document).then((found) => found.violations.map((v) =>
+            `${v.id} (${v.help}): ${v.nodes.map((n) => n.target.join(' ')).join(', ')}`))";
+    let violations = browser.run(script, &[]).unwrap();
+    assert_eq!(violations, json!([]), "{about}");
 }
 
 fn serve(folder: &TempDir, arguments: &[String]) -> (Child, String) {

@@ -33,7 +33,7 @@ fn shown(page: &Page) {
 
 fn teach_s(page: &Page, count: usize) {
     page.click("#tab-teach");
-    page.click("[name=model][value=S]");
+    page.choose_model("S");
     page.click("#teach-start");
     let taught = format!("return document.querySelectorAll('#version-list li').length === {count}");
     patiently(page, "a version", &taught);
@@ -88,8 +88,42 @@ fn several_found_ones_have_numbers() {
     let tags =
         "return [...document.querySelectorAll('#overlay .tag')].map((tag) => tag.textContent.slice(0, 2)).sort()";
     assert_eq!(page.browser.run(tags, &[]).unwrap(), json!(["1:", "2:"]));
+    let places = "return [...document.querySelectorAll('#found .pose')].map((p) => p.innerText)";
+    for place in page.browser.run(places, &[]).unwrap().as_array().unwrap() {
+        let place = place.as_str().unwrap();
+        assert!(place.starts_with("x ") && place.contains(" px, ") && place.contains('°'), "{place}");
+    }
     page.screenshot("project-11-two");
     page.assert_accessible("two found");
+
+    // The least score decides, in the list, in the picture and in the row.
+    let count = page.text("#least-score-count");
+    assert!(count.starts_with("Found 2 of ") && count.contains("at 0.50, in 1 of 1 pictures"), "{count}");
+    let slide =
+        "const s = document.getElementById('least-score'); s.value = arguments[0]; s.dispatchEvent(new Event('input'))";
+    page.browser.run(slide, &[json!("1")]).unwrap();
+    page.wait_for("nothing", "return document.getElementById('found').innerText.includes('Nothing is accepted')");
+    let count = page.text("#least-score-count");
+    assert!(count.starts_with("Found 0 of ") && count.contains("--min-score 1.00"), "{count}");
+    assert!(page.text("#strip").contains("nothing found"), "{}", page.text("#strip"));
+    page.screenshot("project-13-least-score");
+    page.assert_accessible("nothing at the highest least score");
+    page.browser.run(slide, &[json!("0.5")]).unwrap();
+
+    // Another picture, with nothing in it, comes first when the row is sorted.
+    try_picture(&page, "empty.png", &RgbImage::from_pixel(640, 480, Rgb([140, 140, 135])));
+    let row = "return [...document.querySelectorAll('#strip button')].map((b) => b.children[1].innerText)";
+    assert_eq!(page.browser.run(row, &[]).unwrap(), json!(["two.png", "empty.png"]));
+    for by in ["score", "state"] {
+        let sort = "const s = document.getElementById('sort-pictures'); s.value = arguments[0]; s.dispatchEvent(new Event('change'))";
+        page.browser.run(sort, &[json!("added")]).unwrap();
+        page.browser.run(sort, &[json!(by)]).unwrap();
+        page.settle_frames();
+        assert_eq!(page.browser.run(row, &[]).unwrap(), json!(["empty.png", "two.png"]), "{by}");
+    }
+    page.click("#strip li:nth-child(2) button");
+    page.wait_for("the other picture", "return document.getElementById('photo').alt === 'Photo two.png'");
+    page.screenshot("project-14-sorted");
     page.assert_quiet();
 }
 
@@ -106,6 +140,12 @@ fn a_refused_one_says_why_and_is_learnt_from() {
     let dots = "return document.querySelectorAll('#overlay .differs path').length";
     assert!(page.browser.run(dots, &[]).unwrap().as_u64().unwrap() > 0, "where it differs is shown");
     page.screenshot("project-1-refused");
+    page.click("#show-differences");
+    page.settle_frames();
+    assert_eq!(page.browser.run(dots, &[]).unwrap(), json!(0), "what differs can be switched off");
+    page.assert_accessible("without the marks of what differs");
+    page.click("#show-differences");
+    page.settle_frames();
     page.assert_accessible("a refused detection");
     page.click(".found button");
     page.wait_for(
@@ -122,8 +162,17 @@ fn a_refused_one_says_why_and_is_learnt_from() {
         "the version to be stale",
         "return document.getElementById('version-list').innerText.includes('stale')",
     );
+    page.wait_for("the old result", "return !document.getElementById('teach-old').hidden");
     page.screenshot("project-2-stale");
     page.assert_accessible("versions");
+    // In the last step, too, "Teach again" teaches.
+    page.click("#tab-try");
+    assert!(page.text("#try-intro").contains("This model is old"), "{}", page.text("#try-intro"));
+    let again = "[...document.querySelectorAll('#found button')].find((b) => b.innerText === 'Teach again').click()";
+    page.browser.run(again, &[]).unwrap();
+    let taught = "return document.querySelectorAll('#version-list li').length === 2
+        && document.getElementById('teach-old').hidden && !document.getElementById('go-try').hidden";
+    patiently(&page, "another version", taught);
     page.assert_quiet();
 }
 
@@ -165,6 +214,17 @@ fn a_picture_without_the_part_is_kept_and_versions_are_compared_after_opening_ag
     let compared = "const text = document.getElementById('compared').innerText;
         return text.includes('other.png') && text.includes('empty.png') && text";
     patiently(&page, "the table", compared);
+    // Each checkbox is beside its word, and the button in the card; "in use" is no warning.
+    let layout = "const cards = [...document.querySelectorAll('#version-list li')];
+        const middle = (r) => (r.top + r.bottom) / 2, rect = (e) => e.getBoundingClientRect();
+        const word = (label) => { const range = document.createRange(); range.selectNode(label.lastChild); return rect(range); };
+        const beside = cards.every((card) => { const label = card.querySelector('label');
+            return Math.abs(middle(rect(label.firstChild)) - middle(word(label))) < 4; });
+        const inside = cards.every((card) => [...card.querySelectorAll('button')].every((b) =>
+            rect(b).right <= rect(card).right && rect(b).bottom <= rect(card).bottom));
+        return [beside, inside, document.querySelector('.used').innerText, getComputedStyle(document.querySelector('.used')).color !==
+            getComputedStyle(document.querySelector('.stale')).color]";
+    assert_eq!(page.browser.run(layout, &[]).unwrap(), json!([true, true, "in use", true]));
     page.screenshot("project-4-compared");
     page.assert_accessible("two versions compared");
     page.click("#version-list li:nth-child(1) button");
@@ -283,6 +343,12 @@ fn that_an_outline_has_no_holes_is_said() {
     assert!((after / area - 1.0).abs() < 0.05, "{after} of {area}");
     page.screenshot("project-10-hole");
     page.assert_accessible("a click in a hole");
+    // A round outline raises the question whether the part looks the same when turned.
+    page.click("#tab-teach");
+    page.wait_for("the question", "return document.getElementById('symmetry').open");
+    assert!(page.text("#symmetry-why").contains("Any turn"), "{}", page.text("#symmetry-why"));
+    page.screenshot("project-12-symmetry");
+    page.assert_accessible("the question of turns");
     page.assert_quiet();
 }
 

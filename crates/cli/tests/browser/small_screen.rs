@@ -30,5 +30,16 @@ fn every_step_fits_a_small_screen_in_light_and_dark() {
             }
         }
     }
+    // The one action is in sight without scrolling.
+    page.click("#tab-teach");
+    for (width, height) in [(390, 800), (1280, 800)] {
+        page.browser.emulate(width, height, false).unwrap();
+        page.browser.run("scrollTo(0, 0); document.querySelector('.panel').scrollTop = 0", &[]).unwrap();
+        page.settle_frames();
+        let in_sight = "const r = document.getElementById('teach-start').getBoundingClientRect();
+            return r.top > 0 && r.bottom <= innerHeight && !document.getElementById('teach-start').disabled";
+        page.screenshot(&format!("teach-{width}"));
+        assert_eq!(page.browser.run(in_sight, &[]).unwrap(), json!(true), "at {width} px");
+    }
     page.assert_quiet();
 }

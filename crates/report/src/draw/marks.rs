@@ -55,6 +55,8 @@ pub struct DetectionMark<'a> {
     pub score: f64,
     /// Verdict of the verification.
     pub verdict: Verdict,
+    /// Number of the part, written before the score.
+    pub number: Option<u64>,
 }
 
 /// Line width that suits a picture's size: 3 pixels at 640 columns, so that marks and tags can still be read
@@ -110,7 +112,8 @@ pub fn draw_detection(image: &mut RgbImage, mark: &DetectionMark<'_>) {
         (None, Some(grasp)) => grasp.center(),
         (None, None) => return,
     };
-    let text = format!("{} {}", format_number(mark.score, 2), mark.verdict.word());
+    let number = mark.number.map(|number| format!("part {number}: ")).unwrap_or_default();
+    let text = format!("{number}{} {}", format_number(mark.score, 2), mark.verdict.word());
     draw_label(image, anchor, &text, color, 5.6 * width);
 }
 
@@ -132,6 +135,7 @@ mod tests {
             grasp: Some(PlanarGrasp { x: 160.0, y: 120.0, angle: Angle::ZERO, width: 60.0 }),
             score: 0.97,
             verdict,
+            number: None,
         }
     }
 

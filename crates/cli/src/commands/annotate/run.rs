@@ -35,6 +35,9 @@ fn lock(written: &Path) -> Result<Option<WriterLock>> {
 
 /// Serves the page until Ctrl-C.
 pub fn run(args: &AnnotateArgs) -> Result<Outcome> {
+    if args.from.is_none() {
+        args.request.refuse_without_camera(&[], "photos")?;
+    }
     let preset = args.preset.parse().map_err(|error| Usage(format!("--preset: {error}")))?;
     let camera = args.camera.file.as_deref().map(CameraFile::read).transpose()?;
     let camera = camera.map(|camera| (camera, args.camera.heights_m()));

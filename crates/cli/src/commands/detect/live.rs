@@ -28,9 +28,10 @@ pub fn run(args: &DetectArgs, address: &Address, detector: Perception) -> Result
     let server = match &args.draw {
         None => None,
         Some(port) => {
-            let port = port.to_str().and_then(|port| port.parse().ok());
-            let port = port.ok_or_else(|| {
-                Usage(format!("--draw: with --from expected a port of 127.0.0.1 (0 for any), found {:?}", args.draw))
+            let number = port.to_str().and_then(|port| port.parse().ok());
+            let port = number.ok_or_else(|| {
+                let found = port.display();
+                Usage(format!("--draw: with --from expected a port of 127.0.0.1 (0 for any), found \"{found}\""))
             })?;
             let server = MjpegServer::start(port)?;
             eprintln!("pictures at {}", server.url());
@@ -75,9 +76,8 @@ pub fn run(args: &DetectArgs, address: &Address, detector: Perception) -> Result
         found_any |= parts.iter().any(|part| part.is_seen(args.min_score));
         write_line(&mut stdout, args, finder.perception(), &frame, picture.dimensions(), seconds, &parts)?;
         if let Some(server) = &server {
-            let seen = parts.iter().filter(|part| part.is_seen(args.min_score)).map(|part| &part.found.detection);
             let mut drawn = RgbImage::clone(&picture);
-            drawing::draw_detections(&mut drawn, seen, args.min_score, &[]);
+            drawing::draw_parts(&mut drawn, &parts, args.min_score);
             server.publish(drawn);
         }
     }

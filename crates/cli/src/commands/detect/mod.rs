@@ -24,10 +24,9 @@ use crate::json_line::json_line;
 
 /// Every image gets its line; one that cannot be read gets its error, and the next one its turn.
 pub fn run(args: &DetectArgs) -> Result<Outcome> {
-    if args.from.is_none() && (args.frames.is_some() || args.every_frame) {
-        return Err(
-            Usage("--frames and --every-frame: expected live pictures (--from), found images".to_owned()).into()
-        );
+    if args.from.is_none() {
+        let own = [("--frames", args.frames.is_some()), ("--every-frame", args.every_frame)];
+        args.request.refuse_without_camera(&own, "images")?;
     }
     if args.from.is_some() && !args.images.is_empty() {
         return Err(Usage("--from: expected live pictures instead of images, found images as well".to_owned()).into());
@@ -61,7 +60,8 @@ pub fn run(args: &DetectArgs) -> Result<Outcome> {
         num_failed: 0,
         is_alone: false,
         last_error: String::new(),
-        found_any: false,
+        num_found: 0,
+        num_with_parts: 0,
     };
     let inputs: Vec<_> = args.images.iter().map(|argument| (argument, pictures_of_argument(argument))).collect();
     let num_pictures = |inputs: &Result<PictureInputs>| inputs.as_ref().map_or(1, |inputs| inputs.pictures.len());
@@ -82,7 +82,8 @@ pub fn run(args: &DetectArgs) -> Result<Outcome> {
             Err(error) => batch.failed(&argument.display().to_string(), &error)?,
         }
     }
-    match (batch.num_failed, batch.found_any) {
+    batch.summarize();
+    match (batch.num_failed, batch.num_found > 0) {
         (0, true) => Ok(Outcome::Done),
         (0, false) => Ok(Outcome::NothingToGrasp),
         // One line says all of one picture.
@@ -103,7 +104,10 @@ struct Batch<'a, W> {
     /// There is one picture in all.
     is_alone: bool,
     last_error: String,
-    found_any: bool,
+    /// Accepted detections in all pictures.
+    num_found: usize,
+    /// Pictures with at least one of them.
+    num_with_parts: usize,
 }
 
 impl<W: Write> Batch<'_, W> {
@@ -115,10 +119,21 @@ impl<W: Write> Batch<'_, W> {
         match self.detect(input) {
             Ok(seen) => {
                 self.num_used += 1;
-                self.found_any |= seen.accepted(self.args.min_score).next().is_some();
+                let num_found = seen.accepted(self.args.min_score).count();
+                self.num_found += num_found;
+                self.num_with_parts += usize::from(num_found > 0);
                 seen.write(&mut self.stdout, self.args, self.detector, &input.name())
             }
             Err(error) => self.failed(&input.name(), &error),
+        }
+    }
+
+    /// Says on standard error what was found in several pictures.
+    fn summarize(&self) {
+        if !self.is_alone {
+            let Self { num_found, num_with_parts, num_used, .. } = self;
+            let parts = if *num_found == 1 { "part" } else { "parts" };
+            eprintln!("found {num_found} {parts} in {num_with_parts} of {num_used} pictures");
         }
     }
 
