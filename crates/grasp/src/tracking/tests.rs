@@ -187,7 +187,12 @@ fn a_part_that_lies_still_stays_where_the_search_has_it() {
     let answers = run_searching_before_answers(&mut tracker, Duration::from_millis(100), &frames);
     let found = &answers[0].1[0].detection;
     for (was_searched, parts) in &answers[1..] {
-        assert_eq!((*was_searched, &parts[0].detection), (false, found));
+        let mut followed = parts[0].detection.clone();
+        // A window of the picture is read at other numbers, so that sums end in other bits.
+        let [seen, searched] = [followed.agreement, found.agreement].map(Option::unwrap);
+        assert!((seen - searched).abs() < 1e-12, "{seen} instead of {searched}");
+        followed.agreement = found.agreement;
+        assert_eq!((*was_searched, &followed), (false, found));
     }
     // What moves by a pixel is followed.
     let moved = tracker.frame(Arc::new(picture(&[at(101.3, 90.8, 17.0)])), Duration::from_millis(1200));

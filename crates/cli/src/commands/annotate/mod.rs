@@ -1,7 +1,6 @@
 //! `sdg annotate`: the annotation page.
 
 #[cfg(feature = "annotate")]
-#[cfg(feature = "annotate")]
 mod run;
 
 use std::path::PathBuf;
