@@ -62,7 +62,7 @@ pub struct Comparison<'a> {
     pub details: &'a Details,
     pub(crate) close_up: &'a CloseUp,
     pub(crate) mirrored: Option<&'a Rival>,
-    pub(crate) turned: &'a Rival,
+    pub(crate) turned: Option<&'a Rival>,
     pub(crate) profile: Option<&'a Profile>,
     /// Poses that agree by less are not worth that network's time.
     pub min_agreement: f64,
@@ -151,7 +151,8 @@ impl Comparison<'_> {
         Evidence { close, ..evidence }
     }
 
-    /// `pose`, or a turn at which the part resembles itself and what differs between the two is seen. Scales stay in `scales`.
+    /// `pose`, or a turn at which the part resembles itself and what differs between the two is seen; of a part of revolution, the place
+    /// along its axis and the end that its profile tells. Scales stay in `scales`.
     pub fn best_turn(&self, pose: &PlanarSimilarity, scales: &RangeInclusive<f64>) -> PlanarSimilarity {
         if self.agreement(pose).both() < MIN_TURNED {
             return *pose;
@@ -159,7 +160,7 @@ impl Comparison<'_> {
         if let Some(profile) = self.profile {
             return profile.placed(self.picture.field, pose, scales);
         }
-        let turned = self.turned.better_turn(self.picture.image, self.picture.field, pose);
+        let turned = self.turned.and_then(|turned| turned.better_turn(self.picture.image, self.picture.field, pose));
         turned.filter(|turned| scales.contains(&turned.scale)).unwrap_or(*pose)
     }
 

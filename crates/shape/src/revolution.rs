@@ -70,9 +70,14 @@ impl Revolution {
 
     /// Along the axis, as long as the part.
     pub(crate) fn axis(&self) -> Vector2<f64> {
+        let (first, last) = self.ends();
+        (last - first) * self.axis
+    }
+
+    /// The part's first and last place along the axis.
+    fn ends(&self) -> (f64, f64) {
         let along = self.pixels.iter().map(|[along, _]| *along);
-        let ends = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(first, last), at| (first.min(at), last.max(at)));
-        (ends.1 - ends.0) * self.axis
+        along.fold((f64::INFINITY, f64::NEG_INFINITY), |(first, last), at| (first.min(at), last.max(at)))
     }
 
     /// How far above the axis the part's upper side lies beside a line: as far as the outline lies from the axis there.
@@ -85,8 +90,7 @@ impl Revolution {
 
     /// Whether the light changes across the axis as on a round body.
     fn is_round(&self, brightness: &[f64]) -> bool {
-        let first = self.pixels.iter().map(|[along, _]| *along).fold(f64::INFINITY, f64::min);
-        let last = self.pixels.iter().map(|[along, _]| *along).fold(f64::NEG_INFINITY, f64::max);
+        let (first, last) = self.ends();
         let piece_px = ((last - first) / ALONG as f64).max(1.0);
         let mut pieces: Vec<Vec<(f64, f64)>> = vec![Vec::new(); ALONG + 1];
         for ([along, across], light) in self.pixels.iter().zip(brightness) {

@@ -165,9 +165,10 @@ pub struct ShapeSearch {
     likeness: Likeness,
     details: Details,
     close_up: CloseUp,
-    /// `None` where the mirror image is the same, or has too few edges.
+    /// `None` where the mirror image is the same, or has too few edges, and for a part of revolution.
     mirrored: Option<Rival>,
-    turned: Rival,
+    /// `None` for a part of revolution, whose profile tells its ends.
+    turned: Option<Rival>,
     /// Of a part of revolution alone.
     profile: Option<Profile>,
     outline: Polygon,
@@ -191,7 +192,10 @@ impl ShapeSearch {
         let (sweep_level_idx, points) = sweep_points(&field, &template, outline, config);
         let log_scales = [config.scales.start().ln(), config.scales.end().ln()];
         let close_up = CloseUp::new(image, outline);
-        let own_places = places_in_photo(&points, sweep_level_idx, &template, &field, config);
+        let turned = || {
+            let own_places = places_in_photo(&points, sweep_level_idx, &template, &field, config);
+            Rival::turned(&close_up, &template, &field, outline.bounds().center(), &own_places)
+        };
         let places_of_mirrored = |flipped: &RgbImage, outline: &Polygon, template: &ShapeTemplate| {
             let flipped = GradientField::with_config(flipped, &config.shape.gradient);
             let (level_idx, points) = sweep_points(&flipped, template, outline, config);
@@ -206,7 +210,7 @@ impl ShapeSearch {
             structure: Structure::new(&field, outline, &config.shape.structure, &config.shape.agreement),
             likeness: Likeness::new(image, outline),
             details: Details::new(image, outline),
-            turned: Rival::turned(&close_up, &template, &field, outline.bounds().center(), &own_places),
+            turned: if profile.is_some() { None } else { Some(turned()) },
             // What differs from the mirror image is the light on one side of the axis.
             mirrored: if profile.is_some() { None } else { mirrored() },
             profile,
@@ -322,7 +326,7 @@ impl ShapeSearch {
     /// The demonstration over an image.
     pub fn comparison<'a>(&'a self, picture: &Picture<'a>) -> Comparison<'a> {
         let Self { template, surface, structure, likeness, details, close_up, mirrored, turned, profile, .. } = self;
-        let (min_agreement, mirrored) = (self.config.min_agreement, mirrored.as_ref());
+        let (min_agreement, mirrored, turned) = (self.config.min_agreement, mirrored.as_ref(), turned.as_ref());
         Comparison {
             template,
             surface,
