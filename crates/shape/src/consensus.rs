@@ -10,20 +10,14 @@
 //! that move edges by about a level pixel; a crest at distance `d` asks for `row · step = d`.
 
 use nalgebra::{Const, DimMin, SMatrix, SVector, Vector4};
+use pulp::{Arch, Simd, WithSimd};
 
 use crate::capture_range::{CaptureRange, step_units};
-use crate::edge_points::parabola_peak;
+use crate::edge_points::EdgePoint;
 use crate::pose::Pose;
+use crate::sightings::{EdgePlace, FIRST_REACH, Group, LANES, LATER_REACH, Sightings};
 use crate::template::{MatchedLevel, TemplateLevel};
 
-/// How far along its normal an edge point looks for crests, in level pixels: first and later rounds. Chosen by hand,
-/// not measured.
-pub(crate) const FIRST_REACH: usize = 6;
-pub(crate) const LATER_REACH: usize = 3;
-/// Most crests kept for a point. Chosen by hand, not measured.
-const MAX_CRESTS: usize = 3;
-/// Least alignment of a crest's direction, noise floor included. Chosen by hand, not measured.
-const MIN_TRUST: f32 = 0.2;
 /// Width of "on the edge" in level pixels, from the first look to the last. Chosen by hand, not measured.
 pub(crate) const WIDTHS: [f64; 3] = [2.0, 1.2, 0.7];
 /// Starts of the first round, in level pixels of edge movement by shift and by scale. Chosen by hand, not measured.
@@ -86,111 +80,23 @@ pub(crate) fn snap_from(
     best
 }
 
-/// What one edge point sees along its normal; `row` has as many entries as a pose has coordinates.
-pub(crate) struct Sighting<const N: usize> {
-    row: SVector<f64, N>,
-    weight: f64,
-    /// (distance, weight) of each crest.
-    crests: [(f64, f64); MAX_CRESTS],
-    num_crests: usize,
-}
-
-fn gather(level: &TemplateLevel, matched: &MatchedLevel<'_>, pose: &Pose, reach: usize) -> Vec<Sighting<4>> {
+fn gather(level: &TemplateLevel, matched: &MatchedLevel<'_>, pose: &Pose, reach: usize) -> Sightings<4> {
     let map = pose.level_map(matched.image_pixel_size);
     let radius = (level.radius_px * pose.log_scale.exp() / matched.image_pixel_size).max(1.0) as f32;
     let [center_x, center_y] = map.apply([0.0, 0.0]);
-    let mut sightings = Vec::with_capacity(level.points.len());
-    for point in &level.points {
+    let place = |point: &EdgePoint| {
         let [x, y] = map.apply(point.offset);
         let [nx, ny] = map.turn(point.normal);
         let (rx, ry) = ((x - center_x) / radius, (y - center_y) / radius);
-        let row = Vector4::new(nx, ny, ny * rx - nx * ry, nx * rx + ny * ry).map(f64::from);
-        let place = EdgePlace { at: [x, y], normal: [nx, ny], double: map.turn_double(point.double) };
-        sightings.extend(Sighting::new(matched, row, f64::from(point.weight), &place, reach));
-    }
-    sightings
-}
-
-/// An edge point laid over a level of the image, in its pixels; (cos 2φ, sin 2φ) of the normal beside it.
-pub(crate) struct EdgePlace {
-    pub(crate) at: [f32; 2],
-    pub(crate) normal: [f32; 2],
-    pub(crate) double: [f32; 2],
-}
-
-impl<const N: usize> Sighting<N> {
-    /// `None` where no crest is in reach.
-    pub(crate) fn new(
-        matched: &MatchedLevel<'_>,
-        row: SVector<f64, N>,
-        weight: f64,
-        place: &EdgePlace,
-        reach: usize,
-    ) -> Option<Self> {
-        let mut sighting = Self { row, weight, crests: [(0.0, 0.0); MAX_CRESTS], num_crests: 0 };
-        sighting.look(matched, place, reach);
-        (sighting.num_crests > 0).then_some(sighting)
-    }
-
-    /// Finds the crests of the gradient's part along the normal, the nearest first kept.
-    fn look(&mut self, matched: &MatchedLevel<'_>, &EdgePlace { at, normal, double }: &EdgePlace, reach: usize) {
-        const MAX_LEN: usize = 2 * FIRST_REACH + 3;
-        let len = 2 * reach + 3;
-        let middle = (reach + 1) as f32;
-        let floor = matched.image_level.floor();
-        // Of the gradient's strength: roots are taken of crests alone.
-        let mut squares = [0.0f32; MAX_LEN];
-        let mut trusts = [0.0f32; MAX_LEN];
-        for k in 0..len {
-            let t = k as f32 - middle;
-            // Beyond the border there is no crest.
-            if let Some([dx, dy, energy]) = matched.image_level.bilinear(at[0] + t * normal[0], at[1] + t * normal[1]) {
-                trusts[k] = (dx * double[0] + dy * double[1]).max(0.0);
-                squares[k] = trusts[k] * (energy + floor);
-            }
-        }
-        for k in 1..len - 1 {
-            if squares[k] < squares[k - 1] || squares[k] <= squares[k + 1] || trusts[k] < MIN_TRUST {
-                continue;
-            }
-            let [before, here, after] = [squares[k - 1], squares[k], squares[k + 1]].map(f32::sqrt);
-            let distance = f64::from(k as f32 - middle + parabola_peak(before, here, after));
-            let crest = (distance, f64::from(trusts[k]));
-            if self.num_crests < MAX_CRESTS {
-                self.crests[self.num_crests] = crest;
-                self.num_crests += 1;
-            } else if let Some(furthest) = self.crests.iter_mut().max_by(|a, b| a.0.abs().total_cmp(&b.0.abs()))
-                && distance.abs() < furthest.0.abs()
-            {
-                *furthest = crest;
-            }
-        }
-    }
-
-    /// Residual, and the share in the consensus, of the crest that fits `step` best.
-    #[inline]
-    fn best_crest(&self, step: &SVector<f64, N>, width: f64) -> (f64, f64) {
-        let moved = self.row.dot(step);
-        let mut best = (0.0, 0.0);
-        for &(distance, trust) in &self.crests[..self.num_crests] {
-            let share = trust * kernel((distance - moved) / width);
-            if share > best.1 {
-                best = (distance, share);
-            }
-        }
-        best
-    }
-}
-
-/// Tukey's biweight, 1 at 0 and 0 beyond 3 widths: no exponential, no far influence.
-#[inline]
-fn kernel(x: f64) -> f64 {
-    let rest = (1.0 - x * x / 9.0).max(0.0);
-    rest * rest
+        let row = [nx, ny, ny * rx - nx * ry, nx * rx + ny * ry];
+        EdgePlace { at: [x, y], normal: [nx, ny], double: map.turn_double(point.double), row, weight: point.weight }
+    };
+    let places: Vec<EdgePlace<4>> = level.points.iter().map(place).collect();
+    Sightings::gather(matched, &places, reach)
 }
 
 /// The step of most consensus from any of the starts; those that have come to the same place go on as one.
-fn best_fit(sightings: &[Sighting<4>], is_free: [bool; 4], mut steps: Vec<Vector4<f64>>) -> (Vector4<f64>, f64) {
+fn best_fit(sightings: &Sightings<4>, is_free: [bool; 4], mut steps: Vec<Vector4<f64>>) -> (Vector4<f64>, f64) {
     for width in &WIDTHS {
         let mut fitted: Vec<Vector4<f64>> = Vec::with_capacity(steps.len());
         for step in steps {
@@ -221,41 +127,113 @@ fn starts(is_free: [bool; 4], first: Starts) -> Vec<Vector4<f64>> {
     starts
 }
 
-/// The weighted normal equations of the crests that fit `step` best: the matrix, of which the lower triangle alone is filled
+/// Tukey's biweight, 1 at 0 and 0 beyond 3 widths: no exponential, no far influence.
+#[inline(always)]
+fn kernel(x: f32) -> f32 {
+    let rest = (1.0 - x * x / 9.0).max(0.0);
+    rest * rest
+}
+
+/// Residual, and the weighted share in the consensus, of the crest of each point that fits a step best.
+#[inline(always)]
+fn best_crests<const N: usize>(group: &Group<N>, step: &[f32; N], width: f32) -> ([f32; LANES], [f32; LANES]) {
+    let (mut rests, mut shares) = ([0.0f32; LANES], [0.0f32; LANES]);
+    let mut moved = [0.0f32; LANES];
+    for (row, step) in group.rows.iter().zip(step) {
+        for lane in 0..LANES {
+            moved[lane] += row[lane] * step;
+        }
+    }
+    for (distances, trusts) in group.distances.iter().zip(&group.trusts) {
+        for lane in 0..LANES {
+            let rest = distances[lane] - moved[lane];
+            let share = trusts[lane] * kernel(rest / width);
+            let is_better = share > shares[lane];
+            rests[lane] = if is_better { rest } else { rests[lane] };
+            shares[lane] = if is_better { share } else { shares[lane] };
+        }
+    }
+    for lane in 0..LANES {
+        shares[lane] *= group.weights[lane];
+    }
+    (rests, shares)
+}
+
+/// The weighted normal equations of the crests that fit a step best: the matrix, of which the lower triangle alone is filled
 /// (nothing above it is read), and the right-hand side.
-fn normal_equations<const N: usize>(
-    sightings: &[Sighting<N>],
-    step: &SVector<f64, N>,
-    width: f64,
-) -> (SMatrix<f64, N, N>, SVector<f64, N>) {
-    let mut lower = [[0.0; N]; N];
-    let mut right = [0.0; N];
-    for sighting in sightings {
-        let (distance, share) = sighting.best_crest(step, width);
-        let weight = sighting.weight * share;
-        if weight > 0.0 {
-            let rest = distance - sighting.row.dot(step);
-            for (i, (lower, right)) in lower.iter_mut().zip(&mut right).enumerate() {
-                let weighted = sighting.row[i] * weight;
-                *right += weighted * rest;
-                for (sum, other) in lower.iter_mut().zip(sighting.row.iter()).take(i + 1) {
-                    *sum += weighted * other;
+struct NormalEquations<'a, const N: usize> {
+    sightings: &'a Sightings<N>,
+    step: [f32; N],
+    width: f32,
+}
+
+impl<const N: usize> WithSimd for NormalEquations<'_, N> {
+    type Output = ([[f32; N]; N], [f32; N]);
+
+    /// Plain loops; compiled for the widest instructions that the machine has.
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Self::Output {
+        let mut lower = [[[0.0f32; LANES]; N]; N];
+        let mut right = [[0.0f32; LANES]; N];
+        for group in &self.sightings.groups {
+            let (rests, weights) = best_crests(group, &self.step, self.width);
+            for i in 0..N {
+                let weighted: [f32; LANES] = std::array::from_fn(|lane| group.rows[i][lane] * weights[lane]);
+                for lane in 0..LANES {
+                    right[i][lane] += weighted[lane] * rests[lane];
+                }
+                for j in 0..=i {
+                    for lane in 0..LANES {
+                        lower[i][j][lane] += weighted[lane] * group.rows[j][lane];
+                    }
                 }
             }
         }
+        (lower.map(|row| row.map(sum)), right.map(sum))
     }
-    (SMatrix::from_fn(|i, j| lower[i][j]), SVector::from(right))
+}
+
+struct Consensus<'a, const N: usize> {
+    sightings: &'a Sightings<N>,
+    step: [f32; N],
+    width: f32,
+}
+
+impl<const N: usize> WithSimd for Consensus<'_, N> {
+    type Output = f32;
+
+    /// As there.
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> f32 {
+        let mut sums = [0.0f32; LANES];
+        for group in &self.sightings.groups {
+            let (_, shares) = best_crests(group, &self.step, self.width);
+            for lane in 0..LANES {
+                sums[lane] += shares[lane];
+            }
+        }
+        sum(sums)
+    }
+}
+
+#[inline(always)]
+fn sum(lanes: [f32; LANES]) -> f32 {
+    lanes.into_iter().sum()
+}
+
+fn in_single<const N: usize>(step: &SVector<f64, N>) -> [f32; N] {
+    std::array::from_fn(|k| step[k] as f32)
 }
 
 /// Weighted share of the sightings that have a crest at a step.
-pub(crate) fn consensus_at<const N: usize>(sightings: &[Sighting<N>], step: &SVector<f64, N>) -> f64 {
-    let width = WIDTHS[WIDTHS.len() - 1];
-    sightings.iter().map(|sighting| sighting.weight * sighting.best_crest(step, width).1).sum()
+pub(crate) fn consensus_at<const N: usize>(sightings: &Sightings<N>, step: &SVector<f64, N>) -> f64 {
+    let width = WIDTHS[WIDTHS.len() - 1] as f32;
+    f64::from(Arch::new().dispatch(Consensus { sightings, step: in_single(step), width }))
 }
 
 /// Iteratively re-weighted least squares from `start`, narrowing.
 pub(crate) fn fit_offsets<const N: usize>(
-    sightings: &[Sighting<N>],
+    sightings: &Sightings<N>,
     is_free: [bool; N],
     start: SVector<f64, N>,
     widths: &[f64],
@@ -266,7 +244,10 @@ where
     let mut step = start;
     for &width in widths {
         for _ in 0..2 {
-            let (mut normal_matrix, right) = normal_equations(sightings, &step, width);
+            let equations = NormalEquations { sightings, step: in_single(&step), width: width as f32 };
+            let (lower, right) = Arch::new().dispatch(equations);
+            let mut normal_matrix = SMatrix::<f64, N, N>::from_fn(|i, j| f64::from(lower[i][j]));
+            let right = SVector::<f64, N>::from_fn(|i, _| f64::from(right[i]));
             // Directions that no edge holds (the angle of a ring) stay where they are. The share was chosen by hand.
             normal_matrix += SMatrix::<f64, N, N>::identity() * (2e-3 * normal_matrix.trace()).max(1e-9);
             for k in 0..N {

@@ -7,9 +7,11 @@
 use nalgebra::{Matrix2, Point2, SVector, Vector2};
 use sdg_geometry::{Angle, PlanarSimilarity};
 
-use crate::consensus::{EdgePlace, FIRST_REACH, LATER_REACH, Sighting, WIDTHS, consensus_at, fit_offsets};
+use crate::consensus::{WIDTHS, consensus_at, fit_offsets};
+use crate::edge_points::EdgePoint;
 use crate::gradient_field::GradientField;
 use crate::pose::Pose;
+use crate::sightings::{EdgePlace, FIRST_REACH, LATER_REACH, Sightings};
 use crate::template::{MatchedLevel, ShapeTemplate, TemplateLevel};
 
 /// Starts: no shortening, and so much (ln) in each of so many directions. A start is followed over about half of that.
@@ -119,26 +121,26 @@ fn radius(level: &TemplateLevel, image_pixel_size: f64, pose: &Affine) -> f64 {
 }
 
 /// What the edge points see at an affine pose; `None` for one that cannot be.
-fn gather(level: &TemplateLevel, matched: &MatchedLevel<'_>, pose: &Affine, reach: usize) -> Option<Vec<Sighting<6>>> {
+fn gather(level: &TemplateLevel, matched: &MatchedLevel<'_>, pose: &Affine, reach: usize) -> Option<Sightings<6>> {
     let pixel = matched.image_pixel_size;
     let normal_map = pose.linear.try_inverse()?.transpose();
     let radius = radius(level, pixel, pose);
-    let mut sightings = Vec::with_capacity(level.points.len());
-    for point in &level.points {
+    let place = |point: &EdgePoint| {
         let [offset, normal] = [point.offset, point.normal].map(|v| Vector2::new(f64::from(v[0]), f64::from(v[1])));
         let from_center = pose.linear * offset / pixel;
         let n = (normal_map * normal).try_normalize(f64::EPSILON)?;
         let r = from_center / radius;
         let at = pose.center.coords / pixel + from_center;
-        let place = EdgePlace {
+        Some(EdgePlace {
             at: [at.x as f32, at.y as f32],
             normal: [n.x as f32, n.y as f32],
             double: [(n.x * n.x - n.y * n.y) as f32, (2.0 * n.x * n.y) as f32],
-        };
-        let row = SVector::from([n.x, n.y, n.x * r.x, n.x * r.y, n.y * r.x, n.y * r.y]);
-        sightings.extend(Sighting::new(matched, row, f64::from(point.weight), &place, reach));
-    }
-    Some(sightings)
+            row: [n.x, n.y, n.x * r.x, n.x * r.y, n.y * r.x, n.y * r.y].map(|value| value as f32),
+            weight: point.weight,
+        })
+    };
+    let places = level.points.iter().map(place).collect::<Option<Vec<EdgePlace<6>>>>()?;
+    Some(Sightings::gather(matched, &places, reach))
 }
 
 #[cfg(test)]

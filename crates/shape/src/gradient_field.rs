@@ -12,6 +12,7 @@
 //! brightness on both sides but another colour.
 
 use image::RgbImage;
+use wide::f32x4;
 
 use crate::config::GradientConfig;
 
@@ -179,6 +180,45 @@ impl GradientLevel {
         let [dx, dy, energy, _] = out;
         Some([dx, dy, energy])
     }
+}
+
+impl GradientLevel {
+    /// The bilinear samples `[d.x, d.y, tr, 0]` at the first `out.len()` places, with the bits of [`Self::bilinear`]; zeros outside the
+    /// image. Which of the places lie inside, as 1 or 0.
+    #[inline(always)]
+    pub(crate) fn bilinear_all<const N: usize>(&self, x: &[f32; N], y: &[f32; N], out: &mut [f32x4]) -> [f32; N] {
+        let Reading { size, last, last_pair, .. } = self.reading;
+        let last_pair = last_pair.map(|last| last as f32);
+        let (mut fx, mut fy, mut inside, mut idxs) = ([0.0; N], [0.0; N], [0.0; N], [0u32; N]);
+        for k in 0..N {
+            let is_inside = (x[k] >= 0.0) & (y[k] >= 0.0) & (x[k] <= size[0]) & (y[k] <= size[1]);
+            inside[k] = if is_inside { 1.0 } else { 0.0 };
+            let u = (x[k] - 0.5).max(0.0).min(last[0]);
+            let v = (y[k] - 0.5).max(0.0).min(last[1]);
+            let (col, row) = (u.floor().min(last_pair[0]), v.floor().min(last_pair[1]));
+            fx[k] = u - col;
+            fy[k] = v - row;
+            idxs[k] = whole(row).wrapping_mul(self.width as u32).wrapping_add(whole(col));
+        }
+        for (k, out) in out.iter_mut().enumerate().take(N) {
+            let at = idxs[k] as usize;
+            let Some(window) = self.samples.get(at..at + self.width + 2) else { continue };
+            let (Some([a, b]), Some([c, d])) = (window.first_chunk(), window.last_chunk()) else { continue };
+            let [a, b, c, d] = [a, b, c, d].map(|sample| f32x4::new(*sample));
+            let top = a + f32x4::splat(fx[k]) * (b - a);
+            let bottom = c + f32x4::splat(fx[k]) * (d - c);
+            *out = (top + f32x4::splat(fy[k]) * (bottom - top)) * f32x4::splat(inside[k]);
+        }
+        inside
+    }
+}
+
+/// A whole number from 0 to 2²³ − 1 as an integer: added to 2²³, its bits are the last of the sum's. A conversion that must answer for
+/// every float is not made in lanes.
+#[inline(always)]
+fn whole(value: f32) -> u32 {
+    const TWO_TO_23: f32 = 8_388_608.0;
+    (value + TWO_TO_23).to_bits() & 0x007f_ffff
 }
 
 /// Energy of the pixels of the quiet quarter, read from at most a few thousand of them.

@@ -72,6 +72,7 @@
 #![forbid(unsafe_code)]
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod alignment;
 mod capture_range;
 mod close_look;
 mod comparison;
@@ -93,6 +94,7 @@ mod profile;
 mod refinement;
 mod revolution;
 mod search;
+mod sightings;
 mod structure;
 mod surface;
 mod template;

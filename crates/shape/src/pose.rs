@@ -76,6 +76,20 @@ impl LevelMap {
         [self.a * x - self.b * y + self.tx, self.b * x + self.a * y + self.ty]
     }
 
+    /// [`Self::apply`] of many places.
+    #[inline(always)]
+    pub(crate) fn apply_all<const N: usize>(&self, x: &[f32; N], y: &[f32; N]) -> [[f32; N]; 2] {
+        [
+            std::array::from_fn(|k| self.a * x[k] - self.b * y[k] + self.tx),
+            std::array::from_fn(|k| self.b * x[k] + self.a * y[k] + self.ty),
+        ]
+    }
+
+    /// (cos, sin) of twice the turn.
+    pub(crate) fn double_turn(&self) -> [f32; 2] {
+        self.double_turn
+    }
+
     /// Turns a direction.
     #[inline]
     pub(crate) fn turn(&self, v: [f32; 2]) -> [f32; 2] {

@@ -4,11 +4,12 @@ use image::RgbImage;
 use nalgebra::Point2;
 use sdg_geometry::{PlanarSimilarity, Polygon};
 
+use crate::alignment::PointLanes;
 use crate::config::{MIN_POINTS, ShapeConfig, check_config};
 use crate::edge_points::{EdgePoint, EdgeSelection, rms_radius, select_edge_points};
 use crate::error::ShapeError;
 use crate::gradient_field::{GradientField, GradientLevel};
-use crate::pose::Pose;
+use crate::pose::{LevelMap, Pose};
 
 /// Smallest extent of an outline, in demonstration pixels. Chosen by hand, not measured.
 const MIN_EXTENT_PX: f64 = 12.0;
@@ -39,6 +40,7 @@ pub(crate) struct TemplateLevel {
     /// Root mean square distance of the points from the centre, in demonstration pixels.
     pub(crate) radius_px: f64,
     pub(crate) points: Vec<EdgePoint>,
+    lanes: PointLanes,
 }
 
 impl ShapeTemplate {
@@ -102,7 +104,8 @@ impl ShapeTemplate {
                 // Coarser levels only help to start from further away.
                 break;
             }
-            levels.push(TemplateLevel { pixel_size, radius_px: rms_radius(&points), points });
+            let lanes = PointLanes::new(&points);
+            levels.push(TemplateLevel { pixel_size, radius_px: rms_radius(&points), points, lanes });
         }
         let agreement_level_idx = levels_to(config.agreement.extent).saturating_sub(finest).min(levels.len() - 1);
         Ok(Self { config: config.clone(), center, levels, agreement_level_idx })
@@ -157,20 +160,25 @@ impl MatchedLevel<'_> {
     /// in `[-1, 1]`.
     pub(crate) fn mean_alignment(&self, level: &TemplateLevel, pose: &Pose, sampling: LevelSampling) -> f64 {
         let map = pose.level_map(self.image_pixel_size);
+        let (sum, visible) = match sampling {
+            LevelSampling::Nearest => self.nearest_sums(level, &map),
+            LevelSampling::Bilinear => level.lanes.sums(self.image_level, &map),
+        };
+        f64::from(sum) / f64::from(visible).max(MIN_VISIBLE)
+    }
+
+    /// Sum over the points inside the image, and of their weights.
+    fn nearest_sums(&self, level: &TemplateLevel, map: &LevelMap) -> (f32, f32) {
         let (mut sum, mut visible) = (0.0f32, 0.0f32);
         for point in &level.points {
             let [x, y] = map.apply(point.offset);
-            let sample = match sampling {
-                LevelSampling::Nearest => self.image_level.nearest(x, y),
-                LevelSampling::Bilinear => self.image_level.bilinear(x, y),
-            };
-            if let Some([dx, dy, _]) = sample {
+            if let Some([dx, dy, _]) = self.image_level.nearest(x, y) {
                 let [ex, ey] = map.turn_double(point.double);
                 sum += point.weight * (dx * ex + dy * ey);
                 visible += point.weight;
             }
         }
-        f64::from(sum) / f64::from(visible).max(MIN_VISIBLE)
+        (sum, visible)
     }
 }
 

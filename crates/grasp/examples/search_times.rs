@@ -1,0 +1,55 @@
+//! How long model S looks at pictures: `search_times MODEL [--repeat N] [--size-tolerance LOW-HIGH] PICTURE…`.
+//!
+//! Prints, for each picture, the median of its repeats in milliseconds, decoded picture to verdict, and what was accepted; then the
+//! median over the pictures. Repeats go round all pictures in turn, so that a busy moment does not fall on one of them alone.
+
+use std::time::Instant;
+
+use burn::tensor::Device;
+use sdg_demonstration::{ImageLimits, decode_image};
+use sdg_grasp::{GraspModel, Verification};
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let mut arguments = std::env::args().skip(1);
+    let model_path = arguments.next().ok_or("usage: search_times MODEL [--repeat N] [--size-tolerance LOW-HIGH] PICTURE…")?;
+    let mut model = GraspModel::from_bytes(&std::fs::read(model_path)?, &Device::flex())?;
+    let (mut repeats, mut paths) = (15, Vec::new());
+    while let Some(argument) = arguments.next() {
+        match argument.as_str() {
+            "--repeat" => repeats = arguments.next().ok_or("--repeat needs a number")?.parse()?,
+            "--size-tolerance" => {
+                let range = arguments.next().ok_or("--size-tolerance needs LOW-HIGH")?;
+                let (low, high) = range.split_once('-').ok_or("--size-tolerance needs LOW-HIGH")?;
+                model = model.with_size_tolerance(low.parse()?..=high.parse()?)?;
+            }
+            _ => paths.push(argument),
+        }
+    }
+    let decoded = |path: &String| Ok::<_, Box<dyn std::error::Error>>(decode_image(&std::fs::read(path)?, &ImageLimits::default())?);
+    let images = paths.iter().map(decoded).collect::<Result<Vec<_>, _>>()?;
+
+    let mut times = vec![Vec::new(); images.len()];
+    let mut found = vec![(0, 0); images.len()];
+    for round in 0..=repeats {
+        for (k, image) in images.iter().enumerate() {
+            let start = Instant::now();
+            let detections = model.detect(image, Verification::ByShape)?;
+            // The first round makes the model ready for the pictures' sizes.
+            if round > 0 {
+                times[k].push(1e3 * start.elapsed().as_secs_f64());
+            }
+            found[k] = (detections.iter().filter(|d| d.is_accepted()).count(), detections.len());
+        }
+    }
+    let medians: Vec<f64> = times.into_iter().map(median).collect();
+    for ((path, image), (ms, (accepted, seen))) in paths.iter().zip(&images).zip(medians.iter().zip(&found)) {
+        println!("{ms:8.1} ms  {}×{}  {accepted} accepted of {seen}  {path}", image.width(), image.height());
+    }
+    println!("{:8.1} ms  median of {} pictures", median(medians.clone()), medians.len());
+    Ok(())
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+}

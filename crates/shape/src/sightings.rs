@@ -1,0 +1,151 @@
+//! What the edge points of a template see in a picture: the crests of the gradient near each along its normal.
+//!
+//! Points stand in groups of [`LANES`], coordinate by coordinate, so that the fits ([`crate::consensus`]) take a group at a time. All
+//! sums are made in the same order whatever instructions the machine has.
+
+use pulp::{Arch, Simd, WithSimd};
+use wide::f32x4;
+
+use crate::edge_points::parabola_peak;
+use crate::gradient_field::GradientLevel;
+use crate::template::MatchedLevel;
+
+/// Points that are taken at once.
+pub(crate) const LANES: usize = 8;
+/// How far along its normal an edge point looks for crests, in level pixels: first and later rounds. Chosen by hand,
+/// not measured.
+pub(crate) const FIRST_REACH: usize = 6;
+pub(crate) const LATER_REACH: usize = 3;
+/// Most crests kept for a point. Chosen by hand, not measured.
+pub(crate) const MAX_CRESTS: usize = 3;
+/// Least alignment of a crest's direction, noise floor included. Chosen by hand, not measured.
+const MIN_TRUST: f32 = 0.2;
+/// Samples along a normal, one beyond the reach on either side; derived.
+const MAX_SAMPLES: usize = 2 * FIRST_REACH + 3;
+const _: () = assert!(MAX_SAMPLES <= 2 * LANES, "two groups hold the samples of a normal");
+
+/// An edge point laid over a level of the image, in its pixels.
+pub(crate) struct EdgePlace<const N: usize> {
+    pub(crate) at: [f32; 2],
+    pub(crate) normal: [f32; 2],
+    /// (cos 2φ, sin 2φ) of the normal.
+    pub(crate) double: [f32; 2],
+    /// How far the point moves along its normal for each coordinate of a pose.
+    pub(crate) row: [f32; N],
+    pub(crate) weight: f32,
+}
+
+/// A group of points, those that are left over without weight.
+#[derive(Clone, Copy)]
+pub(crate) struct Group<const N: usize> {
+    pub(crate) rows: [[f32; LANES]; N],
+    pub(crate) weights: [f32; LANES],
+    /// Of each crest, along the normal; with a trust of 0 there is none.
+    pub(crate) distances: [[f32; LANES]; MAX_CRESTS],
+    pub(crate) trusts: [[f32; LANES]; MAX_CRESTS],
+}
+
+/// The points that see a crest.
+pub(crate) struct Sightings<const N: usize> {
+    pub(crate) groups: Vec<Group<N>>,
+}
+
+impl<const N: usize> Sightings<N> {
+    /// Looks from every place along its normal, `reach` pixels to either side; beyond the border nothing is seen.
+    pub(crate) fn gather(matched: &MatchedLevel<'_>, places: &[EdgePlace<N>], reach: usize) -> Self {
+        Arch::new().dispatch(Gather { level: matched.image_level, places, reach })
+    }
+}
+
+struct Gather<'a, const N: usize> {
+    level: &'a GradientLevel,
+    places: &'a [EdgePlace<N>],
+    reach: usize,
+}
+
+impl<const N: usize> WithSimd for Gather<'_, N> {
+    type Output = Sightings<N>;
+
+    /// Plain loops; compiled for the widest instructions that the machine has.
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Sightings<N> {
+        let Self { level, places, reach } = self;
+        let empty = Group {
+            rows: [[0.0; LANES]; N],
+            weights: [0.0; LANES],
+            distances: [[0.0; LANES]; MAX_CRESTS],
+            trusts: [[0.0; LANES]; MAX_CRESTS],
+        };
+        let mut groups: Vec<Group<N>> = Vec::with_capacity(places.len().div_ceil(LANES));
+        let mut lane = LANES;
+        for place in places {
+            let samples = seen(level, place, reach);
+            let Some(crests) = crests(&samples, level.floor(), place.double, reach) else { continue };
+            if lane == LANES {
+                groups.push(empty);
+                lane = 0;
+            }
+            if let Some(group) = groups.last_mut() {
+                for k in 0..N {
+                    group.rows[k][lane] = place.row[k];
+                }
+                group.weights[lane] = place.weight;
+                for (k, (distance, trust)) in crests.into_iter().enumerate() {
+                    group.distances[k][lane] = distance;
+                    group.trusts[k][lane] = trust;
+                }
+            }
+            lane += 1;
+        }
+        Sightings { groups }
+    }
+}
+
+/// The samples along a normal from one end to the other.
+type Samples = [f32x4; 2 * LANES];
+
+#[inline(always)]
+fn seen<const N: usize>(level: &GradientLevel, place: &EdgePlace<N>, reach: usize) -> Samples {
+    let middle = (reach + 1) as f32;
+    let mut samples = [f32x4::ZERO; 2 * LANES];
+    for (group, out) in samples.chunks_exact_mut(LANES).enumerate() {
+        let t: [f32; LANES] = std::array::from_fn(|k| (group * LANES + k) as f32 - middle);
+        let count = (2 * reach + 3).saturating_sub(group * LANES).min(LANES);
+        let [x, y] = [0, 1].map(|i| t.map(|t| place.at[i] + t * place.normal[i]));
+        level.bilinear_all(&x, &y, &mut out[..count]);
+    }
+    samples
+}
+
+/// Distance and trust of the crests of the gradient's part along the normal, the nearest kept; `None` where there is none.
+#[inline(always)]
+fn crests(samples: &Samples, floor: f32, double: [f32; 2], reach: usize) -> Option<[(f32, f32); MAX_CRESTS]> {
+    let len = 2 * reach + 3;
+    let middle = (reach + 1) as f32;
+    // Of the gradient's strength: roots are taken of crests alone.
+    let mut squares = [0.0f32; 2 * LANES];
+    let mut trusts = [0.0f32; 2 * LANES];
+    for (k, sample) in samples.iter().enumerate() {
+        let [dx, dy, energy, _] = sample.to_array();
+        trusts[k] = (dx * double[0] + dy * double[1]).max(0.0);
+        squares[k] = trusts[k] * (energy + floor);
+    }
+    let mut crests = [(0.0f32, 0.0f32); MAX_CRESTS];
+    let mut count = 0;
+    for k in 1..len - 1 {
+        if squares[k] < squares[k - 1] || squares[k] <= squares[k + 1] || trusts[k] < MIN_TRUST {
+            continue;
+        }
+        let [before, here, after] = [squares[k - 1], squares[k], squares[k + 1]].map(f32::sqrt);
+        let crest = (k as f32 - middle + parabola_peak(before, here, after), trusts[k]);
+        if count < MAX_CRESTS {
+            crests[count] = crest;
+            count += 1;
+        } else if let Some(furthest) = crests.iter_mut().max_by(|a, b| a.0.abs().total_cmp(&b.0.abs()))
+            && crest.0.abs() < furthest.0.abs()
+        {
+            *furthest = crest;
+        }
+    }
+    (count > 0).then_some(crests)
+}
