@@ -32,7 +32,13 @@ impl PointLanes {
     pub(crate) fn new(points: &[EdgePoint]) -> Self {
         let group = |points: &[EdgePoint]| {
             let zeros = [0.0; LANES];
-            let mut group = PointGroup { x: zeros, y: zeros, weights: zeros, along: [f32x4::ZERO; LANES], across: [f32x4::ZERO; LANES] };
+            let mut group = PointGroup {
+                x: zeros,
+                y: zeros,
+                weights: zeros,
+                along: [f32x4::ZERO; LANES],
+                across: [f32x4::ZERO; LANES],
+            };
             for (k, point) in points.iter().enumerate() {
                 [group.x[k], group.y[k]] = point.offset;
                 group.weights[k] = point.weight;

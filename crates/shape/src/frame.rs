@@ -2,9 +2,12 @@
 
 use image::RgbImage;
 use nalgebra::{Point2, Vector2};
+use pulp::{Arch, Simd, WithSimd};
 use sdg_geometry::{BoundingBox, PlanarSimilarity};
+use wide::f32x4;
 
-use crate::pixel_cell::PixelCell;
+use crate::pixel_cell::PixelReader;
+use crate::sightings::LANES;
 
 /// The square, `side` pixels wide.
 #[derive(Debug, Clone)]
@@ -66,24 +69,55 @@ impl Frame {
         samples_a_side: f64,
     ) -> Vec<Option<[f32; 3]>> {
         let num = samples_a_side.max(1.0) as usize;
-        let origin = image_from_cutout.apply(&self.place([0.5 / num as f64; 2]));
-        let across = image_from_cutout.apply(&self.place([1.0 + 0.5 / num as f64, 0.5 / num as f64])) - origin;
+        let first = [0.5 / num as f64; 2];
+        let origin = image_from_cutout.apply(&self.place(first));
+        let across = image_from_cutout.apply(&self.place([first[0] + 1.0, first[1]])) - origin;
+        let reader = PixelReader::new(image);
+        Arch::new().dispatch(SampleFrame { reader, side: self.side, num, origin, across })
+    }
+}
+
+/// Reads `num` × `num` samples a pixel, the first at `origin`; `across` is the way from one pixel to the next of its row.
+struct SampleFrame<'a> {
+    reader: PixelReader<'a>,
+    side: usize,
+    num: usize,
+    origin: Point2<f64>,
+    across: Vector2<f64>,
+}
+
+impl WithSimd for SampleFrame<'_> {
+    type Output = Vec<Option<[f32; 3]>>;
+
+    /// Plain loops; compiled for the widest instructions that the machine has.
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Self::Output {
+        let Self { reader, side, num, origin, across } = self;
         let down = Vector2::new(-across.y, across.x);
         let one_more = 1.0 / num as f64;
-        self.pixels()
-            .map(|[x, y]| {
-                let corner = origin + (x - 0.5) * across + (y - 0.5) * down;
-                let (mut sum, mut count) = ([0.0; 3], 0);
+        let [step_x, step_y] = [across.x as f32, across.y as f32];
+        let mut pixels = Vec::with_capacity(side * side);
+        for row in 0..side {
+            for left in (0..side).step_by(LANES) {
+                let (mut sums, mut counts) = ([f32x4::ZERO; LANES], [0.0f32; LANES]);
                 for i in 0..num * num {
                     let [right, below] = [i % num, i / num].map(|k| k as f64 * one_more);
-                    if let Some(cell) = PixelCell::at(image, &(corner + right * across + below * down)) {
-                        let color = cell.color_f32();
-                        count += 1;
-                        (0..3).for_each(|c| sum[c] += color[c]);
+                    let start = origin + (left as f64 + right) * across + (row as f64 + below) * down;
+                    let x: [f32; LANES] = std::array::from_fn(|k| start.x as f32 + k as f32 * step_x);
+                    let y: [f32; LANES] = std::array::from_fn(|k| start.y as f32 + k as f32 * step_y);
+                    let mut colors = [f32x4::ZERO; LANES];
+                    let inside = reader.colors(&x, &y, &mut colors);
+                    for k in 0..LANES {
+                        sums[k] += colors[k];
+                        counts[k] += inside[k];
                     }
                 }
-                (count > 0).then(|| sum.map(|value| value / (255.0 * count as f32)))
-            })
-            .collect()
+                for (sum, count) in sums.iter().zip(counts).take(side - left) {
+                    let [r, g, b, _] = (*sum * f32x4::splat(1.0 / (255.0 * count.max(1.0)))).to_array();
+                    pixels.push((count > 0.0).then_some([r, g, b]));
+                }
+            }
+        }
+        pixels
     }
 }

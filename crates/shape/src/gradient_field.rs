@@ -216,7 +216,7 @@ impl GradientLevel {
 /// A whole number from 0 to 2²³ − 1 as an integer: added to 2²³, its bits are the last of the sum's. A conversion that must answer for
 /// every float is not made in lanes.
 #[inline(always)]
-fn whole(value: f32) -> u32 {
+pub(crate) fn whole(value: f32) -> u32 {
     const TWO_TO_23: f32 = 8_388_608.0;
     (value + TWO_TO_23).to_bits() & 0x007f_ffff
 }

@@ -1,63 +1,71 @@
-//! The four pixels around a point, for bilinear interpolation.
+//! Colours between the pixels of a picture, by bilinear interpolation, many at once.
 //!
 //! Loops of their own, each with its reason beside it: [`GradientField`](crate::GradientField) (directions, three floats),
 //! `sdg-grasp`'s plan view and `sdg-demonstration`'s raster (the border goes on), `sdg-orientation`'s crop (beyond the border a
 //! colour; weights belong to its bits), `sdg-detection`'s pasted masks (single numbers).
 
 use image::RgbImage;
-use nalgebra::Point2;
+use wide::{f32x4, i32x4};
 
-/// The pixels around a point, and where it lies between their centres.
-pub(crate) struct PixelCell<'a> {
-    /// Left and right pixel of the row above, and of the row below: `[r, g, b, r, g, b]`.
-    upper: &'a [u8],
-    lower: &'a [u8],
-    /// From the left pixels to the right ones and from the upper to the lower ones, in [0, 1).
-    along: f64,
-    below: f64,
+use crate::gradient_field::whole;
+
+/// A picture whose colours are read between its pixels.
+#[derive(Clone, Copy)]
+pub(crate) struct PixelReader<'a> {
+    raw: &'a [u8],
+    width: u32,
+    /// Column and row of the last pixel that has a neighbour; below 0 where there is none.
+    last_pair: [f32; 2],
 }
 
-impl<'a> PixelCell<'a> {
-    /// `None` where the point does not lie between four pixel centres.
-    #[inline]
-    pub(crate) fn at(image: &'a RgbImage, point: &Point2<f64>) -> Option<Self> {
-        let (x, y) = (point.x - 0.5, point.y - 0.5);
-        let [width, height] = [image.width(), image.height()];
-        if !(x >= 0.0 && y >= 0.0 && x < f64::from(width) && y < f64::from(height)) {
-            return None;
-        }
-        // Rounded down, as neither is negative: without SSE4 `floor` is a call.
-        let (left, top) = (x as i32, y as i32);
-        if left as u32 + 1 >= width || top as u32 + 1 >= height {
-            return None;
-        }
-        let at = 3 * (top as usize * width as usize + left as usize);
-        let raw = image.as_raw();
-        let (upper, lower) = (&raw[at..][..6], &raw[at + 3 * width as usize..][..6]);
-        Some(Self { upper, lower, along: x - f64::from(left), below: y - f64::from(top) })
+impl<'a> PixelReader<'a> {
+    pub(crate) fn new(image: &'a RgbImage) -> Self {
+        let (width, height) = image.dimensions();
+        Self { raw: image.as_raw(), width, last_pair: [width, height].map(|side| side as f32 - 2.0) }
     }
 
-    /// The colour in single precision.
-    #[inline]
-    pub(crate) fn color_f32(&self) -> [f32; 3] {
-        let (along, below) = (self.along as f32, self.below as f32);
-        std::array::from_fn(|c| {
-            let row = |row: &[u8]| (1.0 - along) * f32::from(row[c]) + along * f32::from(row[c + 3]);
-            (1.0 - below) * row(self.upper) + below * row(self.lower)
-        })
+    /// The colours `[r, g, b, _]`, from 0 to 255, at places in pixels; zeros where a place does not lie between four pixel centres.
+    /// Which of the places do, as 1 or 0.
+    #[inline(always)]
+    pub(crate) fn colors<const N: usize>(&self, x: &[f32; N], y: &[f32; N], out: &mut [f32x4; N]) -> [f32; N] {
+        let (mut along, mut below, mut inside, mut idxs) = ([0.0; N], [0.0; N], [0.0; N], [0u32; N]);
+        let [right, bottom] = self.last_pair;
+        for k in 0..N {
+            let (u, v) = (x[k] - 0.5, y[k] - 0.5);
+            let is_inside = (u >= 0.0) & (v >= 0.0) & (u < right + 1.0) & (v < bottom + 1.0);
+            inside[k] = if is_inside { 1.0 } else { 0.0 };
+            // A place outside, or one that is no number, reads a pixel that then counts nothing.
+            let (u, v) = (u.max(0.0).min(right), v.max(0.0).min(bottom));
+            let (col, row) = (u.floor().max(0.0), v.floor().max(0.0));
+            along[k] = u - col;
+            below[k] = v - row;
+            idxs[k] = whole(row).wrapping_mul(self.width).wrapping_add(whole(col));
+        }
+        for k in 0..N {
+            out[k] = f32x4::ZERO;
+            if inside[k] > 0.0 {
+                let at = 3 * idxs[k] as usize;
+                let (upper, lower) = (self.pair(at), self.pair(at + 3 * self.width as usize));
+                let row = |[left, right]: [f32x4; 2]| left + f32x4::splat(along[k]) * (right - left);
+                let (upper, lower) = (row(upper), row(lower));
+                out[k] = upper + f32x4::splat(below[k]) * (lower - upper);
+            }
+        }
+        inside
     }
 
-    /// The colour in double precision.
-    #[inline]
-    pub(crate) fn color_f64(&self) -> [f64; 3] {
-        let (along, down) = (self.along, self.below);
-        let weights = [(1.0 - along) * (1.0 - down), along * (1.0 - down), (1.0 - along) * down, along * down];
-        let pixels = [&self.upper[..3], &self.upper[3..], &self.lower[..3], &self.lower[3..]];
-        let mut color = [0.0; 3];
-        for (pixel, weight) in pixels.into_iter().zip(weights) {
-            (0..3).for_each(|c| color[c] += weight * f64::from(pixel[c]));
+    /// A pixel and its right neighbour, each with a fourth number that means nothing: four bytes are read at once.
+    #[inline(always)]
+    fn pair(&self, at: usize) -> [f32x4; 2] {
+        let color = |[a, b, c, d]: [u8; 4]| f32x4::from_i32x4(i32x4::new([a, b, c, d].map(i32::from)));
+        match self.raw.get(at..at + 7) {
+            Some(&[a, b, c, d, e, f, g]) => [color([a, b, c, d]), color([d, e, f, g])],
+            // The last two pixels of the picture.
+            _ => match self.raw.get(at..at + 6) {
+                Some(&[a, b, c, d, e, f]) => [color([a, b, c, d]), color([d, e, f, 0])],
+                _ => [f32x4::ZERO; 2],
+            },
         }
-        color
     }
 }
 
@@ -69,11 +77,17 @@ mod tests {
     #[test]
     fn between_four_pixels_by_hand() {
         let image = RgbImage::from_fn(2, 2, |x, y| Rgb([(100 * x + 40 * y) as u8, 7, 0]));
-        let cell = PixelCell::at(&image, &Point2::new(0.75, 1.0)).unwrap();
-        assert_eq!(cell.color_f64(), [45.0, 7.0, 0.0]);
-        assert_eq!(cell.color_f32(), [45.0, 7.0, 0.0]);
-        assert!(PixelCell::at(&image, &Point2::new(0.4, 1.0)).is_none());
-        assert!(PixelCell::at(&image, &Point2::new(1.5, 1.0)).is_none());
-        assert!(PixelCell::at(&image, &Point2::new(f64::NAN, 1.0)).is_none());
+        let mut colors = [f32x4::ZERO; 4];
+        let inside = PixelReader::new(&image).colors(&[0.75, 0.4, 1.5, f32::NAN], &[1.0, 1.0, 1.0, 1.0], &mut colors);
+        assert_eq!(inside, [1.0, 0.0, 0.0, 0.0]);
+        assert_eq!(colors[0].to_array()[..3], [45.0, 7.0, 0.0]);
+        assert_eq!(colors[1..], [f32x4::ZERO; 3]);
+    }
+
+    #[test]
+    fn a_picture_of_one_pixel_has_nothing_between() {
+        let image = RgbImage::from_pixel(1, 1, Rgb([9; 3]));
+        let mut colors = [f32x4::ZERO; 1];
+        assert_eq!(PixelReader::new(&image).colors(&[0.5], &[0.5], &mut colors), [0.0]);
     }
 }

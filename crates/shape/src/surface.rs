@@ -19,10 +19,13 @@ use std::collections::BTreeMap;
 
 use image::RgbImage;
 use nalgebra::{Point2, Vector3};
+use pulp::{Arch, Simd, WithSimd};
 use sdg_geometry::{PlanarSimilarity, Polygon};
+use wide::f32x4;
 
 use crate::config::SurfaceConfig;
-use crate::pixel_cell::PixelCell;
+use crate::pixel_cell::PixelReader;
+use crate::sightings::LANES;
 
 /// Points that are compared; a few hundred are enough for correlations, and cost microseconds. Chosen by that reasoning; 700
 /// before there were cells.
@@ -42,10 +45,45 @@ const MIN_INSIDE: f64 = 0.5;
 /// The colours inside an outline, at a grid of points.
 #[derive(Debug, Clone)]
 pub struct Surface {
-    /// Cell by cell.
-    cells: Vec<Vec<(Point2<f64>, [f64; 3])>>,
+    cells: Vec<Cell>,
     is_plain: bool,
     config: SurfaceConfig,
+}
+
+/// Points that lie beside each other.
+#[derive(Debug, Clone)]
+struct Cell {
+    points: Vec<Point2<f64>>,
+    groups: Vec<PointGroup>,
+}
+
+/// [`LANES`] points of a cell; those that are left over count nothing.
+#[derive(Debug, Clone, Copy)]
+struct PointGroup {
+    x: [f32; LANES],
+    y: [f32; LANES],
+    /// 1, or 0 for a point that is left over.
+    counts: [f32; LANES],
+    colors: [f32x4; LANES],
+}
+
+impl Cell {
+    fn new(points: &[(Point2<f64>, [f32; 3])]) -> Self {
+        let group = |points: &[(Point2<f64>, [f32; 3])]| {
+            let zeros = [0.0; LANES];
+            let mut group = PointGroup { x: zeros, y: zeros, counts: zeros, colors: [f32x4::ZERO; LANES] };
+            for (k, (point, [r, g, b])) in points.iter().enumerate() {
+                (group.x[k], group.y[k]) = (point.x as f32, point.y as f32);
+                group.counts[k] = 1.0;
+                group.colors[k] = f32x4::new([*r, *g, *b, 0.0]);
+            }
+            group
+        };
+        Self {
+            points: points.iter().map(|(point, _)| *point).collect(),
+            groups: points.chunks(LANES).map(group).collect(),
+        }
+    }
 }
 
 impl Surface {
@@ -55,6 +93,7 @@ impl Surface {
         let step = (outline.area() / POINTS).sqrt().max(1.0);
         let cell_side = (outline.area() / config.num_cells).sqrt().max(1.0);
         let (columns, rows) = ((bounds.width() / step) as usize, (bounds.height() / step) as usize);
+        let reader = PixelReader::new(cutout);
         let mut cells: BTreeMap<[usize; 2], Vec<_>> = BTreeMap::new();
         for i in 0..rows * columns {
             let (row, column) = (i / columns, i % columns);
@@ -62,16 +101,17 @@ impl Surface {
             let point = Point2::new(bounds.x1 + right, bounds.y1 + down);
             if outline.contains(&point)
                 && outline.distance_to_edge(&point) >= EDGE_MARGIN_PX
-                && let Some(color) = color_at(cutout, &point)
+                && let Some(color) = color_at(&reader, &point)
             {
                 cells.entry([right, down].map(|d| (d / cell_side) as usize)).or_default().push((point, color));
             }
         }
-        let cells: Vec<Vec<_>> = cells.into_values().collect();
+        let cells: Vec<Cell> = cells.into_values().map(|points| Cell::new(&points)).collect();
+        let mut made = Self { cells, is_plain: false, config: *config };
         let mut whole = Correlation::default();
-        cells.iter().flatten().for_each(|(_, color)| whole.add(color, color));
-        let is_plain = whole.about_means()[0] < whole.floor(config.noise);
-        Self { cells, is_plain, config: *config }
+        made.correlations(cutout, &PlanarSimilarity::IDENTITY).iter().for_each(|cell| whole.merge(cell));
+        made.is_plain = whole.about_means()[0] < whole.floor(config.noise);
+        made
     }
 
     /// Whether the demonstration has less contrast than noise, as a black silhouette: what correlates with it then tells
@@ -81,23 +121,32 @@ impl Surface {
     }
 
     fn points(&self) -> impl Iterator<Item = &Point2<f64>> {
-        self.cells.iter().flatten().map(|(point, _)| point)
+        self.cells.iter().flat_map(|cell| &cell.points)
+    }
+
+    /// Of every cell and what an image shows of it at a pose.
+    fn correlations(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> Vec<Correlation> {
+        let reader = PixelReader::new(image);
+        Arch::new().dispatch(Correlate { cells: &self.cells, reader, image_from_cutout: *image_from_cutout })
     }
 
     /// The share of the points that lie in `outline` after `outline_from_cutout`, in `[0, 1]`.
     pub(crate) fn share_inside(&self, outline: &Polygon, outline_from_cutout: &PlanarSimilarity) -> f64 {
-        let inside = self.points().filter(|point| outline.contains(&outline_from_cutout.apply(point))).count();
+        let bounds = outline.bounds();
+        let is_inside = |point: &Point2<f64>| {
+            let near = (bounds.x1..=bounds.x2).contains(&point.x) && (bounds.y1..=bounds.y2).contains(&point.y);
+            near && outline.contains(point)
+        };
+        let inside = self.points().filter(|point| is_inside(&outline_from_cutout.apply(point))).count();
         inside as f64 / (self.points().count() as f64).max(1.0)
     }
 
     /// Mean brightness of the image at a pose over that of the cut-out; 1 where none of it is in the image.
     pub(crate) fn brightness(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> f64 {
         let (mut taught, mut seen) = (0.0, 0.0);
-        for (point, color) in self.cells.iter().flatten() {
-            if let Some(found) = color_at(image, &image_from_cutout.apply(point)) {
-                taught += color.iter().sum::<f64>();
-                seen += found.iter().sum::<f64>();
-            }
+        for cell in self.correlations(image, image_from_cutout) {
+            taught += cell.taught.iter().sum::<f64>();
+            seen += cell.seen.iter().sum::<f64>();
         }
         if taught > 0.0 { seen / taught } else { 1.0 }
     }
@@ -107,8 +156,7 @@ impl Surface {
     /// count, nor does what covers less than half; the light's tint does.
     pub(crate) fn hue_shift(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> f64 {
         let mut shifts = Vec::with_capacity(self.cells.len());
-        for cell in &self.cells {
-            let sums = Correlation::of(cell, image, image_from_cutout);
+        for sums in self.correlations(image, image_from_cutout) {
             if sums.count >= MIN_IN_CELL {
                 let mean = |sum: [f64; 3]| sum.map(|channel| channel / sums.count as f64);
                 shifts.push((hue_distance(&mean(sums.taught), &mean(sums.seen)), sums.count));
@@ -124,14 +172,14 @@ impl Surface {
         /// Below this correlation it differs. Chosen by hand, not measured.
         const MAX_CORRELATION: f64 = 0.2;
         let noise = self.config.noise_in_cell;
-        let differs = |cell: &&Vec<(Point2<f64>, [f64; 3])>| {
-            let local = Correlation::of(cell, image, image_from_cutout);
+        let differs = |local: &Correlation| {
             local.count >= MIN_IN_CELL
                 && local.contrast_taught(noise) >= MIN_CONTRAST
                 && local.value(noise) < MAX_CORRELATION
         };
-        let points = self.cells.iter().filter(differs).flatten();
-        points.map(|(point, _)| image_from_cutout.apply(point)).collect()
+        let correlations = self.correlations(image, image_from_cutout);
+        let cells = self.cells.iter().zip(&correlations).filter(|(_, local)| differs(local));
+        cells.flat_map(|(cell, _)| &cell.points).map(|point| image_from_cutout.apply(point)).collect()
     }
 
     /// The correlation of colours between the cut-out and the image at a pose, within cells and over the whole; 0 for
@@ -140,8 +188,7 @@ impl Surface {
         let SurfaceConfig { cells_share, noise, noise_in_cell, .. } = self.config;
         let mut whole = Correlation::default();
         let (mut cells, mut weights) = (0.0, 0.0);
-        for cell in &self.cells {
-            let local = Correlation::of(cell, image, image_from_cutout);
+        for local in self.correlations(image, image_from_cutout) {
             if local.count >= MIN_IN_CELL {
                 let weight = local.count as f64 * local.contrast_taught(noise_in_cell);
                 cells += weight * local.value(noise_in_cell);
@@ -169,29 +216,6 @@ struct Correlation {
 }
 
 impl Correlation {
-    /// Of a cell and what an image shows of it at a pose.
-    fn of(cell: &[(Point2<f64>, [f64; 3])], image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> Self {
-        let mut sums = Self::default();
-        for (point, taught) in cell {
-            if let Some(seen) = color_at(image, &image_from_cutout.apply(point)) {
-                sums.add(taught, &seen);
-            }
-        }
-        sums
-    }
-
-    fn add(&mut self, taught: &[f64; 3], seen: &[f64; 3]) {
-        self.count += 1;
-        for channel in 0..3 {
-            let (a, b) = (taught[channel], seen[channel]);
-            self.taught[channel] += a;
-            self.seen[channel] += b;
-            self.taught_squares += a * a;
-            self.seen_squares += b * b;
-            self.products += a * b;
-        }
-    }
-
     fn merge(&mut self, other: &Self) {
         self.count += other.count;
         for channel in 0..3 {
@@ -254,9 +278,62 @@ fn weighted_median(mut values: Vec<(f64, usize)>) -> f64 {
     middle.map_or(0.0, |(value, _)| *value)
 }
 
+struct Correlate<'a> {
+    cells: &'a [Cell],
+    reader: PixelReader<'a>,
+    image_from_cutout: PlanarSimilarity,
+}
+
+impl WithSimd for Correlate<'_> {
+    type Output = Vec<Correlation>;
+
+    /// Plain loops; compiled for the widest instructions that the machine has.
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Vec<Correlation> {
+        let Self { cells, reader, image_from_cutout: PlanarSimilarity { scale, angle, tx, ty } } = self;
+        let (sin, cos) = angle.radians().sin_cos();
+        let [a, b, tx, ty] = [scale * cos, scale * sin, tx, ty].map(|value| value as f32);
+        let of_cell = |cell: &Cell| {
+            let (mut count, [mut taught, mut seen, mut taught_squares, mut seen_squares, mut products]) =
+                (0.0f32, [f32x4::ZERO; 5]);
+            for group in &cell.groups {
+                let x: [f32; LANES] = std::array::from_fn(|k| a * group.x[k] - b * group.y[k] + tx);
+                let y: [f32; LANES] = std::array::from_fn(|k| b * group.x[k] + a * group.y[k] + ty);
+                let mut colors = [f32x4::ZERO; LANES];
+                let inside = reader.colors(&x, &y, &mut colors);
+                for k in 0..LANES {
+                    let counts = inside[k] * group.counts[k];
+                    let (of_photo, of_image) =
+                        (group.colors[k] * f32x4::splat(counts), colors[k] * f32x4::splat(counts));
+                    count += counts;
+                    taught += of_photo;
+                    seen += of_image;
+                    taught_squares += of_photo * of_photo;
+                    seen_squares += of_image * of_image;
+                    products += of_photo * of_image;
+                }
+            }
+            let channels = |sums: f32x4| std::array::from_fn(|c| f64::from(sums.to_array()[c]));
+            let sum = |sums: f32x4| channels(sums).iter().sum::<f64>();
+            Correlation {
+                count: count as usize,
+                taught: channels(taught),
+                seen: channels(seen),
+                taught_squares: sum(taught_squares),
+                seen_squares: sum(seen_squares),
+                products: sum(products),
+            }
+        };
+        cells.iter().map(of_cell).collect()
+    }
+}
+
 /// The colour at a point, by bilinear interpolation; `None` outside the image.
-fn color_at(image: &RgbImage, point: &Point2<f64>) -> Option<[f64; 3]> {
-    PixelCell::at(image, point).map(|cell| cell.color_f64())
+fn color_at(reader: &PixelReader<'_>, point: &Point2<f64>) -> Option<[f32; 3]> {
+    let mut color = [f32x4::ZERO];
+    let [inside] = reader.colors(&[point.x as f32], &[point.y as f32], &mut color);
+    let [r, g, b, _] = color[0].to_array();
+    (inside > 0.0).then_some([r, g, b])
 }
 
 #[cfg(test)]

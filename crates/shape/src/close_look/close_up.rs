@@ -49,6 +49,8 @@ type Pair = ([f32; 3], [f32; 3]);
 pub(crate) struct Seen {
     colors: Vec<Option<[f32; 3]>>,
     pub(super) gradients: Gradients,
+    /// How the photo's windows correlate with it.
+    pub(super) fits: Vec<f32>,
 }
 
 impl CloseUp {
@@ -84,13 +86,14 @@ impl CloseUp {
     pub(crate) fn seen(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> Seen {
         let colors = self.frame.sampled_sparsely(image, image_from_cutout);
         let gradients = Gradients::new(&colors, SIDE, |i| colors[i].is_some());
-        Seen { colors, gradients }
+        let fits = self.expected.fit(&gradients);
+        Seen { colors, gradients, fits }
     }
 
     /// The close look but for the likeness and the mirror image.
     pub(crate) fn look(&self, seen: &Seen, table: &TableColors) -> CloseLook {
         let is_seen = cell_means(&seen.colors);
-        let fits = self.expected.fit(&seen.gradients);
+        let fits = &seen.fits;
         let strongest = self.expected.energy.iter().fold(0.0f32, |a, b| a.max(*b));
         let (mut fit, mut edges) = (0.0, 0.0);
         for (i, energy) in
@@ -106,7 +109,7 @@ impl CloseUp {
             details: None,
             bare: self.bare(seen, table),
             fit: f64::from(fit / edges.max(f32::MIN_POSITIVE)),
-            no_rim: self.share_without_rim(&fits, &is_seen),
+            no_rim: self.share_without_rim(fits, &is_seen),
             added: self.added(seen),
             mirrored: None,
         }

@@ -8,6 +8,10 @@
 //! A window may follow a small parallax or distortion; an edge that is not there, or whose bright and dark side are exchanged, it
 //! cannot follow.
 
+use std::ops::Range;
+
+use pulp::{Arch, Simd, WithSimd};
+
 /// Windows stand so many pixels apart and are three times as wide.
 pub(super) const CELL: usize = 3;
 /// Pixels within this distance of the outline are its edge; more than that inside, the part's surface.
@@ -27,8 +31,9 @@ const SMOOTHING: [f32; 7] = [0.0148, 0.0833, 0.2351, 0.3336, 0.2351, 0.0833, 0.0
 #[derive(Debug, Clone)]
 pub(super) struct Gradients {
     side: usize,
-    signed: Vec<[f32; 2]>,
-    doubled: Vec<[f32; 2]>,
+    /// x and y of `v`, and of the same at twice its angle.
+    signed: [Vec<f32>; 2],
+    doubled: [Vec<f32>; 2],
     /// Squared lengths, the same of both.
     energy: Vec<f32>,
 }
@@ -37,7 +42,7 @@ impl Gradients {
     /// Of sampled colours; the noise is judged where `counts`.
     pub(super) fn new(colors: &[Option<[f32; 3]>], side: usize, counts: impl Fn(usize) -> bool) -> Self {
         let brightness = smoothed(&filled(colors, side), side);
-        let mut signed = vec![[0.0; 2]; side * side];
+        let [mut signed, mut doubled] = [0, 1].map(|_| [0, 1].map(|_| vec![0.0f32; side * side]));
         let (mut squares, mut count) = (0.0, 0);
         for y in 1..side - 1 {
             for x in 1..side - 1 {
@@ -46,7 +51,7 @@ impl Gradients {
                 let across = 3.0 * (at(2, 0) - at(0, 0) + at(2, 2) - at(0, 2)) + 10.0 * (at(2, 1) - at(0, 1));
                 let down = 3.0 * (at(0, 2) - at(0, 0) + at(2, 2) - at(2, 0)) + 10.0 * (at(1, 2) - at(1, 0));
                 let gradient = [across / 32.0, down / 32.0];
-                signed[y * side + x] = gradient;
+                (signed[0][y * side + x], signed[1][y * side + x]) = (gradient[0], gradient[1]);
                 if counts(y * side + x) {
                     squares += gradient[0] * gradient[0] + gradient[1] * gradient[1];
                     count += 1;
@@ -54,23 +59,23 @@ impl Gradients {
             }
         }
         let noise = NOISE.max(NOISE_SHARE * (squares / (count as f32).max(1.0)).sqrt());
-        let mut made = Self { side, doubled: vec![[0.0; 2]; side * side], energy: vec![0.0; side * side], signed };
+        let mut energy = vec![0.0; side * side];
         for i in 0..side * side {
-            let length = made.signed[i][0].hypot(made.signed[i][1]);
-            let [x, y] = made.signed[i].map(|value| value / (length + noise));
-            made.signed[i] = [x, y];
-            made.energy[i] = x * x + y * y;
-            let length = made.energy[i].sqrt() + 1e-6;
-            made.doubled[i] = [(x * x - y * y) / length, 2.0 * x * y / length];
+            let gradient = [signed[0][i], signed[1][i]];
+            let length = (gradient[0] * gradient[0] + gradient[1] * gradient[1]).sqrt();
+            let [x, y] = gradient.map(|value| value / (length + noise));
+            (signed[0][i], signed[1][i]) = (x, y);
+            energy[i] = x * x + y * y;
+            let length = energy[i].sqrt() + 1e-6;
+            (doubled[0][i], doubled[1][i]) = ((x * x - y * y) / length, 2.0 * x * y / length);
         }
-        made
+        Self { side, signed, doubled, energy }
     }
 
     /// The same with nothing where `counts` does not hold.
     pub(super) fn only(mut self, counts: impl Fn(usize) -> bool) -> Self {
         for i in (0..self.energy.len()).filter(|i| !counts(*i)) {
-            self.signed[i] = [0.0; 2];
-            self.doubled[i] = [0.0; 2];
+            self.signed.iter_mut().chain(&mut self.doubled).for_each(|values| values[i] = 0.0);
             self.energy[i] = 0.0;
         }
         self
@@ -90,56 +95,51 @@ impl Gradients {
 #[derive(Debug, Clone)]
 pub(super) struct Expected {
     side: usize,
-    pixels: Vec<ExpectedPixel>,
+    /// x and y of what the surface shows, and of the outline's edge at twice its angle; 0 elsewhere.
+    surface: [Vec<f32>; 2],
+    rim: [Vec<f32>; 2],
+    /// 1 where there is either, no nearer to the frame's border than shifts reach.
+    counts: Vec<f32>,
+    /// Rows in which there is either.
+    rows: Range<usize>,
     /// Mean squared length in each window.
     pub(super) energy: Vec<f32>,
-}
-
-/// A pixel of the surface or of the outline's edge, no nearer to the frame's border than shifts reach.
-#[derive(Debug, Clone)]
-struct ExpectedPixel {
-    idx: usize,
-    cell: usize,
-    is_surface: bool,
-    direction: [f32; 2],
 }
 
 impl Expected {
     /// `depth` is how far each pixel lies inside the outline.
     pub(super) fn new(gradients: &Gradients, depth: &[f32]) -> Self {
         let side = gradients.side;
-        let mut pixels = Vec::new();
-        let mut cells = vec![0.0; num_cells(side)];
+        let [mut surface, mut rim] = [0, 1].map(|_| [0, 1].map(|_| vec![0.0f32; side * side]));
+        let (mut counts, mut cells) = (vec![0.0; side * side], vec![0.0; num_cells(side)]);
+        let (mut first, mut last) = (side, 0);
         for (i, depth) in depth.iter().enumerate().filter(|(_, depth)| **depth >= -RIM_PX) {
-            let is_surface = *depth > RIM_PX;
-            let direction = if is_surface { gradients.signed[i] } else { gradients.doubled[i] };
             cells[cell_of(i, side)] += gradients.energy[i];
             let [x, y] = [i % side, i / side];
             if x.min(y) >= REACH && x.max(y) < side - REACH {
-                pixels.push(ExpectedPixel { idx: i, cell: cell_of(i, side), is_surface, direction });
+                let is_surface = *depth > RIM_PX;
+                let (to, from) =
+                    if is_surface { (&mut surface, &gradients.signed) } else { (&mut rim, &gradients.doubled) };
+                to.iter_mut().zip(from).for_each(|(to, from)| to[i] = from[i]);
+                counts[i] = 1.0;
+                (first, last) = (first.min(y), last.max(y));
             }
         }
-        Self { side, pixels, energy: window_means(&cells, side) }
+        Self { side, surface, rim, counts, rows: first..last + 1, energy: window_means(&cells, side) }
     }
 
     /// The best correlation of each window with a picture, from −1 to 1.
     pub(super) fn fit(&self, picture: &Gradients) -> Vec<f32> {
-        let side = self.side as isize;
         let mut best = vec![-1.0f32; num_cells(self.side)];
-        for (dx, dy) in (-(REACH as isize)..=REACH as isize)
-            .flat_map(|dy| (-(REACH as isize)..=REACH as isize).map(move |dx| (dx, dy)))
-        {
+        let (mut products, mut seen) = (vec![0.0f32; best.len()], vec![0.0f32; best.len()]);
+        let reach = REACH as isize;
+        for (dx, dy) in (-reach..=reach).flat_map(|dy| (-reach..=reach).map(move |dx| (dx, dy))) {
             if dx * dx + dy * dy > MAX_SHIFT_SQUARED {
                 continue;
             }
-            let mut products = vec![0.0f32; best.len()];
-            let mut seen = vec![0.0f32; best.len()];
-            for pixel in &self.pixels {
-                let j = (pixel.idx as isize + dy * side + dx) as usize;
-                let [u, v] = if pixel.is_surface { picture.signed[j] } else { picture.doubled[j] };
-                products[pixel.cell] += pixel.direction[0] * u + pixel.direction[1] * v;
-                seen[pixel.cell] += picture.energy[j];
-            }
+            let offset = dy * self.side as isize + dx;
+            let sums = ShiftedSums { expected: self, picture, offset, products: &mut products, seen: &mut seen };
+            Arch::new().dispatch(sums);
             let (products, seen) = (window_means(&products, self.side), window_means(&seen, self.side));
             for (cell, best) in best.iter_mut().enumerate() {
                 let of_both = ((self.energy[cell] + EMPTY) * (seen[cell] + EMPTY)).sqrt();
@@ -147,6 +147,59 @@ impl Expected {
             }
         }
         best
+    }
+}
+
+/// Sums in cells of the products of what is expected with a picture `offset` pixels further, and of the picture's squared lengths.
+struct ShiftedSums<'a> {
+    expected: &'a Expected,
+    picture: &'a Gradients,
+    offset: isize,
+    products: &'a mut [f32],
+    seen: &'a mut [f32],
+}
+
+impl WithSimd for ShiftedSums<'_> {
+    type Output = ();
+
+    /// Plain loops over rows; compiled for the widest instructions that the machine has.
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self { expected: Expected { side, surface, rim, counts, rows, .. }, picture, offset, products, seen } =
+            self;
+        let (side, across) = (*side, side / CELL);
+        let len = side - 2 * REACH;
+        products.fill(0.0);
+        seen.fill(0.0);
+        let mut row_products = vec![0.0f32; side];
+        let mut row_seen = vec![0.0f32; side];
+        for cell_row in rows.start / CELL..rows.end.div_ceil(CELL) {
+            row_products.fill(0.0);
+            row_seen.fill(0.0);
+            for row in (cell_row * CELL).max(rows.start)..((cell_row + 1) * CELL).min(rows.end) {
+                let from = row * side + REACH;
+                let [surface_x, surface_y] = [0, 1].map(|k| &surface[k][from..][..len]);
+                let [rim_x, rim_y] = [0, 1].map(|k| &rim[k][from..][..len]);
+                let counts = &counts[from..][..len];
+                let there = (from as isize + offset) as usize;
+                let [signed_x, signed_y] = [0, 1].map(|k| &picture.signed[k][there..][..len]);
+                let [doubled_x, doubled_y] = [0, 1].map(|k| &picture.doubled[k][there..][..len]);
+                let energy = &picture.energy[there..][..len];
+                let products = &mut row_products[REACH..][..len];
+                let seen = &mut row_seen[REACH..][..len];
+                for k in 0..len {
+                    products[k] += surface_x[k] * signed_x[k]
+                        + surface_y[k] * signed_y[k]
+                        + rim_x[k] * doubled_x[k]
+                        + rim_y[k] * doubled_y[k];
+                    seen[k] += counts[k] * energy[k];
+                }
+            }
+            for column in 0..across {
+                products[cell_row * across + column] = row_products[CELL * column..][..CELL].iter().sum();
+                seen[cell_row * across + column] = row_seen[CELL * column..][..CELL].iter().sum();
+            }
+        }
     }
 }
 
@@ -199,18 +252,45 @@ fn filled(colors: &[Option<[f32; 3]>], side: usize) -> Vec<f32> {
     brightness.into_iter().map(Option::unwrap_or_default).collect()
 }
 
+/// Smoothed along rows, then along columns; beyond the border its pixels are repeated.
 fn smoothed(values: &[f32], side: usize) -> Vec<f32> {
-    let pass = |values: &[f32], step: usize| -> Vec<f32> {
-        let half = SMOOTHING.len() / 2;
-        let mean = |i: usize| {
-            let along = i / step % side;
-            let start = i - along * step;
-            let of = |(k, weight): (usize, &f32)| {
-                weight * values[start + (along + k).saturating_sub(half).min(side - 1) * step]
-            };
-            SMOOTHING.iter().enumerate().map(of).sum()
-        };
-        (0..values.len()).map(mean).collect()
-    };
-    pass(&pass(values, 1), side)
+    Arch::new().dispatch(Smooth { values, side })
+}
+
+struct Smooth<'a> {
+    values: &'a [f32],
+    side: usize,
+}
+
+impl WithSimd for Smooth<'_> {
+    type Output = Vec<f32>;
+
+    /// Plain loops over rows; compiled for the widest instructions that the machine has.
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Vec<f32> {
+        const HALF: usize = SMOOTHING.len() / 2;
+        let Self { values, side } = self;
+        let mut across = vec![0.0f32; values.len()];
+        let mut padded = vec![0.0f32; side + 2 * HALF];
+        for (row, out) in values.chunks_exact(side).zip(across.chunks_exact_mut(side)) {
+            padded[HALF..][..side].copy_from_slice(row);
+            padded[..HALF].fill(row[0]);
+            padded[HALF + side..].fill(row[side - 1]);
+            for (k, weight) in SMOOTHING.iter().enumerate() {
+                for (out, value) in out.iter_mut().zip(&padded[k..][..side]) {
+                    *out += weight * value;
+                }
+            }
+        }
+        let mut smoothed = vec![0.0f32; values.len()];
+        for (y, out) in smoothed.chunks_exact_mut(side).enumerate() {
+            for (k, weight) in SMOOTHING.iter().enumerate() {
+                let row = (y + k).saturating_sub(HALF).min(side - 1);
+                for (out, value) in out.iter_mut().zip(&across[row * side..][..side]) {
+                    *out += weight * value;
+                }
+            }
+        }
+        smoothed
+    }
 }

@@ -146,7 +146,7 @@ impl Rival {
         let seen = self.close_up.seen(image, pose);
         let judged = likely
             .into_iter()
-            .map(|turn| (turn, self.close_up.duel(&self.close_up, &seen.gradients, &turn.inverse().compose(pose))));
+            .map(|turn| (turn, self.close_up.duel(&self.close_up, &seen, &turn.inverse().compose(pose))));
         let better = judged.filter(|(_, fit)| fit.share >= MIN_SHARE_OF_TURN && fit.margin <= -MIN_GAIN_BY_TURN);
         better.min_by(|a, b| a.1.margin.total_cmp(&b.1.margin)).map(|(turn, _)| turn)
     }
@@ -165,7 +165,7 @@ impl Rival {
         });
         let (pose, _) = fitted.max_by(|a, b| a.1.total_cmp(&b.1))?;
         let rival_from_cutout = pose.inverse().compose(image_from_cutout);
-        Some(self.close_up.duel(photo, &seen.gradients, &rival_from_cutout))
+        Some(self.close_up.duel(photo, seen, &rival_from_cutout))
     }
 }
 
@@ -176,16 +176,16 @@ impl CloseUp {
     }
 
     /// The photo against this one, which lies there by `own_from_photo`.
-    fn duel(&self, photo: &CloseUp, seen: &Gradients, own_from_photo: &PlanarSimilarity) -> RivalFit {
+    fn duel(&self, photo: &CloseUp, seen: &Seen, own_from_photo: &PlanarSimilarity) -> RivalFit {
         let both = self.laid_over(photo, own_from_photo);
-        let fit = both.photos.fit(&photo.expected, seen);
-        let rivals_fit = both.rivals.fit(&both.expected, seen);
+        let fit = both.photos.fit(&seen.fits);
+        let rivals_fit = both.rivals.fit(&both.expected.fit(&seen.gradients));
         RivalFit { margin: f64::from(fit - rivals_fit), fit: f64::from(rivals_fit), share: both.share(photo) }
     }
 
     /// This one in the photo's frame, and where the two differ.
     fn laid_over(&self, photo: &CloseUp, own_from_photo: &PlanarSimilarity) -> LaidOver {
-        let depth: Vec<f32> = photo.frame.pixels().map(|at| self.depth_at(photo, at, own_from_photo)).collect();
+        let depth = self.depths(photo, own_from_photo);
         let colors = photo.frame.sampled_sparsely(&self.image, own_from_photo);
         let gradients = Gradients::new(&colors, SIDE, |i| depth[i] > -3.0);
         let expected = Expected::new(&gradients, &depth);
@@ -196,12 +196,23 @@ impl CloseUp {
         LaidOver { photos, rivals: Differing::new(&expected, &of_photo), expected }
     }
 
-    /// How far a pixel of the photo's frame lies inside this one's outline.
-    fn depth_at(&self, photo: &CloseUp, at: [f64; 2], own_from_photo: &PlanarSimilarity) -> f32 {
-        let [x, y] = self.frame.place_of(&own_from_photo.apply(&photo.frame.place(at)));
-        let (column, row) = (x.floor() as isize, y.floor() as isize);
-        let inside = |k: isize| (0..SIDE as isize).contains(&k);
-        if inside(column) && inside(row) { self.depth[row as usize * SIDE + column as usize] } else { f32::MIN }
+    /// How far each pixel of the photo's frame lies inside this one's outline.
+    fn depths(&self, photo: &CloseUp, own_from_photo: &PlanarSimilarity) -> Vec<f32> {
+        let place = |at: [f64; 2]| self.frame.place_of(&own_from_photo.apply(&photo.frame.place(at)));
+        let [first, right] = [place([0.5, 0.5]), place([1.5, 0.5])];
+        // One pixel to the right; one down is the same turned by a quarter.
+        let [along, across] = [right[0] - first[0], right[1] - first[1]];
+        let depth_at = |[x, y]: [f64; 2]| {
+            let (column, row) = ((x + 1.0) as usize, (y + 1.0) as usize);
+            let is_inside = (1..=SIDE).contains(&column) && (1..=SIDE).contains(&row);
+            if is_inside { self.depth[(row - 1) * SIDE + column - 1] } else { f32::MIN }
+        };
+        let of_row = |row: usize| {
+            let row = row as f64;
+            let start = [first[0] - row * across, first[1] + row * along];
+            (0..SIDE).map(move |k| depth_at([start[0] + k as f64 * along, start[1] + k as f64 * across]))
+        };
+        (0..SIDE).flat_map(of_row).collect()
     }
 }
 
@@ -239,9 +250,8 @@ impl Differing {
         self.windows.iter().map(|(_, differs)| differs).sum()
     }
 
-    /// How they correlate with what is seen.
-    fn fit(&self, expected: &Expected, seen: &Gradients) -> f32 {
-        let with_picture = expected.fit(seen);
+    /// How they correlate with a picture, whose windows correlate so.
+    fn fit(&self, with_picture: &[f32]) -> f32 {
         let fit: f32 = self.windows.iter().map(|&(i, differs)| differs * with_picture[i]).sum();
         fit / self.sum().max(f32::MIN_POSITIVE)
     }
