@@ -69,6 +69,18 @@ impl ShapeTemplate {
         (pose.to_similarity(self.center), agreement)
     }
 
+    /// As [`Self::captured`] down to the agreement's level, and the agreement there: a pose that is compared, not grasped.
+    pub(crate) fn captured_roughly(
+        &self,
+        field: &GradientField,
+        start: &PlanarSimilarity,
+        reach: &Reach,
+    ) -> (PlanarSimilarity, f64) {
+        let start = Pose::from_similarity(start, self.center);
+        let pose = self.follow_to(field, &reach.about(start), start, self.agreement_level_idx);
+        (pose.to_similarity(self.center), self.agreement_at(field, &pose))
+    }
+
     /// Moves a pose that may be further off onto the edges: climbed and snapped at every level, about five times slower than
     /// [`Self::snapped`]. Deterministic.
     ///

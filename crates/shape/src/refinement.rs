@@ -99,7 +99,12 @@ impl ShapeTemplate {
 
     /// Climbs and snaps from `from` within `range`, coarse to fine.
     pub(crate) fn follow(&self, field: &GradientField, range: &CaptureRange, from: Pose) -> Pose {
-        self.levels.iter().rev().fold(from, |pose, level| {
+        self.follow_to(field, range, from, 0)
+    }
+
+    /// The same down to a level that need not be the finest.
+    pub(crate) fn follow_to(&self, field: &GradientField, range: &CaptureRange, from: Pose, last_idx: usize) -> Pose {
+        self.levels[last_idx..].iter().rev().fold(from, |pose, level| {
             let matched = level.matched_level(field, &range.start);
             snap(level, &matched, range, climb(level, &matched, range, pose)).pose
         })

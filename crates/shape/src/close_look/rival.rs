@@ -57,10 +57,9 @@ fn resembling(
     });
     let mut turns: Vec<(PlanarSimilarity, f64)> = turns.collect();
     turns.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let about_middle = turns.iter().take(NUM_FOLLOWED).map(|(pose, _)| template.captured(field, pose, &REACH));
+    let about_middle = turns.iter().take(NUM_FOLLOWED).map(|(pose, _)| template.captured_roughly(field, pose, &REACH));
     let mut fits: Vec<(PlanarSimilarity, f64)> = about_middle
-        .chain(further.iter().copied())
-        .map(|pose| (pose, template.agreement(field, &pose)))
+        .chain(further.iter().map(|pose| (*pose, template.agreement(field, pose))))
         .filter(|(pose, agreement)| counts(pose, *agreement))
         .collect();
     fits.sort_by(|a, b| b.1.total_cmp(&a.1));
@@ -137,9 +136,10 @@ impl Rival {
         pose: &PlanarSimilarity,
     ) -> Option<PlanarSimilarity> {
         let agreement = self.template.agreement(field, pose);
-        let turns = self.starts.iter().map(|start| self.template.captured(field, &pose.compose(start), &REACH));
-        let is_likely = |turn: &PlanarSimilarity| self.template.agreement(field, turn) >= agreement - MAX_LOSS_BY_TURN;
-        let likely: Vec<PlanarSimilarity> = turns.filter(is_likely).collect();
+        let turns =
+            self.starts.iter().map(|start| self.template.captured_roughly(field, &pose.compose(start), &REACH));
+        let likely = turns.filter(|(_, of_turn)| *of_turn >= agreement - MAX_LOSS_BY_TURN);
+        let likely: Vec<PlanarSimilarity> = likely.map(|(turn, _)| turn).collect();
         if likely.is_empty() {
             return None;
         }
@@ -148,7 +148,8 @@ impl Rival {
             .into_iter()
             .map(|turn| (turn, self.close_up.duel(&self.close_up, &seen, &turn.inverse().compose(pose))));
         let better = judged.filter(|(_, fit)| fit.share >= MIN_SHARE_OF_TURN && fit.margin <= -MIN_GAIN_BY_TURN);
-        better.min_by(|a, b| a.1.margin.total_cmp(&b.1.margin)).map(|(turn, _)| turn)
+        let best = better.min_by(|a, b| a.1.margin.total_cmp(&b.1.margin));
+        best.map(|(turn, _)| self.template.captured(field, &turn, &REACH))
     }
 
     /// Fits the rival about a pose of the photo, and compares the two there.
@@ -159,10 +160,8 @@ impl Rival {
         field: &GradientField,
         image_from_cutout: &PlanarSimilarity,
     ) -> Option<RivalFit> {
-        let fitted = self.starts.iter().map(|start| {
-            let pose = self.template.captured(field, &image_from_cutout.compose(start), &REACH);
-            (pose, self.template.agreement(field, &pose))
-        });
+        let starts = self.starts.iter().map(|start| image_from_cutout.compose(start));
+        let fitted = starts.map(|start| self.template.captured_roughly(field, &start, &REACH));
         let (pose, _) = fitted.max_by(|a, b| a.1.total_cmp(&b.1))?;
         let rival_from_cutout = pose.inverse().compose(image_from_cutout);
         Some(self.close_up.duel(photo, seen, &rival_from_cutout))
