@@ -11,7 +11,8 @@ use sdg_grasp::{GraspModel, Verification};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
-    let model_path = arguments.next().ok_or("usage: search_times MODEL [--repeat N] [--size-tolerance LOW-HIGH] PICTURE…")?;
+    let model_path =
+        arguments.next().ok_or("usage: search_times MODEL [--repeat N] [--size-tolerance LOW-HIGH] PICTURE…")?;
     let mut model = GraspModel::from_bytes(&std::fs::read(model_path)?, &Device::flex())?;
     let (mut repeats, mut paths) = (15, Vec::new());
     while let Some(argument) = arguments.next() {
@@ -25,7 +26,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             _ => paths.push(argument),
         }
     }
-    let decoded = |path: &String| Ok::<_, Box<dyn std::error::Error>>(decode_image(&std::fs::read(path)?, &ImageLimits::default())?);
+    let decoded = |path: &String| {
+        Ok::<_, Box<dyn std::error::Error>>(decode_image(&std::fs::read(path)?, &ImageLimits::default())?)
+    };
     let images = paths.iter().map(decoded).collect::<Result<Vec<_>, _>>()?;
 
     let mut times = vec![Vec::new(); images.len()];

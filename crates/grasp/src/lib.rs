@@ -78,7 +78,6 @@ mod plan;
 mod pose;
 mod prepared;
 mod record;
-mod resampled;
 mod round_top;
 mod safetensors_file;
 mod same_part;

@@ -10,10 +10,9 @@
 use image::RgbImage;
 use nalgebra::{Point2, Vector2};
 use sdg_geometry::{Angle, PlanarGrasp, PlanarSimilarity, Polygon, Slant};
-use sdg_shape::parallel;
+use sdg_shape::{PlanMap, parallel};
 
 use crate::detection::{Found, GraspDetection};
-use crate::resampled::PlanMap;
 use crate::sighting::Sighting;
 use crate::verification::{SearchedImage, Shot, agreement_in, foreshortening, usual_focal_px};
 

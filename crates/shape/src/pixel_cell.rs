@@ -28,30 +28,40 @@ impl<'a> PixelReader<'a> {
     /// Which of the places do, as 1 or 0.
     #[inline(always)]
     pub(crate) fn colors<const N: usize>(&self, x: &[f32; N], y: &[f32; N], out: &mut [f32x4; N]) -> [f32; N] {
-        let (mut along, mut below, mut inside, mut idxs) = ([0.0; N], [0.0; N], [0.0; N], [0u32; N]);
+        let mut inside = [0.0; N];
         let [right, bottom] = self.last_pair;
         for k in 0..N {
             let (u, v) = (x[k] - 0.5, y[k] - 0.5);
             let is_inside = (u >= 0.0) & (v >= 0.0) & (u < right + 1.0) & (v < bottom + 1.0);
             inside[k] = if is_inside { 1.0 } else { 0.0 };
-            // A place outside, or one that is no number, reads a pixel that then counts nothing.
-            let (u, v) = (u.max(0.0).min(right), v.max(0.0).min(bottom));
-            let (col, row) = (u.floor().max(0.0), v.floor().max(0.0));
+        }
+        self.colors_to_border(x, y, out);
+        for k in 0..N {
+            out[k] *= f32x4::splat(inside[k]);
+        }
+        inside
+    }
+
+    /// The same; a place beyond the border, or one that is no number, has the colour of the nearest pixel.
+    #[inline(always)]
+    pub(crate) fn colors_to_border<const N: usize>(&self, x: &[f32; N], y: &[f32; N], out: &mut [f32x4; N]) {
+        let (mut along, mut below, mut idxs) = ([0.0; N], [0.0; N], [0u32; N]);
+        let [right, bottom] = self.last_pair;
+        for k in 0..N {
+            let u = (x[k] - 0.5).max(0.0).min(right + 1.0);
+            let v = (y[k] - 0.5).max(0.0).min(bottom + 1.0);
+            let (col, row) = (u.floor().min(right).max(0.0), v.floor().min(bottom).max(0.0));
             along[k] = u - col;
             below[k] = v - row;
             idxs[k] = whole(row).wrapping_mul(self.width).wrapping_add(whole(col));
         }
         for k in 0..N {
-            out[k] = f32x4::ZERO;
-            if inside[k] > 0.0 {
-                let at = 3 * idxs[k] as usize;
-                let (upper, lower) = (self.pair(at), self.pair(at + 3 * self.width as usize));
-                let row = |[left, right]: [f32x4; 2]| left + f32x4::splat(along[k]) * (right - left);
-                let (upper, lower) = (row(upper), row(lower));
-                out[k] = upper + f32x4::splat(below[k]) * (lower - upper);
-            }
+            let at = 3 * idxs[k] as usize;
+            let (upper, lower) = (self.pair(at), self.pair(at + 3 * self.width as usize));
+            let row = |[left, right]: [f32x4; 2]| left + f32x4::splat(along[k]) * (right - left);
+            let (upper, lower) = (row(upper), row(lower));
+            out[k] = upper + f32x4::splat(below[k]) * (lower - upper);
         }
-        inside
     }
 
     /// A pixel and its right neighbour, each with a fourth number that means nothing: four bytes are read at once.

@@ -4,10 +4,10 @@ use image::RgbImage;
 use nalgebra::Point2;
 use sdg_demonstration::{Annotation, Demonstration};
 use sdg_geometry::{BoundingBox, GraspLine, PlanView, Polygon, PosedCamera};
+use sdg_shape::PlanMap;
 
 use super::{CameraOverTable, Lengths, plan_view, slant};
 use crate::error::{GraspError, Result};
-use crate::resampled::PlanMap;
 
 /// Photos and their marks in the plan view of the marks' plane, and how fine that is: as the first photo shows the part.
 ///

@@ -16,6 +16,7 @@ use std::ops::RangeInclusive;
 use image::RgbImage;
 use nalgebra::{Isometry3, Point2, Point3, Rotation2, UnitQuaternion, Vector2, Vector3};
 use sdg_geometry::{Angle, BoundingBox, PlanView, PlanarGrasp, Polygon, PosedCamera, Workspace};
+use sdg_shape::{PixelRect, PlanMap};
 
 pub use self::demonstration::{pictures_from_above, seen_from_above};
 pub use self::uncertainty::{Circumstances, ErrorLength, Uncertainty};
@@ -23,7 +24,6 @@ use crate::detection::GraspDetection;
 use crate::error::{GraspError, Result};
 use crate::lengths::Lengths;
 use crate::model::{GraspModel, Verification};
-use crate::resampled::{PixelRect, PlanMap};
 
 /// A table and a camera over it.
 #[derive(Debug, Clone, Copy, PartialEq)]

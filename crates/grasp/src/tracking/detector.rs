@@ -5,12 +5,12 @@ use std::sync::Arc;
 use image::{RgbImage, imageops};
 
 use burn::tensor::read_sync;
+use sdg_shape::PixelRect;
 
 use crate::detection::{Found, GraspDetection};
 use crate::error::Result;
 use crate::model::{GraspModel, Verification};
 use crate::plan::{PlanDetector, PlanarPose};
-use crate::resampled::PixelRect;
 
 /// A model, and the plan view that it works in where the camera is calibrated.
 #[derive(Debug, Clone)]

@@ -11,13 +11,12 @@ use std::sync::Arc;
 use image::RgbImage;
 use sdg_geometry::{BoundingBox, PlanarSimilarity};
 use sdg_orientation::halved;
-use sdg_shape::{CloseLook, Evidence, GradientField, Picture, Reach, TableColors};
+use sdg_shape::{CloseLook, Evidence, GradientField, Picture, PixelRect, Reach, TableColors};
 
 use super::detector::PartDetector;
 use crate::colors::Colors;
 use crate::detection::Placement;
 use crate::prepared::{Prepared, WorkingSize};
-use crate::resampled::PixelRect;
 use crate::sizes::{SizeRange, scaling};
 use crate::taught::TaughtDemonstration;
 
