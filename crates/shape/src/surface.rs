@@ -216,6 +216,24 @@ struct Correlation {
 }
 
 impl Correlation {
+    /// Of sums about a colour of the photo and one of the image: `taught`, `seen`, their squares and products.
+    fn about(
+        [of_photo, of_image]: [[f64; 3]; 2],
+        count: f64,
+        [taught, seen, taught_squares, seen_squares, products]: [[f64; 3]; 5],
+    ) -> Self {
+        let mut sums = Self { count: count as usize, ..Self::default() };
+        for c in 0..3 {
+            let (photo, image) = (of_photo[c], of_image[c]);
+            sums.taught[c] = taught[c] + count * photo;
+            sums.seen[c] = seen[c] + count * image;
+            sums.taught_squares += taught_squares[c] + 2.0 * photo * taught[c] + count * photo * photo;
+            sums.seen_squares += seen_squares[c] + 2.0 * image * seen[c] + count * image * image;
+            sums.products += products[c] + image * taught[c] + photo * seen[c] + count * photo * image;
+        }
+        sums
+    }
+
     fn merge(&mut self, other: &Self) {
         self.count += other.count;
         for channel in 0..3 {
@@ -294,18 +312,25 @@ impl WithSimd for Correlate<'_> {
         let (sin, cos) = angle.radians().sin_cos();
         let [a, b, tx, ty] = [scale * cos, scale * sin, tx, ty].map(|value| value as f32);
         let of_cell = |cell: &Cell| {
-            let (mut count, [mut taught, mut seen, mut taught_squares, mut seen_squares, mut products]) =
-                (0.0f32, [f32x4::ZERO; 5]);
+            // From a colour that is near all others: sums of squares of large numbers would lose the small differences.
+            let (mut base, mut count) = (None, 0.0f32);
+            let [mut taught, mut seen, mut taught_squares, mut seen_squares, mut products] = [f32x4::ZERO; 5];
             for group in &cell.groups {
                 let x: [f32; LANES] = std::array::from_fn(|k| a * group.x[k] - b * group.y[k] + tx);
                 let y: [f32; LANES] = std::array::from_fn(|k| b * group.x[k] + a * group.y[k] + ty);
                 let mut colors = [f32x4::ZERO; LANES];
-                let inside = reader.colors(&x, &y, &mut colors);
+                let mut counts = reader.colors(&x, &y, &mut colors);
                 for k in 0..LANES {
-                    let counts = inside[k] * group.counts[k];
-                    let (of_photo, of_image) =
-                        (group.colors[k] * f32x4::splat(counts), colors[k] * f32x4::splat(counts));
-                    count += counts;
+                    counts[k] *= group.counts[k];
+                }
+                let first = counts.iter().position(|counts| *counts > 0.0);
+                let Some([of_photo, of_image]) = base.or(first.map(|k| [group.colors[k], colors[k]])) else { continue };
+                base = Some([of_photo, of_image]);
+                for k in 0..LANES {
+                    let counts_k = f32x4::splat(counts[k]);
+                    let [of_photo, of_image] =
+                        [(group.colors[k] - of_photo) * counts_k, (colors[k] - of_image) * counts_k];
+                    count += counts[k];
                     taught += of_photo;
                     seen += of_image;
                     taught_squares += of_photo * of_photo;
@@ -314,15 +339,9 @@ impl WithSimd for Correlate<'_> {
                 }
             }
             let channels = |sums: f32x4| std::array::from_fn(|c| f64::from(sums.to_array()[c]));
-            let sum = |sums: f32x4| channels(sums).iter().sum::<f64>();
-            Correlation {
-                count: count as usize,
-                taught: channels(taught),
-                seen: channels(seen),
-                taught_squares: sum(taught_squares),
-                seen_squares: sum(seen_squares),
-                products: sum(products),
-            }
+            let base = base.unwrap_or([f32x4::ZERO; 2]).map(channels);
+            let sums = [taught, seen, taught_squares, seen_squares, products].map(channels);
+            Correlation::about(base, f64::from(count), sums)
         };
         cells.iter().map(of_cell).collect()
     }

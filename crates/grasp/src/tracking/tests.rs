@@ -188,9 +188,9 @@ fn a_part_that_lies_still_stays_where_the_search_has_it() {
     let found = &answers[0].1[0].detection;
     for (was_searched, parts) in &answers[1..] {
         let mut followed = parts[0].detection.clone();
-        // A window of the picture is read at other numbers, so that sums end in other bits.
+        // A window of the picture is read at other numbers, so that sums in single precision end in other bits.
         let [seen, searched] = [followed.agreement, found.agreement].map(Option::unwrap);
-        assert!((seen - searched).abs() < 1e-12, "{seen} instead of {searched}");
+        assert!((seen - searched).abs() < 1e-6, "{seen} instead of {searched}");
         followed.agreement = found.agreement;
         assert_eq!((*was_searched, &followed), (false, found));
     }
