@@ -1,6 +1,6 @@
 // Shortcuts. In fields, keys are for writing.
 
-import { adjustGripper, boxDrawn, clickOutline, closeOutline, deleteSelected, nudge, placeGripper, proposeOutline, redo, setBox, setTool, undo } from "./editing.js";
+import { adjustGripper, boxDrawn, closeOutline, deleteSelected, nudge, placeGripper, proposeOutline, redo, setBox, setTool, strokeOutline, undo } from "./editing.js";
 import { boundsOf } from "./geometry.js";
 import { holdSpace, letGo } from "./gestures.js";
 import { keepPicture, takePhoto, toggleCamera, toggleLive } from "./live.js";
@@ -31,7 +31,7 @@ function putInTheMiddle() {
     const [x1, y1, x2, y2] = boundsOf(part);
     placeGripper([(x1 + x2) / 2, (y1 + y2) / 2]);
   } else if (state.tool === "in" || state.tool === "out") {
-    clickOutline(middle(), state.tool === "in");
+    strokeOutline([middle()], state.tool === "in");
   } else return false;
   return true;
 }

@@ -52,6 +52,8 @@ async function meetAgain() {
     // The next beat asks again.
     return;
   }
+  // It was started without a project: the marks that wait are sent when this one is opened again.
+  if (session.start) return location.reload();
   // Another call of this was quicker.
   if (!isLost()) return;
   const gone = [];

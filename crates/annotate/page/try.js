@@ -2,6 +2,7 @@
 
 import { api } from "./api.js";
 import { button } from "./buttons.js";
+import { uploadPhoto } from "./folder.js";
 import { adopt } from "./editing.js";
 import { placeText } from "./live.js";
 import { MIN_SHOWN, numbered } from "./overlay.js";
@@ -33,7 +34,8 @@ for (const kind of ["dragover", "dragleave", "drop"]) {
     stage.classList.toggle("dropping", kind === "dragover");
     if (kind !== "drop") return;
     const files = [...event.dataTransfer.files];
-    if (files.length) {
+    if (files.length && state.tab === "mark" && !state.images.length && !state.camera) uploadPhoto(files[0]);
+    else if (files.length) {
       openTab("try");
       addPictures(files);
     }

@@ -180,6 +180,7 @@ fn serve(folder: &TempDir, arguments: &[String]) -> (Child, String) {
         .current_dir(folder.path())
         // It is ended without a word, and what it keeps for the session goes with the folder.
         .env("TMPDIR", folder.path())
+        .env("XDG_STATE_HOME", folder.path().join("state"))
         .stdout(Stdio::piped())
         .spawn()
         .unwrap();
