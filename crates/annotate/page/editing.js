@@ -62,7 +62,8 @@ export async function save(target) {
     try {
       const sending = JSON.stringify(target.marks);
       const view = await api.saveMarks(target.id, target.marks);
-      Object.assign(target, { saved: view.saved, advice: view.advice, sent: sending });
+      // What the disk has not taken is not sent yet: it is kept and sent again.
+      Object.assign(target, { saved: view.saved, advice: view.advice, sent: view.saved.by_disk ? target.sent : sending });
     } catch (error) {
       target.saved = { state: "refused", why: error.message, lost: error.lost };
       if (error.lost) sent = -1;

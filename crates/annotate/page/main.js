@@ -8,7 +8,7 @@ import { renderLive } from "./live.js";
 import { renderMarkPanel } from "./mark_panel.js";
 import { renderOverlay } from "./overlay.js";
 import { renderSamples } from "./samples.js";
-import { beat, sendKept } from "./server_end.js";
+import { beat, renderUnsaved, sendKept } from "./server_end.js";
 import { showStart } from "./start.js";
 import { onChange, state } from "./store.js";
 import { openImage, renderStrip, showCurrent, shownName } from "./strip.js";
@@ -43,7 +43,7 @@ by("zoom-fit").addEventListener("click", fitOrPart);
 onChange(() => {
   // Until the server has answered there is nothing to show.
   if (state.project === undefined) return;
-  for (const render of [renderTabs, renderView, renderOverlay, renderStrip, renderMarkPanel, renderSamples, renderTeach, renderVersions, renderTry, renderLive, renderFolder]) render();
+  for (const render of [renderTabs, renderView, renderOverlay, renderStrip, renderMarkPanel, renderSamples, renderTeach, renderVersions, renderTry, renderLive, renderFolder, renderUnsaved]) render();
   document.title = `${shownName() || "Photo"} · Teach a grasp`;
 });
 

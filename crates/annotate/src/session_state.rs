@@ -94,7 +94,10 @@ impl State {
         self.images[id].saved = match written {
             Ok(true) => Saved::Written { file: file_name(&self.images[id].file) },
             Ok(false) => Saved::Nothing,
-            Err(error) => Saved::Refused { why: error.to_string() },
+            Err(error) => {
+                let by_disk = matches!(error, Error::Write(_) | Error::File { .. });
+                Saved::Refused { why: error.to_string(), by_disk }
+            }
         };
     }
 

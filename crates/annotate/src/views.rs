@@ -21,6 +21,8 @@ pub enum Saved {
     Refused {
         /// One line for the person at the page.
         why: String,
+        /// Whether the file could not be written, so that the same marks may be saved later.
+        by_disk: bool,
     },
 }
 

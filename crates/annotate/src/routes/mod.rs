@@ -77,9 +77,9 @@ pub fn answer(desk: &Desk, request: &Request) -> Response {
     let Some(path) = head.path.strip_prefix('/') else { return no_such_address() };
     let path: Vec<&str> = path.split('/').collect();
     match (head.method.as_str(), path.as_slice()) {
-        ("GET", [""]) => Response::new(200, "text/html; charset=utf-8", page::INDEX.as_bytes()),
+        ("GET", [""]) => Response::new(200, "text/html; charset=utf-8", page::index().into_bytes()),
         ("GET", ["page", name]) => match page::file(name) {
-            Some((media_type, text)) => Response::new(200, media_type, text.as_bytes()),
+            Some((media_type, text)) => Response::new(200, media_type, text.into_bytes()),
             None => no_such_address(),
         },
         ("GET", ["api", "session"]) => json_of(desk.view()),
