@@ -74,10 +74,17 @@ const MAX_KEEPALIVE_CHARS = 20000;
 
 export const api = {
   session: (options) => send("GET", "/api/session", undefined, options),
+  createProject: (name, photo) => send("POST", `/api/projects?name=${encodeURIComponent(name)}&photo=${encodeURIComponent(photo.name)}`, photo),
+  openProject: (id) => send("POST", `/api/projects/${id}/open`),
+  closeProject: () => send("DELETE", "/api/projects"),
+  addPhoto: (id) => send("POST", `/api/others/${id}/photo`),
+  addOtherTrial: (id) => send("POST", `/api/others/${id}/try`),
+  otherUrl: (id) => `/api/others/${id}/picture`,
+  uploadPhoto: (file) => send("POST", `/api/images?name=${encodeURIComponent(file.name)}`, file),
   rename: (label) => json("PUT", "/api/label", { label }),
   // `keepalive`: marks made just before the page is closed are saved, too.
   saveMarks: (id, marks) => json("PUT", `/api/images/${id}/marks`, marks, { keepalive: JSON.stringify(marks).length < MAX_KEEPALIVE_CHARS }),
-  proposeOutline: (id, box, clicks) => json("POST", `/api/images/${id}/outline`, { box, clicks }),
+  proposeOutline: (id, box, strokes) => json("POST", `/api/images/${id}/outline`, { box, strokes }),
   removeImage: (id) => send("DELETE", `/api/images/${id}`),
   putBackImage: (id) => send("POST", `/api/images/${id}/put-back`),
   removeTrialPicture: (id) => send("DELETE", `/api/trial-pictures/${id}`),

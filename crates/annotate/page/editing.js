@@ -8,10 +8,10 @@ import { showBox } from "./view.js";
 
 /** Pixels are told to a hundredth. */
 const round = (_, value) => (typeof value === "number" ? Math.round(value * 100) / 100 : value);
-/** Gives what the server tells of a photo the page's own fields; `clicksOf`: the clicks that each proposed outline was found with. */
+/** Gives what the server tells of a photo the page's own fields; `strokesOf`: the strokes that each proposed outline was found with. */
 export function adopt(view) {
   const committed = JSON.stringify(view.marks);
-  return { ...view, committed, sent: committed, past: [], future: [], revision: 0, clicks: null, clicksOf: new Map() };
+  return { ...view, committed, sent: committed, past: [], future: [], revision: 0, strokes: null, strokesOf: new Map(), drawnBox: null };
 }
 
 /** Makes the marks as they are now a step that can be undone, and saves them. */
@@ -34,8 +34,8 @@ function travel(from, to) {
   to(target).push(target.committed);
   target.committed = from(target).pop();
   target.marks = JSON.parse(target.committed);
-  // A click that is undone counts no more for the next one.
-  target.clicks = target.clicksOf.get(target.committed) ?? null;
+  // A stroke that is undone counts no more for the next one.
+  target.strokes = target.strokesOf.get(target.committed) ?? null;
   Object.assign(state, { draft: null, vertex: null });
   save(target);
   changed();
@@ -62,7 +62,8 @@ export async function save(target) {
     try {
       const sending = JSON.stringify(target.marks);
       const view = await api.saveMarks(target.id, target.marks);
-      Object.assign(target, { saved: view.saved, advice: view.advice, sent: sending });
+      // What the disk has not taken is not sent yet: it is kept and sent again.
+      Object.assign(target, { saved: view.saved, advice: view.advice, sent: view.saved.by_disk ? target.sent : sending });
     } catch (error) {
       target.saved = { state: "refused", why: error.message, lost: error.lost };
       if (error.lost) sent = -1;
@@ -98,6 +99,7 @@ export function setGripper(gripper) {
 
 /** A box was drawn: the outline is looked for in it, unless there is one, and the gripper is next. */
 export function boxDrawn() {
+  image().drawnBox = null;
   state.selected = "box";
   commit();
   state.tool = nextTool();
@@ -121,32 +123,46 @@ export function closeOutline(points) {
   state.tool = nextTool();
 }
 
-/** Says that a place belongs to the part or does not; the outline is found anew with all that was said. */
-export function clickOutline(point, isInside) {
+/** Says that what lies under a stroke belongs to the part or does not; the outline is found anew with all that was said. */
+export function strokeOutline(points, isInside) {
   const target = image();
   const box = target.marks.box ?? (target.marks.outline && boundsOf(target.marks.outline));
   if (!box) return toast("Draw a box around the part first: the outline is looked for in it.");
-  target.clicks = [...(target.clicks ?? []), { at: point, is_inside: isInside }];
-  // A place outside the box that belongs to the part makes the box larger.
-  if (isInside && (point[0] < box[0] || point[1] < box[1] || point[0] > box[2] || point[1] > box[3])) {
-    setBox(boundsOf([box.slice(0, 2), box.slice(2), point]));
-  }
-  return proposeOutline({ clicks: target.clicks });
+  target.strokes = [...(target.strokes ?? []), { points, isInside }];
+  // What lies outside the box and belongs to the part makes the box larger.
+  const grown = boundsOf([box.slice(0, 2), box.slice(2), ...points]);
+  if (isInside && String(grown) !== String(box)) setBox(grown);
+  return proposeOutline({ strokes: target.strokes });
+}
+
+/** A person's box reaches beyond the outline by this share of its side at most; a looser one is drawn to a corrected outline. */
+const LOOSE = 0.06;
+
+/** Draws a loose box to the outline that was corrected, with a little room. */
+function snapBox(marks) {
+  const [x1, y1, x2, y2] = boundsOf(marks.outline);
+  const room = Math.max(2, 0.02 * Math.hypot(x2 - x1, y2 - y1));
+  const [bx1, by1, bx2, by2] = marks.box;
+  const most = LOOSE * Math.max(bx2 - bx1, by2 - by1);
+  if (Math.max(x1 - bx1, y1 - by1, bx2 - x2, by2 - y2) > most) setBox([x1 - room, y1 - room, x2 + room, y2 + room]);
 }
 
 /** Asks the server for the outline of what is in the box. `quietly` when nobody asked for it by name. */
-export async function proposeOutline({ quietly = false, clicks = null } = {}) {
+export async function proposeOutline({ quietly = false, strokes = null } = {}) {
   const target = image();
-  const box = target.marks.box ?? (target.marks.outline && boundsOf(target.marks.outline));
+  // What is said is looked for in the box that was drawn, also after it was drawn to the outline.
+  const drawn = strokes && target.drawnBox;
+  const box = drawn ? boundsOf([drawn, target.marks.box].flatMap((b) => [b.slice(0, 2), b.slice(2)])) : target.marks.box ?? (target.marks.outline && boundsOf(target.marks.outline));
   if (!box) {
     setTool("box");
     return toast("Draw a box around the part first: the outline is looked for in it.");
   }
-  if (!clicks) target.clicks = null;
+  if (!strokes) Object.assign(target, { strokes: null, drawnBox: null });
   state.proposing = true;
   changed();
   try {
-    const { outline } = await api.proposeOutline(target.id, box, clicks ?? []);
+    const said = (strokes ?? []).map(({ points, isInside }) => ({ points, is_inside: isInside }));
+    const { outline } = await api.proposeOutline(target.id, box, said);
     // Whoever has drawn on meanwhile is not overruled.
     const waited = target === image() && !(quietly && target.marks.outline);
     if (waited && !outline) {
@@ -154,14 +170,19 @@ export async function proposeOutline({ quietly = false, clicks = null } = {}) {
     } else if (waited) {
       target.marks.outline = outline;
       if (!target.marks.grasp) state.selected = "outline";
+      if (strokes && target.marks.box) {
+        target.drawnBox = box;
+        snapBox(target.marks);
+      }
       commit();
-      target.clicksOf.set(target.committed, clicks);
-      const last = clicks?.at(-1);
-      if (!clicks) toast("Found an outline. Click “In” or “Out” where it is wrong, or drag it.");
-      else if (!last.is_inside && isWithin(last.at, outline)) {
+      target.strokesOf.set(target.committed, strokes);
+      const last = strokes?.at(-1);
+      const middle = last?.points[Math.floor(last.points.length / 2)];
+      if (!strokes) toast("Found an outline. Draw over what is wrong with “In” or “Out”, or drag the outline.");
+      else if (!last.isInside && isWithin(middle, outline)) {
         toast("That place has the part all around it. An outline is one line around the part and has no holes; a hole does no harm.");
-      } else if (last.is_inside && !isWithin(last.at, outline)) {
-        toast("That place does not hang together with the part. Click between it and the part, too, or draw the outline by hand.");
+      } else if (last.isInside && !isWithin(middle, outline)) {
+        toast("That place does not hang together with the part. Draw from there to the part, too, or draw the outline by hand.");
       }
     }
   } catch (error) {

@@ -74,6 +74,65 @@ const MIN_ROOM_PX = 2;
 
 export const withRoom = (width) => width + Math.max(2 * MIN_ROOM_PX, width * ROOM);
 
+/** Sides are looked at so far along the part, in its widths; the farthest at which they are still straight counts. */
+const SIDE_LENGTHS = [4, 2.5, 1.5, 1];
+/** Sides are straight where their points lie so near to a line, as a share of the part's width, and at least so many pixels. */
+const STRAIGHT = 0.03;
+const MIN_STRAIGHT_PX = 0.7;
+/** Edges that run more across the jaws than this are ends of the part, not sides. */
+const MAX_ACROSS = Math.tan((35 * Math.PI) / 180);
+/** Another turn than this is no correction. */
+const MAX_CORRECTION = (20 * Math.PI) / 180;
+
+/** The points of the part's outline on both sides of the jaws within `half` along them: [along, across], a pixel apart. */
+function sidePoints({ center, angle, width }, part, half) {
+  const along = direction(angle);
+  const across = quarter(along);
+  const sides = [[], []];
+  part.forEach((to, i) => {
+    const [a, b] = [part.at(i - 1), to].map((p) => [dot(sub(p, center), along), dot(sub(p, center), across)]);
+    const [dt, ds] = sub(b, a);
+    if (Math.abs(ds) > MAX_ACROSS * Math.abs(dt)) return;
+    const count = Math.ceil(Math.hypot(dt, ds));
+    for (let k = 0; k < count; k += 1) {
+      const [t, s] = add(a, times([dt, ds], (k + 0.5) / count));
+      if (Math.abs(t) <= half && Math.abs(s) < width) sides[s < 0 ? 0 : 1].push([t, s]);
+    }
+  });
+  return sides;
+}
+
+/** The common slope of both sides and how far their points lie from it; null where a side is missing. */
+function commonSlope(sides, half) {
+  if (sides.some((side) => side.length < Math.max(half, 3))) return null;
+  const mean = (points, axis) => points.reduce((sum, p) => sum + p[axis], 0) / points.length;
+  const centred = sides.flatMap((side) => {
+    const middle = [mean(side, 0), mean(side, 1)];
+    return side.map((p) => sub(p, middle));
+  });
+  const slope = centred.reduce((sum, [t, s]) => sum + t * s, 0) / centred.reduce((sum, [t]) => sum + t * t, 0);
+  const off = Math.sqrt(centred.reduce((sum, [t, s]) => sum + (s - slope * t) ** 2, 0) / centred.length);
+  return { slope, off };
+}
+
+/** The turn of a gripper along the straight sides of the part between its jaws; its own where they are not straight. */
+export function alongSides(gripper, part) {
+  const { width } = gripper;
+  for (const lengths of SIDE_LENGTHS) {
+    let { angle } = gripper;
+    let fit = null;
+    // Turned, the jaws see more of the sides.
+    for (let round = 0; round < 3; round += 1) {
+      fit = commonSlope(sidePoints({ ...gripper, angle }, part, (lengths * width) / 2), (lengths * width) / 2);
+      if (!fit) break;
+      angle += Math.atan(fit.slope);
+    }
+    const isStraight = fit && fit.off <= Math.max(STRAIGHT * width, MIN_STRAIGHT_PX);
+    if (isStraight && Math.abs(angle - gripper.angle) <= MAX_CORRECTION) return angle;
+  }
+  return gripper.angle;
+}
+
 /** The gripper at `point` turned so that it closes over the narrowest of the part, with the middle moved between its sides. */
 export function placedAt(point, part, jawLength = null) {
   const [x1, y1, x2, y2] = boundsOf(part);
@@ -86,8 +145,10 @@ export function placedAt(point, part, jawLength = null) {
     if (!best || width < best.width - 1e-9) best = { angle, width, middle: (sides.least + sides.most) / 2 };
   }
   if (!best) return { center: point, angle: 0, length, width: length };
-  const across = quarter(direction(best.angle));
-  return { center: add(point, times(across, best.middle)), angle: best.angle, length, width: withRoom(best.width) };
+  const middled = (angle, middle) => add(point, times(quarter(direction(angle)), middle));
+  const angle = alongSides({ center: middled(best.angle, best.middle), angle: best.angle, width: best.width }, part);
+  const { least, most } = reach({ center: point, angle, length }, part) ?? { least: -best.width / 2, most: best.width / 2 };
+  return { center: middled(angle, (least + most) / 2), angle, length, width: withRoom(most - least) };
 }
 
 /** Jaws that just let the part between them, for a gripper that was drawn as a line. */

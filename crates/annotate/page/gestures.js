@@ -1,7 +1,7 @@
 // What mouse, pen and fingers do on the photo.
 
 import { add, direction, dot, fittedWidth, gripperOf, norm, quarter, sub, times } from "./geometry.js";
-import { boxDrawn, clickOutline, closeOutline, commit, placeGripper, setBox, setGripper, setTool } from "./editing.js";
+import { boxDrawn, closeOutline, commit, placeGripper, setBox, setGripper, setTool, strokeOutline } from "./editing.js";
 import { changed, image, isMarking, marks, region, size, state } from "./store.js";
 import { KNOB_PX } from "./overlay.js";
 import { pan, toPhoto, zoom } from "./view.js";
@@ -15,6 +15,9 @@ const LENGTH_SLACK_PX = 12;
 /** A second click within this time closes the outline. */
 const DOUBLE_MS = 400;
 const SNAP_RAD = Math.PI / 12;
+/** Between the points of a stroke, and how many there are at most; the server takes a thousand. */
+const STROKE_STEP_PX = 4;
+const MAX_STROKE_POINTS = 500;
 
 /** Pointers that are down, by their id: where they are on the stage. */
 const pointers = new Map();
@@ -97,15 +100,24 @@ function addingPoint() {
   };
 }
 
-/** A click that says what belongs to the part. */
-function clicking(isInside) {
+/** A stroke, or a click, over what belongs to the part or does not. */
+function stroking(isInside, from) {
+  const points = [from];
   return {
-    move() {},
-    end(clicked, at) {
-      if (!clicked) return;
+    move(at) {
+      const to = toPhoto(at);
+      // Points nearer to each other tell nothing more.
+      if (norm(sub(to, points.at(-1))) * state.view.scale < STROKE_STEP_PX || points.length >= MAX_STROKE_POINTS) return;
+      points.push(to);
+      state.draft = { kind: "stroke", points, isInside };
+      changed();
+    },
+    end() {
+      state.draft = null;
       const [w, h] = size();
-      const [x, y] = toPhoto(at);
-      if (x >= 0 && y >= 0 && x < w && y < h) clickOutline([x, y], isInside);
+      const inside = points.filter(([x, y]) => x >= 0 && y >= 0 && x < w && y < h);
+      if (inside.length) strokeOutline(inside, isInside);
+      else changed();
     },
   };
 }
@@ -204,7 +216,7 @@ function begin(event, at) {
   if (state.tool === "box") return drawingBox(from);
   if (state.tool === "grasp") return drawingGrasp(from);
   if (state.tool === "outline") return addingPoint();
-  if (state.tool === "in" || state.tool === "out") return clicking(state.tool === "in");
+  if (state.tool === "in" || state.tool === "out") return stroking(state.tool === "in", from);
   Object.assign(state, { selected: null, vertex: null });
   changed();
   return panning();

@@ -1,11 +1,11 @@
 // Shortcuts. In fields, keys are for writing.
 
-import { adjustGripper, boxDrawn, clickOutline, closeOutline, deleteSelected, nudge, placeGripper, proposeOutline, redo, setBox, setTool, undo } from "./editing.js";
-import { boundsOf } from "./geometry.js";
+import { adjustGripper, boxDrawn, closeOutline, deleteSelected, nudge, placeGripper, proposeOutline, redo, setBox, setTool, strokeOutline, undo } from "./editing.js";
+import { boundsOf, boxPolygon } from "./geometry.js";
 import { holdSpace, letGo } from "./gestures.js";
 import { keepPicture, takePhoto, toggleCamera, toggleLive } from "./live.js";
 import { openImage } from "./strip.js";
-import { isLive, isMarking, region, size, state } from "./store.js";
+import { isLive, isMarking, region, size, state, trialPicture } from "./store.js";
 import { actualSize, fit, middle, showBox, zoom } from "./view.js";
 
 const DEGREE = Math.PI / 180;
@@ -31,14 +31,15 @@ function putInTheMiddle() {
     const [x1, y1, x2, y2] = boundsOf(part);
     placeGripper([(x1 + x2) / 2, (y1 + y2) / 2]);
   } else if (state.tool === "in" || state.tool === "out") {
-    clickOutline(middle(), state.tool === "in");
+    strokeOutline([middle()], state.tool === "in");
   } else return false;
   return true;
 }
 
 /** The whole photo; when that is shown already, the part. */
 export function fitOrPart() {
-  const part = state.tab === "try" || isLive() ? null : region();
+  const best = !isLive() && state.tab === "try" ? trialPicture()?.detections?.[0]?.marks : null;
+  const part = best ? best.outline ?? boxPolygon(best.box) : state.tab === "try" || isLive() ? null : region();
   if (state.view.fitted && part) showBox(boundsOf(part));
   else fit();
 }

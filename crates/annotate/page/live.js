@@ -196,7 +196,6 @@ function renderShooting() {
   const { live } = state;
   const isShooting = isLive() && state.tab === "mark";
   by("shoot").hidden = !isShooting;
-  by("mark-work").hidden = isShooting;
   by("camera-button").hidden = !state.camera;
   by("back-to-photos").hidden = !state.images.length;
   offBecause(by("take"), live.taking ? "The photo is being taken" : !live.isUsable && "The camera shows no usable picture");

@@ -2,12 +2,14 @@
 
 import { api, belongTo } from "./api.js";
 import { adopt } from "./editing.js";
+import { openFolder, renderFolder } from "./folder.js";
 import "./gestures.js";
 import { renderLive } from "./live.js";
 import { renderMarkPanel } from "./mark_panel.js";
 import { renderOverlay } from "./overlay.js";
 import { renderSamples } from "./samples.js";
-import { beat, sendKept } from "./server_end.js";
+import { beat, renderUnsaved, sendKept } from "./server_end.js";
+import { showStart } from "./start.js";
 import { onChange, state } from "./store.js";
 import { openImage, renderStrip, showCurrent, shownName } from "./strip.js";
 import { renderTabs } from "./tabs.js";
@@ -40,19 +42,29 @@ by("zoom-fit").addEventListener("click", fitOrPart);
 
 onChange(() => {
   // Until the server has answered there is nothing to show.
-  if (!state.images.length && !state.camera) return;
-  for (const render of [renderTabs, renderView, renderOverlay, renderStrip, renderMarkPanel, renderSamples, renderTeach, renderVersions, renderTry, renderLive]) render();
-  document.title = `${shownName()} · Teach a grasp`;
+  if (state.project === undefined) return;
+  for (const render of [renderTabs, renderView, renderOverlay, renderStrip, renderMarkPanel, renderSamples, renderTeach, renderVersions, renderTry, renderLive, renderFolder, renderUnsaved]) render();
+  document.title = `${shownName() || "Photo"} · Teach a grasp`;
 });
 
 // The key in the address is in a cookie now: out of sight, and out of the history.
 history.replaceState(null, "", "/");
 
 try {
-  const [session, teaching] = await Promise.all([api.session(), api.teaching()]);
+  const session = await api.session();
+  if (session.start) showStart(session.start);
+  else await open(session);
+} catch (error) {
+  by("hint").textContent = error.message;
+}
+
+async function open(session) {
   belongTo(session);
+  const teaching = await api.teaching();
   Object.assign(state, {
     label: session.label,
+    isNamed: session.is_named,
+    others: session.others,
     modelPath: session.model_path,
     project: session.project,
     models: session.models,
@@ -65,10 +77,10 @@ try {
   });
   if (state.images.length) openImage(0);
   else showCurrent();
+  by("projects").hidden = !session.can_close;
+  if (!state.images.length && !state.camera && state.others.length) openFolder("photo");
   watch();
   session.notes.forEach(toast);
   sendKept(state.project);
   beat();
-} catch (error) {
-  by("hint").textContent = error.message;
 }

@@ -53,17 +53,19 @@ by("undo").addEventListener("click", undo);
 by("redo").addEventListener("click", redo);
 by("delete").addEventListener("click", deleteSelected);
 
-label.addEventListener("change", async () => {
+async function rename() {
   try {
     const session = await api.rename(label.value);
-    Object.assign(state, { label: session.label, modelPath: session.model_path });
+    Object.assign(state, { label: session.label, isNamed: session.is_named, modelPath: session.model_path });
     for (const { id, saved } of session.images) Object.assign(state.images.find((known) => known.id === id) ?? {}, { saved });
   } catch (error) {
     toast(error.message);
   }
   label.value = state.label;
   changed();
-});
+}
+label.addEventListener("change", rename);
+by("keep-name").addEventListener("click", rename);
 
 for (const [what, input] of Object.entries(inputs)) {
   input.addEventListener("change", () => {
@@ -179,8 +181,8 @@ function hint() {
     const count = state.draft?.points?.length ?? 0;
     return count > 2 ? "Click the first point, or press Enter, to close" : "Click around the part, point by point";
   }
-  if (state.tool === "in") return "Click what belongs to the part and is left out";
-  if (state.tool === "out") return "Click what does not belong to the part";
+  if (state.tool === "in") return "Click, or draw over, what belongs to the part and is left out";
+  if (state.tool === "out") return "Click, or draw over, what does not belong to the part: a shadow, the table";
   if (state.selected === "grasp" && grasp) return "Drag between the jaws to move, a jaw to open, an end to turn";
   if (state.selected === "outline" && outline) return "Drag a point, or the line to add one; Del deletes";
   return box || grasp || outline ? "" : "Choose Box to begin";
@@ -197,6 +199,7 @@ export function renderMarkPanel() {
   note.hidden = !target.note;
   note.textContent = target.note ?? "";
   if (document.activeElement !== label) label.value = state.label;
+  by("naming").hidden = state.isNamed;
 }
 
 function renderTools() {

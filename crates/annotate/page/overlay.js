@@ -150,15 +150,13 @@ function drawDraft(draft) {
   });
 }
 
-/** What was said to belong to the part and what not. */
-function drawClicks(clicks) {
-  const parent = group("clicks", "clicks");
-  for (const kind of ["inside", "outside"]) {
-    (clicks?.[kind] ?? []).forEach((point, i) => {
-      const [cx, cy] = toScreen(point);
-      element(`clicks/${kind}${i}`, "circle", { class: kind, cx, cy, r: 5 }, parent);
-    });
-  }
+/** What was said to belong to the part and what not: strokes, and clicks as dots. */
+function drawStrokes(strokes) {
+  const parent = group("strokes", "strokes");
+  strokes.forEach(({ points, isInside }, i) => {
+    const d = points.length > 1 ? path(points.map(toScreen), false) : `${path([toScreen(points[0])], false)}h.01`;
+    for (const under of ["under", ""]) element(`strokes/${i}${under}`, "path", { class: `${isInside ? "inside" : "outside"} ${under}`, d }, parent);
+  });
 }
 
 /** Where picture and photo differ under a refused one: edges red, surface blue. */
@@ -210,7 +208,8 @@ export function renderOverlay() {
     if (outline) drawOutline(outline, correcting);
     if (box) drawBox(box, correcting);
     if (grasp) drawGrasp(grasp, correcting);
-    if (state.tool === "in" || state.tool === "out") drawClicks(image().clicks);
+    const { draft } = state;
+    if (state.tool === "in" || state.tool === "out") drawStrokes([...(image().strokes ?? []), ...(draft?.kind === "stroke" ? [draft] : [])]);
     if (state.draft) drawDraft(state.draft);
   }
   for (const [key, found] of drawn) if (!next.has(key)) found.remove();

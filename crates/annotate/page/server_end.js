@@ -12,7 +12,7 @@ const BEAT_MS = 3000;
 const RETRY_MS = 1500;
 const KEPT = "kept-marks";
 
-const isUnsaved = (target) => target.saving || target.saved.lost;
+const isUnsaved = (target) => target.saving || target.saved.lost || target.saved.by_disk;
 
 /** Keeps marks that the server has not got, by the photo's name. */
 function keep() {
@@ -52,6 +52,8 @@ async function meetAgain() {
     // The next beat asks again.
     return;
   }
+  // It was started without a project: the marks that wait are sent when this one is opened again.
+  if (session.start) return location.reload();
   // Another call of this was quicker.
   if (!isLost()) return;
   const gone = [];
@@ -104,7 +106,20 @@ export async function sendKept(project) {
   if (count) toast(`Marks on ${count === 1 ? "a photo" : `${count} photos`} that were kept in this browser are saved now.`);
 }
 
-window.addEventListener("pagehide", () => isLost() && keep());
+window.addEventListener("pagehide", () => keep());
+
+/** A banner that stays as long as marks could not be written. */
+export function renderUnsaved() {
+  const unsaved = state.images.filter(({ saved }) => saved.by_disk);
+  const [first] = unsaved;
+  const names = new Intl.ListFormat("en").format(unsaved.slice(0, 3).map(({ name }) => name).concat(unsaved.length > 3 ? [`${unsaved.length - 3} more`] : []));
+  const text = first ? `Not saved: the marks on ${names} (${first.saved.why}). They stay on this page; saving is tried again until it succeeds.` : "";
+  const line = document.getElementById("unsaved");
+  line.hidden = !first;
+  if (line.textContent === text) return;
+  if (!first) toast("All marks are saved now.");
+  line.textContent = text;
+}
 
 /** Asks again and again whether the server is there. */
 export async function beat() {
@@ -115,6 +130,7 @@ export async function beat() {
       await meetAgain();
     } else {
       if (!state.images.some(isUnsaved)) localStorage.removeItem(KEPT);
+      state.images.filter(({ saved }) => saved.by_disk).forEach(save);
       if (!document.hidden) await api.teaching().catch(() => null);
     }
   }

@@ -2,9 +2,12 @@
 
 export const state = {
   label: "",
+  /** Whether somebody gave that name; it is a proposal otherwise. */
+  isNamed: true,
   modelPath: "",
-  /** The folder, where the session is a project; versions of the model, oldest first. */
-  project: null,
+  /** The project's folder, or the file of a photo's; its folder's other pictures; versions of the model, oldest first. */
+  project: undefined,
+  others: [],
   models: [],
   /** Whether the camera of the photos is calibrated: the size of the part in them is known then. */
   isCalibrated: false,
@@ -73,10 +76,11 @@ export function isLive() {
 }
 
 /** Whether the stage shows a photo on which marks can be made. */
-export const isMarking = () => state.tab === "mark" && !isLive();
+export const isMarking = () => state.tab === "mark" && !isLive() && Boolean(image());
 
 /** Where the part is, as far as it is marked: its outline, or its box. */
 export function region() {
+  if (!image()) return null;
   const { outline, box } = marks();
   if (outline) return outline;
   return box ? [[box[0], box[1]], [box[2], box[1]], [box[2], box[3]], [box[0], box[3]]] : null;

@@ -2,7 +2,7 @@
 
 import { api } from "./api.js";
 import { offBecause } from "./buttons.js";
-import { changed, image, isComplete, state } from "./store.js";
+import { changed, image, isComplete, isFound, state } from "./store.js";
 import { turnsOf } from "./symmetry.js";
 import { toast } from "./toast.js";
 import { figuresText, gradeOf } from "./versions.js";
@@ -44,7 +44,7 @@ for (const [letter, name, says] of MODELS) {
   else by("other-models").append(item);
 }
 
-const isRunning = () => ["running", "stopping"].includes(state.teaching.status);
+export const isRunning = () => ["running", "stopping"].includes(state.teaching.status);
 const seconds = (s) => (s < 90 ? `${Math.round(s)} s` : `${Math.floor(s / 60)} min ${Math.round(s % 60)} s`);
 const percent = (share) => `${Math.round(share * 100)}\u00a0%`;
 
@@ -96,7 +96,8 @@ export async function watch() {
   }
   if (state.teaching.status === "done") {
     state.models = (await api.session().catch(() => state)).models;
-    // What another model found is old news.
+    // What another model found is old news; it is told what has changed.
+    for (const trial of state.trialPictures) trial.before = trial.detections && trial.detections.filter(isFound).length;
     for (const trial of [...state.trialPictures, state.live]) trial.detections = null;
     changed();
   }

@@ -2,14 +2,18 @@
 
 import { api } from "./api.js";
 import { button } from "./buttons.js";
+import { uploadPhoto } from "./folder.js";
 import { adopt } from "./editing.js";
+import { boundsOf } from "./geometry.js";
 import { placeText } from "./live.js";
 import { MIN_SHOWN, numbered } from "./overlay.js";
+import { exportPictures } from "./export.js";
 import { openImage, openTrialPicture, removeTrialPicture } from "./strip.js";
 import { changed, isFound, isLive, state, trialPicture } from "./store.js";
 import { openTab } from "./tabs.js";
-import { teach } from "./teach.js";
+import { isRunning, teach } from "./teach.js";
 import { toast } from "./toast.js";
+import { showBox } from "./view.js";
 
 const by = (id) => document.getElementById(id);
 const stage = by("stage");
@@ -33,7 +37,8 @@ for (const kind of ["dragover", "dragleave", "drop"]) {
     stage.classList.toggle("dropping", kind === "dragover");
     if (kind !== "drop") return;
     const files = [...event.dataTransfer.files];
-    if (files.length) {
+    if (files.length && state.tab === "mark" && !state.images.length && !state.camera) uploadPhoto(files[0]);
+    else if (files.length) {
       openTab("try");
       addPictures(files);
     }
@@ -109,12 +114,41 @@ async function accept(marks, { correct }) {
       openTab("mark");
       openImage(state.images.length - 1);
       toast("Correct the marks; they are saved as you go.");
-    } else toast("Now a demonstration. Teach again to learn from it.");
+    } else if (isQuick()) teach();
+    else toast("Now a demonstration. Teach again to learn from it.");
   } catch (error) {
     toast(error.message);
   }
   changed();
 }
+
+/** Whether the model in use is taught in seconds: it then learns at once from what is right. */
+const isQuick = () => state.models.find((model) => model.is_current)?.summary.model === "S" && !isRunning();
+
+/** What the last teaching changed on the pictures that were tried before it. */
+function renderLearnt() {
+  const again = state.trialPictures.filter(({ before, detections }) => typeof before === "number" && detections);
+  const known = state.trialPictures.filter(({ before }) => typeof before === "number");
+  let text = "";
+  if (isRunning() && state.tab === "try") text = "It learns from what you said…";
+  else if (known.length && again.length < known.length) text = `The new model looks at the pictures again: ${again.length} of ${known.length}…`;
+  else if (known.length) {
+    const count = (trial) => trial.detections.filter(isFound).length;
+    const names = (list) => new Intl.ListFormat("en").format(list.map(({ name }) => name));
+    const more = again.filter((trial) => count(trial) > trial.before);
+    const less = again.filter((trial) => count(trial) < trial.before);
+    const [was, is] = [again.filter(({ before }) => before), again.filter(count)];
+    text = `The new model finds the part in ${is.length} of ${again.length} pictures; the one before: in ${was.length}.`;
+    if (more.length) text += ` More is found in ${names(more)}.`;
+    if (less.length) text += ` Less is found in ${names(less)}.`;
+    if (!more.length && !less.length) text += " No picture has changed.";
+  }
+  by("learnt").hidden = !text;
+  if (by("learnt").textContent !== text) by("learnt").textContent = text;
+}
+
+by("save-csv").addEventListener("click", () => exportPictures("csv"));
+by("save-json").addEventListener("click", () => exportPictures("json"));
 
 /** Teaches as before, with what was added since, and shows how it goes. */
 function teachAgain() {
@@ -165,6 +199,8 @@ function card(detection, i, count, shown) {
       item.append(legend);
     }
   }
+  const { outline, box } = detection.marks;
+  row.append(button("Zoom to it", () => showBox(outline ? boundsOf(outline) : box), "plain"));
   item.append(row);
   return item;
 }
@@ -231,10 +267,14 @@ function renderJudge() {
   const inPictures = looked.filter((trial) => trial.detections.some(isFound)).length;
   const beyond = state.minScore === 0.5 ? "" : ` For “sdg detect”: --min-score ${least}.`;
   const words = looked.length
-    ? `Found ${places.filter(isFound).length} of ${places.length} at ${least}, in ${inPictures} of ${looked.length} pictures.${beyond}`
+    ? `Found ${places.filter(isFound).length} of ${places.length} at ${least}, in ${inPictures} of ${looked.length} pictures${looked.length < state.trialPictures.length ? ` (${state.trialPictures.length - looked.length} are still looked at)` : ""}.${beyond}`
     : "";
   if (by("least-score-count").textContent !== words) by("least-score-count").textContent = words;
-  by("sort-choice").hidden = state.trialPictures.length < 2;
+  const all = state.trialPictures.length;
+  by("looked").hidden = looked.length === all || all < 2;
+  Object.assign(by("looked"), { max: Math.max(all, 1), value: looked.length });
+  by("export").hidden = !looked.length;
+  by("sort-choice").hidden = all < 2;
   const differs = ({ refusal }) => refusal && (refusal.edges.length || refusal.surface.length);
   by("differences-choice").hidden = isLive() || !trialPicture()?.detections?.some((d) => !isFound(d) && differs(d));
 }
@@ -250,6 +290,7 @@ export function renderTry() {
         : "Each picture is looked at as it comes in. What reaches the least score is found."
       : "Add pictures that were taken as the first one was, with the part lying in other ways.";
   renderJudge();
+  renderLearnt();
   renderFound();
   lookAtAll();
 }

@@ -84,6 +84,7 @@ export function renderView() {
   const { scale, x, y } = state.view;
   photo.style.transform = `translate(${x}px, ${y}px) scale(${scale})`;
   photo.classList.toggle("crisp", scale >= CRISP_FROM);
+  document.getElementById("zoom-tools").hidden = photo.hidden;
   document.getElementById("zoom").textContent = `${Math.round(scale * 100)} %`;
 }
 

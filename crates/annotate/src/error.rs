@@ -47,9 +47,6 @@ pub enum Error {
     /// A project's file that is none.
     #[error("{}: expected a project's file as `sdg annotate` writes it, found {found}", path.display())]
     Project { path: PathBuf, found: String },
-    /// A project without a photo.
-    #[error("{}: expected a photo of the part in this folder (PNG, JPEG, WebP, BMP, TIFF), or a camera to take it with, found neither", path.display())]
-    EmptyProject { path: PathBuf },
     /// A file of the page's key that holds something else.
     #[error(
         "{}: expected a key of 16 letters and digits or more, found {found} characters (delete the file for a new key)",

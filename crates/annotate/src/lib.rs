@@ -28,6 +28,7 @@
 mod advice;
 mod annotation_file;
 mod camera_pictures;
+mod desk;
 mod error;
 mod gripper;
 mod guard;
@@ -41,6 +42,7 @@ mod page;
 mod picture;
 mod preview;
 mod project_file;
+mod recent;
 mod routes;
 mod server;
 mod session;
@@ -52,11 +54,14 @@ mod views;
 
 pub use advice::{Advice, Fix, ModelAdvice, Remark};
 pub use camera_pictures::{CameraPictures, SizeCheck, paced};
+pub use desk::{OpenProject, Start};
 pub use error::{Error, Result, TeacherError};
 pub use gripper::{Gripper, Reach};
 pub use guard::new_token;
 pub use live::{Live, LiveFault, LiveFaultKind, LiveFrame, LiveOptions, LivePictures};
 pub use marks::{GraspMarks, Marks};
+pub use project_file::project_of_photo;
+pub use recent::{RecentProject, RecentProjects};
 pub use sdg_demonstration::ModelKind;
 pub use server::Server;
 pub use session::{Session, SessionOptions};
@@ -66,4 +71,4 @@ pub use teacher::{
 };
 pub use teaching::{News, Status};
 pub use token_file::token_of_file;
-pub use views::{ComparedPicture, ImageView, ModelView, Saved, SessionView, TrialPictureView};
+pub use views::{ComparedPicture, ImageView, ModelView, OtherView, Saved, SessionView, TrialPictureView};

@@ -38,6 +38,39 @@ pub fn free_numbered(path: &Path) -> PathBuf {
     (1..).map(numbered).find(|path| !taken(path)).expect("numbers do not run out")
 }
 
+/// What cameras and people call any picture.
+const ANY_PICTURE: [&str; 14] = [
+    "photo",
+    "image",
+    "picture",
+    "img",
+    "pic",
+    "dsc",
+    "dscn",
+    "dscf",
+    "pxl",
+    "p",
+    "demo",
+    "frame",
+    "screenshot",
+    "webcam",
+];
+
+/// A name for the part that is on a photo: the photo's, or its folder's where the photo is called as any picture is.
+pub fn proposed_label(photo: Option<&Path>, folder: &Path) -> String {
+    let says_something = |name: &String| {
+        let letters: String = name.chars().filter(|c| c.is_alphabetic()).flat_map(char::to_lowercase).collect();
+        !letters.is_empty() && !ANY_PICTURE.contains(&letters.as_str()) && !name.starts_with('.')
+    };
+    let of_photo = photo.and_then(Path::file_stem).map(|stem| stem.to_string_lossy().into_owned());
+    // The current folder has no name of its own.
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    let absolute = std::path::absolute(folder).unwrap_or_default();
+    let of_folder = || absolute.file_name().map(|name| name.to_string_lossy().into_owned());
+    let proposed = of_photo.filter(says_something).or_else(|| of_folder().filter(says_something));
+    proposed.map_or_else(|| "part".to_owned(), |name| name.chars().take(60).collect())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -64,5 +97,16 @@ mod tests {
         assert_eq!(free_numbered(&spaced), spaced);
         std::fs::write(&spaced, "").unwrap();
         assert_eq!(free_numbered(&spaced), folder.path().join("my part-2.png"));
+    }
+
+    #[test]
+    fn a_part_is_called_as_its_photo_or_its_folder() {
+        let propose = |photo: &str, folder: &str| proposed_label(Some(Path::new(photo)), Path::new(folder));
+        assert_eq!(propose("/parts/wing bolt.jpg", "/parts"), "wing bolt");
+        for photo in ["IMG_2034.JPG", "photo-2.png", "20261127_101500.jpg", "DSC00012.JPG"] {
+            assert_eq!(propose(photo, "/parts/wingbolt"), "wingbolt", "{photo}");
+        }
+        assert_eq!(propose("photo.png", "/tmp/.tmpA1"), "part");
+        assert_eq!(proposed_label(None, Path::new("/parts/lid")), "lid");
     }
 }

@@ -1,7 +1,10 @@
 //! The page's own files, compiled in: it fetches nothing from elsewhere and needs no build step.
+//!
+//! They are sent without their indentation and without lines that are comments alone, which are a seventh of them. Every line keeps
+//! its number, so that the browser's messages name lines of the files as they stand in page/.
 
-/// The page's HTML document.
-pub const INDEX: &str = include_str!("../page/index.html");
+/// The page's HTML document, as it stands in page/.
+const INDEX: &str = include_str!("../page/index.html");
 
 const SCRIPT: &str = "text/javascript; charset=utf-8";
 const ICON: &str = "image/svg+xml";
@@ -14,6 +17,8 @@ const FILES: &[(&str, &str, &str)] = &[
     ("api.js", SCRIPT, include_str!("../page/api.js")),
     ("buttons.js", SCRIPT, include_str!("../page/buttons.js")),
     ("editing.js", SCRIPT, include_str!("../page/editing.js")),
+    ("export.js", SCRIPT, include_str!("../page/export.js")),
+    ("folder.js", SCRIPT, include_str!("../page/folder.js")),
     ("geometry.js", SCRIPT, include_str!("../page/geometry.js")),
     ("gestures.js", SCRIPT, include_str!("../page/gestures.js")),
     ("keyboard.js", SCRIPT, include_str!("../page/keyboard.js")),
@@ -24,6 +29,7 @@ const FILES: &[(&str, &str, &str)] = &[
     ("server_end.js", SCRIPT, include_str!("../page/server_end.js")),
     ("samples.js", SCRIPT, include_str!("../page/samples.js")),
     ("store.js", SCRIPT, include_str!("../page/store.js")),
+    ("start.js", SCRIPT, include_str!("../page/start.js")),
     ("symmetry.js", SCRIPT, include_str!("../page/symmetry.js")),
     ("strip.js", SCRIPT, include_str!("../page/strip.js")),
     ("tabs.js", SCRIPT, include_str!("../page/tabs.js")),
@@ -34,9 +40,32 @@ const FILES: &[(&str, &str, &str)] = &[
     ("view.js", SCRIPT, include_str!("../page/view.js")),
 ];
 
-/// A file by its name, with its media type.
-pub fn file(name: &str) -> Option<(&'static str, &'static str)> {
-    FILES.iter().find(|(known, ..)| *known == name).map(|&(_, media_type, text)| (media_type, text))
+/// The page's HTML document, as it is sent.
+pub fn index() -> String {
+    lean(INDEX)
+}
+
+/// A file by its name, as it is sent, with its media type.
+pub fn file(name: &str) -> Option<(&'static str, String)> {
+    let &(_, media_type, text) = FILES.iter().find(|(known, ..)| *known == name)?;
+    Some((media_type, lean(text)))
+}
+
+/// A file without indentation and comment lines.
+fn lean(text: &str) -> String {
+    let mut lean = String::with_capacity(text.len());
+    let mut is_comment = false;
+    for line in text.lines() {
+        let line = line.trim_start();
+        let begins = ["/*", "<!--"].iter().any(|begin| line.starts_with(begin));
+        let ends = ["*/", "-->"].iter().any(|end| line.trim_end().ends_with(end));
+        if !(is_comment || begins || line.starts_with("//")) {
+            lean.push_str(line);
+        }
+        is_comment = (is_comment || begins) && !ends;
+        lean.push('\n');
+    }
+    lean
 }
 
 #[cfg(test)]
@@ -48,8 +77,26 @@ mod tests {
 
     #[test]
     fn the_page_is_small() {
-        let bytes = INDEX.len() + FILES.iter().map(|(.., text)| text.len()).sum::<usize>();
+        let bytes = index().len() + FILES.iter().map(|(.., text)| lean(text).len()).sum::<usize>();
         assert!(bytes < MAX_BYTES, "{bytes} bytes");
+    }
+
+    #[test]
+    fn what_is_sent_has_all_lines_but_comments() {
+        let text = "// About.\n  /** Two\n   * lines. */\nconst a = 1; // kept\n    b(`//`);\n<!-- no -->\n";
+        assert_eq!(lean(text), "\n\n\nconst a = 1; // kept\nb(`//`);\n\n");
+        for text in FILES.iter().map(|&(.., text)| text).chain([INDEX]) {
+            assert_eq!(lean(text).lines().count(), text.lines().count());
+            // A template that goes over several lines, or code after a comment's end, would be changed.
+            for line in text.lines() {
+                assert!(line.matches('`').count() % 2 == 0, "a template over several lines: {line}");
+                let after = line.split_once("*/").map_or("", |(_, after)| after);
+                assert!(
+                    after.trim().is_empty() || !line.trim_start().starts_with("/*"),
+                    "code after a comment: {line}"
+                );
+            }
+        }
     }
 
     /// The values of a property of this name in the page's CSS, and of those that begin with it.

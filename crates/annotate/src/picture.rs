@@ -36,6 +36,14 @@ impl Picture {
         Ok(Self { path: path.to_owned(), name, size: [image.width(), image.height()] })
     }
 
+    /// Decodes bytes once, so that what is no picture is refused before it is written.
+    ///
+    /// # Errors
+    /// Bytes that are no picture.
+    pub fn check(bytes: &[u8], name: &str) -> Result<()> {
+        decode(bytes, name).map(|_| ())
+    }
+
     /// The pixels, upright.
     ///
     /// # Errors

@@ -1,14 +1,16 @@
-//! A project's folder: its photos with their marks beside them, and a file that says what is what.
+//! A project: photos with their marks beside them, and a file that says what is what.
 //!
 //! ```text
-//! DIR/sdg-project.json   photos, tried pictures and what was said of them, versions of the model
-//!     photo.png .json    a photo of the part, its marks
-//!     pendulum.sdg       the model in use
-//!     models/            all versions
-//!     tried/             pictures that came from the page
+//! DIR/sdg-project.json         photos, tried pictures and what was said of them, versions of the model
+//!     photo.sdg-project.json   the same for a photo that was opened alone
+//!     photo.png .json          a photo of the part, its marks
+//!     pendulum.sdg             the model in use
+//!     models/                  all versions
+//!     tried/                   pictures that came from the page
 //! ```
-//! Names are relative to the folder where they lie in it. A picture that stands in the folder and that the file does not name has
-//! come there since: with marks beside it it is a photo, otherwise a picture to try.
+//! Names are relative to the folder where they lie in it. A folder that is a project may hold pictures that its file does not name.
+//! They have come there since: with marks beside it such a picture is a photo, otherwise a picture to try. In a new folder without
+//! any marks the person chooses the photo. Nothing of the folder is taken into the project of a photo.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -29,6 +31,48 @@ pub const TRIED_FOLDER: &str = "tried";
 const FORMAT: u32 = 1;
 /// Larger than any project's file.
 const MAX_BYTES: u64 = 64 << 20;
+
+/// Where a project's file stands, and the folder that its names are relative to.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ProjectPlace {
+    pub folder: PathBuf,
+    pub file: PathBuf,
+    /// Whether the folder is the project, not a photo in it.
+    pub is_folder: bool,
+}
+
+impl ProjectPlace {
+    pub fn of_folder(folder: &Path) -> Self {
+        Self { folder: folder.to_owned(), file: folder.join(FILE), is_folder: true }
+    }
+
+    /// The project of the photo's folder where that names the photo, otherwise the photo's own.
+    ///
+    /// # Errors
+    /// A file that cannot be read or is no project's.
+    pub fn of_photo(photo: &Path) -> Result<Self> {
+        let folder = photo.parent().unwrap_or(Path::new("")).to_owned();
+        let whole = Self { folder: folder.clone(), file: folder.join(FILE), is_folder: false };
+        let known = ProjectFile::read(&whole)?;
+        if known.is_some_and(|file| file.photos.contains(&relative(&folder, photo))) {
+            return Ok(whole);
+        }
+        Ok(Self { folder, file: photo.with_extension(FILE), is_folder: false })
+    }
+
+    /// For people, and to tell one project from another: the folder, or the file of a photo's.
+    pub fn shown(&self) -> String {
+        if self.is_folder { self.folder.display().to_string() } else { self.file.display().to_string() }
+    }
+}
+
+/// The file of the project that is opened with a photo, which need not be there yet.
+///
+/// # Errors
+/// A file in the photo's folder that cannot be read or is no project's.
+pub fn project_of_photo(photo: &Path) -> Result<PathBuf> {
+    Ok(ProjectPlace::of_photo(photo)?.file)
+}
 
 /// What the file says.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -80,18 +124,17 @@ impl Default for ProjectFile {
 }
 
 impl ProjectFile {
-    /// Reads a folder's file and adds the pictures that have come there since. Pictures that are gone are left out; their names
-    /// come second.
+    /// Reads a project's file, if there is one.
     ///
     /// # Errors
-    /// A folder that cannot be read, a file that is no project's, marks that belong to another picture.
-    pub fn open(folder: &Path) -> Result<(Self, Vec<String>)> {
-        let path = folder.join(FILE);
-        let mut file = match fs::metadata(&path) {
-            Err(error) if error.kind() == ErrorKind::NotFound => Self::default(),
-            Err(source) => return Err(Error::file(&path, "cannot read")(source)),
+    /// A file that cannot be read or is no project's.
+    fn read(place: &ProjectPlace) -> Result<Option<Self>> {
+        let path = place.file.clone();
+        match fs::metadata(&path) {
+            Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
+            Err(source) => Err(Error::file(&path, "cannot read")(source)),
             Ok(metadata) if metadata.len() > MAX_BYTES => {
-                return Err(Error::TooLarge { path, most: MAX_BYTES, found: metadata.len() });
+                Err(Error::TooLarge { path, most: MAX_BYTES, found: metadata.len() })
             }
             Ok(_) => {
                 let bytes = fs::read(&path).map_err(Error::file(&path, "cannot read"))?;
@@ -100,9 +143,21 @@ impl ProjectFile {
                 if read.format != FORMAT {
                     return Err(Error::Project { path, found: format!("format {}, expected {FORMAT}", read.format) });
                 }
-                read
+                Ok(Some(read))
             }
-        };
+        }
+    }
+
+    /// Reads a project's file and, of a folder, adds the pictures that have come there since. Pictures that are gone are left out;
+    /// their names come second.
+    ///
+    /// # Errors
+    /// A folder that cannot be read, a file that is no project's, marks that belong to another picture.
+    pub fn open(place: &ProjectPlace) -> Result<(Self, Vec<String>)> {
+        let read = Self::read(place)?;
+        let is_new = read.is_none();
+        let mut file = read.unwrap_or_default();
+        let folder = &place.folder;
         let mut gone = Vec::new();
         let mut is_there = |name: &String| {
             let there = folder.join(name).is_file();
@@ -116,11 +171,13 @@ impl ProjectFile {
         if file.current_model.is_some_and(|id| id >= file.models.len()) {
             file.current_model = None;
         }
-        file.add_new(folder)?;
+        if place.is_folder {
+            file.add_new(folder, is_new)?;
+        }
         Ok((file, gone))
     }
 
-    fn add_new(&mut self, folder: &Path) -> Result<()> {
+    fn add_new(&mut self, folder: &Path, is_new: bool) -> Result<()> {
         for path in pictures_in(folder)? {
             let name = relative(folder, &path);
             let is_known = self.photos.contains(&name)
@@ -137,7 +194,11 @@ impl ProjectFile {
                 self.tried.push(Tried { file: name, name: picture.name, absent: false, became: None });
             }
         }
-        // Somewhere the marks must begin.
+        if is_new && self.photos.is_empty() && self.tried.len() > 1 {
+            // Which of them is the photo only the person knows; until it is chosen, none is taken in.
+            self.removed.extend(self.tried.drain(..).map(|tried| tried.file));
+        }
+        // The only picture of a new folder, and another one where the photo is gone.
         if self.photos.is_empty()
             && let Some(first) = self.tried.iter().position(|tried| !tried.absent)
         {
@@ -146,15 +207,24 @@ impl ProjectFile {
         Ok(())
     }
 
-    /// Writes the file.
+    /// Whether it says no more than that there is a photo, which needs no file.
+    fn is_bare(&self) -> bool {
+        let Self { label, tried, removed, models, photos, .. } = self;
+        label.is_none() && tried.is_empty() && removed.is_empty() && models.is_empty() && photos.len() < 2
+    }
+
+    /// Writes the file. A photo that is only looked at gets none.
     ///
     /// # Errors
     /// A folder that cannot be written to.
-    pub fn write(&self, folder: &Path) -> Result<()> {
-        let path = folder.join(FILE);
+    pub fn write(&self, place: &ProjectPlace) -> Result<()> {
+        let path = &place.file;
+        if !place.is_folder && self.is_bare() && !path.exists() {
+            return Ok(());
+        }
         let text = serde_json::to_vec_pretty(self)
             .map_err(|error| Error::Project { path: path.clone(), found: error.to_string() })?;
-        Ok(write_atomically(&path, &text)?)
+        Ok(write_atomically(path, &text)?)
     }
 }
 
@@ -173,6 +243,13 @@ mod tests {
     use super::*;
     use image::RgbImage;
 
+    fn open(folder: &Path) -> (ProjectFile, Vec<String>) {
+        ProjectFile::open(&ProjectPlace::of_folder(folder)).unwrap()
+    }
+
+    const MARKED: &str = r#"{"imageWidth": 60, "imageHeight": 40, "shapes": [
+            {"label": "bar", "shape_type": "rectangle", "points": [[10, 10], [30, 20]]}]}"#;
+
     #[test]
     fn pictures_of_a_new_folder_are_sorted_by_their_marks() {
         let folder = tempfile::tempdir().unwrap();
@@ -180,25 +257,50 @@ mod tests {
         for name in ["a.png", "b.png", "c.png"] {
             RgbImage::new(60, 40).save(at(name)).unwrap();
         }
-        let (file, gone) = ProjectFile::open(folder.path()).unwrap();
-        assert_eq!((file.photos, file.tried.len(), gone.len()), (vec!["a.png".to_owned()], 2, 0));
-        let labelme = r#"{"imageWidth": 60, "imageHeight": 40, "shapes": [
-            {"label": "bar", "shape_type": "rectangle", "points": [[10, 10], [30, 20]]}]}"#;
-        fs::write(at("b.json"), labelme).unwrap();
-        let (mut file, _) = ProjectFile::open(folder.path()).unwrap();
+        // Without marks, the person chooses.
+        let (file, gone) = open(folder.path());
+        assert_eq!((file.photos.len(), file.tried.len(), gone.len()), (0, 0, 0));
+        assert_eq!(file.removed.len(), 3);
+        fs::write(at("b.json"), MARKED).unwrap();
+        let (mut file, _) = open(folder.path());
         assert_eq!(file.photos, ["b.png"]);
         assert_eq!(file.tried.iter().map(|tried| tried.file.as_str()).collect::<Vec<_>>(), ["a.png", "c.png"]);
 
         file.tried.remove(0);
         file.removed.insert("a.png".into());
         file.tried[0].absent = true;
-        file.write(folder.path()).unwrap();
+        file.write(&ProjectPlace::of_folder(folder.path())).unwrap();
         RgbImage::new(60, 40).save(at("d.png")).unwrap();
         fs::remove_file(at("b.png")).unwrap();
-        let (again, gone) = ProjectFile::open(folder.path()).unwrap();
+        let (again, gone) = open(folder.path());
         assert_eq!(gone, ["b.png"]);
         // What was taken out stays out; what is known not to show the part is no photo of it.
         assert_eq!((again.photos, &again.tried), (vec!["d.png".to_owned()], &file.tried));
+    }
+
+    #[test]
+    fn a_photo_has_a_project_of_its_own_unless_the_folder_names_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        for name in ["a.png", "b.png"] {
+            RgbImage::new(60, 40).save(at(name)).unwrap();
+        }
+        let place = ProjectPlace::of_photo(&at("a.png")).unwrap();
+        assert_eq!(place.file, at("a.sdg-project.json"));
+        // Nothing else of the folder is taken in, and nothing is written for a look.
+        assert_eq!(ProjectFile::open(&place).unwrap().0, ProjectFile::default());
+        let bare = ProjectFile { photos: vec!["a.png".into()], ..ProjectFile::default() };
+        bare.write(&place).unwrap();
+        assert!(!place.file.exists());
+        let named = ProjectFile { label: Some("rod".into()), ..bare };
+        named.write(&place).unwrap();
+        assert_eq!(ProjectFile::open(&place).unwrap().0, named);
+
+        let whole = ProjectFile { photos: vec!["b.png".into()], ..ProjectFile::default() };
+        whole.write(&ProjectPlace::of_folder(folder.path())).unwrap();
+        let place = ProjectPlace::of_photo(&at("b.png")).unwrap();
+        assert_eq!((place.file.clone(), ProjectFile::open(&place).unwrap().0), (at(FILE), whole));
+        assert_eq!(ProjectPlace::of_photo(&at("a.png")).unwrap().file, at("a.sdg-project.json"));
     }
 
     #[test]
@@ -210,7 +312,8 @@ mod tests {
             (r#"{"format": 7, "photos": [], "tried": [], "removed": [], "models": []}"#, "format 7"),
         ] {
             fs::write(folder.path().join(FILE), text).unwrap();
-            let error = ProjectFile::open(folder.path()).unwrap_err().to_string();
+            let place = ProjectPlace::of_folder(folder.path());
+            let error = ProjectFile::open(&place).unwrap_err().to_string();
             assert!(error.contains(found), "{error}");
         }
     }

@@ -1,4 +1,4 @@
-//! The server: this computer only, one port, one session, connections read and written by hyper.
+//! The server: this computer only, one port, one project at a time, connections read and written by hyper.
 //!
 //! ```text
 //! TcpStream ─ hyper (head bounded, timed) ─ admit (length, Guard) ─ body (bounded, timed) ─ routes, on a thread ─ hyper
@@ -23,6 +23,7 @@ use tokio::sync::Semaphore;
 use tokio::time::timeout;
 use tokio_io_timeout::TimeoutStream;
 
+use crate::desk::{Desk, Start};
 use crate::error::{Error, Result};
 use crate::guard::Guard;
 use crate::http::{Head, Request, Response};
@@ -42,7 +43,7 @@ const MAX_HEADERS: usize = 64;
 /// More connections than the page's browsers keep, and more requests than are answered at a time.
 const MAX_CONNECTIONS: usize = 64;
 
-/// A bound port and the session behind it.
+/// A bound port and what is behind it.
 pub struct Server {
     listener: TcpListener,
     port: u16,
@@ -54,7 +55,7 @@ pub struct Server {
 #[derive(Clone)]
 struct Service {
     guard: Arc<Guard>,
-    session: Arc<Session>,
+    desk: Arc<Desk>,
 }
 
 impl Server {
@@ -63,10 +64,23 @@ impl Server {
     /// # Errors
     /// A port that is taken, or no random bytes for the token.
     pub fn bind(session: Session, port: u16) -> Result<Self> {
+        let token = session.token().map(str::to_owned);
+        Self::bind_desk(Desk::of_session(session), port, token.as_deref())
+    }
+
+    /// The same with the key to the page, if it has one already, where a project is chosen on the page.
+    ///
+    /// # Errors
+    /// A port that is taken, or no random bytes for the token.
+    pub fn bind_start(start: Start, port: u16, token: Option<&str>) -> Result<Self> {
+        Self::bind_desk(Desk::of_start(start), port, token)
+    }
+
+    fn bind_desk(desk: Desk, port: u16, token: Option<&str>) -> Result<Self> {
         let failed = |source| Error::Port { port, source };
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port)).map_err(failed)?;
         let port = listener.local_addr().map_err(failed)?.port();
-        let service = Service { guard: Arc::new(Guard::new(port, session.token())?), session: Arc::new(session) };
+        let service = Service { guard: Arc::new(Guard::new(port, token)?), desk: Arc::new(desk) };
         Ok(Self { listener, port, patience: MAX_WAIT, service })
     }
 
@@ -158,9 +172,9 @@ impl Service {
         };
         let is_page = head.path == "/";
         let request = Request { head, body: read_body(body, patience).await? };
-        let session = self.session;
+        let desk = self.desk;
         // A panic in one request is an error of that request alone; the terminal has its message.
-        let answered = tokio::task::spawn_blocking(move || routes::answer(&session, &request)).await;
+        let answered = tokio::task::spawn_blocking(move || routes::answer(&desk, &request)).await;
         let mut response = answered.unwrap_or_else(|_| routes::broken());
         if is_page {
             response.headers.push(self.guard.cookie());

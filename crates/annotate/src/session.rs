@@ -2,25 +2,27 @@
 //!
 //! Requests name pictures by their index in a list made here. No path comes from the page.
 
+mod folder;
+mod opening;
 mod tried;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use sdg_demonstration::{Demonstration, ModelKind};
+use sdg_files::WriterLock;
 use tempfile::TempDir;
 
 use crate::advice::advise;
 use crate::error::{Error, Result};
-use crate::guard::new_token;
 use crate::live::{LiveDesk, LiveOptions};
 use crate::marks::Marks;
-use crate::model_versions::{ModelVersions, Version, now_secs};
+use crate::model_versions::{Version, now_secs};
 use crate::names::{file_name, free_numbered, safe_stem};
-use crate::picture::{Picture, pictures_in, png};
+use crate::picture::{Picture, png};
 use crate::preview::{Previews, SampleKey};
-use crate::project_file::{ProjectFile, TRIED_FOLDER};
-use crate::session_state::{MarkedPicture, State, TrialPicture};
+use crate::project_file::ProjectPlace;
+use crate::session_state::State;
 use crate::teacher::{GraspTeacher, TaughtModel, TeachRequest, TeachingMaterial};
 use crate::teaching::{News, Teaching};
 use crate::views::{ImageView, Saved, SessionView};
@@ -41,7 +43,8 @@ pub struct SessionOptions {
     pub model_path: Option<PathBuf>,
     /// A camera to take pictures with; with one, `images` may be empty.
     pub live: Option<LiveOptions>,
-    /// The folder of a project, which is opened where it was left; `images` are then empty.
+    /// The folder of a project; `images` are then empty. Without one, the first image has a project of its own. Either is opened
+    /// where it was left.
     pub project: Option<PathBuf>,
     /// The key to the page, for a server that is to be found again by the same page; a new one without it.
     pub token: Option<String>,
@@ -51,6 +54,23 @@ pub struct SessionOptions {
 
 fn locked(state: &Mutex<State>) -> MutexGuard<'_, State> {
     state.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// The name of a part as it is kept, without spaces around it.
+///
+/// # Errors
+/// An empty or endless name.
+pub(crate) fn check_label(label: &str) -> Result<&str> {
+    let label = label.trim();
+    let count = label.chars().count();
+    if count == 0 || count > MAX_LABEL_CHARS || label.chars().any(char::is_control) {
+        return Err(Error::Request {
+            what: "name",
+            expected: format!("1 to {MAX_LABEL_CHARS} letters"),
+            found: if count > MAX_LABEL_CHARS { format!("{count}") } else { format!("{label:?}") },
+        });
+    }
+    Ok(label)
 }
 
 /// One session.
@@ -64,9 +84,10 @@ pub struct Session {
     /// What is written for the person at the page stands beside this: the first picture, or the first photo to be taken.
     home: PathBuf,
     live: Option<LiveDesk>,
-    /// Pictures that came from the page: in the project, or, without one, until one is accepted.
-    uploads: PathBuf,
-    _temporary: Option<TempDir>,
+    /// For pictures that came from the page before there was a photo.
+    temporary: Option<TempDir>,
+    /// Keep other programs from writing what this one writes.
+    locks: Vec<WriterLock>,
     state: Arc<Mutex<State>>,
     id: String,
     token: Option<String>,
@@ -74,106 +95,6 @@ pub struct Session {
 }
 
 impl Session {
-    /// Opens pictures and their marks.
-    ///
-    /// # Errors
-    /// Neither picture nor camera, a picture that cannot be read, or marks that belong to another.
-    pub fn open(options: &SessionOptions, teacher: Arc<dyn GraspTeacher>) -> Result<Self> {
-        let (project, mut notes) = match &options.project {
-            Some(folder) => ProjectFile::open(folder)?,
-            None => (ProjectFile::default(), Vec::new()),
-        };
-        notes.iter_mut().for_each(|gone| *gone += " is not there any more.");
-        let mut photos = options.images.clone();
-        let folder = options.project.as_deref();
-        photos.extend(folder.iter().flat_map(|folder| project.photos.iter().map(|name| (folder.join(name), None))));
-        let first = photos.first().map(|(path, _)| path.clone());
-        let of_camera = || options.live.as_ref().map(|live| live.photo_path.clone());
-        let home = match folder {
-            Some(folder) if first.is_none() && options.live.is_none() => {
-                return Err(Error::EmptyProject { path: folder.to_owned() });
-            }
-            Some(folder) => folder.join("photo.png"),
-            None => first.or_else(of_camera).ok_or(Error::NoImage)?,
-        };
-        let mut label = project.label.clone();
-        let images = photos
-            .iter()
-            .map(|(path, annotation)| {
-                let (image, named) = MarkedPicture::open(path, annotation.as_deref())?;
-                label = label.take().or(named);
-                Ok(image)
-            })
-            .collect::<Result<Vec<_>>>()?;
-        let mut trial_pictures = Vec::new();
-        for tried in &project.tried {
-            let path = folder.unwrap_or(Path::new("")).join(&tried.file);
-            let picture = Picture { name: tried.name.clone(), ..Picture::open(&path)? };
-            let became = tried.became.as_ref().and_then(|name| project.photos.iter().position(|photo| photo == name));
-            trial_pictures.push(TrialPicture { became, is_absent: tried.absent, ..TrialPicture::new(picture, false) });
-        }
-        for path in &options.trial_pictures {
-            let paths = if path.is_dir() { pictures_in(path)? } else { vec![path.clone()] };
-            for path in paths {
-                let taken = images.iter().any(|image| image.picture.path == path)
-                    || trial_pictures.iter().any(|trial| trial.picture.path == path);
-                if !taken {
-                    trial_pictures.push(TrialPicture::new(Picture::open(&path)?, false));
-                }
-            }
-        }
-        if trial_pictures.len() > MAX_TRIAL_PICTURES {
-            return Err(Error::TooManyPictures { most: MAX_TRIAL_PICTURES });
-        }
-        let temporary = match folder {
-            Some(_) => None,
-            None => {
-                let made = tempfile::Builder::new().prefix("sdg-annotate-").tempdir();
-                Some(made.map_err(Error::file(&std::env::temp_dir(), "cannot make a folder in it"))?)
-            }
-        };
-        let uploads = temporary.as_ref().map_or_else(|| home.with_file_name(TRIED_FOLDER), |dir| dir.path().to_owned());
-        let models = ModelVersions {
-            folder: options.model_path.as_ref().unwrap_or(&home).with_file_name("models"),
-            versions: project.models,
-            current: project.current_model,
-        };
-        let teaching = Arc::new(Teaching::default());
-        if let Some(id) = models.current {
-            let opened = models
-                .read(id)
-                .and_then(|bytes| teacher.open(&bytes, &models.versions[id].summary).map_err(Error::Teacher));
-            match opened {
-                Ok(model) => teaching.set_model(Arc::from(model)),
-                Err(error) => notes.push(format!("The model cannot be read: {error}")),
-            }
-        }
-        let state = State {
-            label: label.unwrap_or_else(|| "part".to_owned()),
-            images,
-            trial_pictures,
-            models,
-            project: options.project.clone(),
-            removed_earlier: project.removed,
-            max_opening_px: options.max_opening_px,
-        };
-        state.save_project()?;
-        Ok(Self {
-            teacher,
-            teaching,
-            previews: Previews::default(),
-            model_path: options.model_path.clone(),
-            home,
-            live: options.live.clone().map(LiveDesk::new),
-            uploads,
-            _temporary: temporary,
-            state: Arc::new(Mutex::new(state)),
-            id: new_token()?,
-            token: options.token.clone(),
-            notes,
-        })
-    }
-
     /// The key that the page is to have, where one was given.
     pub(crate) fn token(&self) -> Option<&str> {
         self.token.as_deref()
@@ -184,22 +105,32 @@ impl Session {
         &self.id
     }
 
+    /// Holds locks as long as the session lasts.
+    pub fn holding(mut self, locks: Vec<WriterLock>) -> Self {
+        self.locks.extend(locks);
+        self
+    }
+
     fn state(&self) -> MutexGuard<'_, State> {
         locked(&self.state)
     }
 
     /// All that the page starts from.
     pub fn view(&self) -> SessionView {
-        let state = self.state();
+        let mut state = self.state();
+        let others = state.others();
         SessionView {
             id: self.id.clone(),
             label: state.label.clone(),
+            is_named: state.is_named,
+            others,
             images: state.image_ids().map(|id| state.image_view(id)).collect(),
             trial_pictures: state.trial_ids().map(|id| state.trial_picture_view(id)).collect(),
             model_path: self.model_path(&state).display().to_string(),
             models: state.model_views(),
             is_calibrated: state.max_opening_px.is_some(),
-            project: state.project.as_ref().map(|folder| folder.display().to_string()),
+            project: state.place.as_ref().map(ProjectPlace::shown),
+            can_close: false,
             notes: self.notes.clone(),
             camera: self.live.as_ref().map(|desk| desk.options.address.clone()),
         }
@@ -229,17 +160,10 @@ impl Session {
     /// # Errors
     /// An empty or endless name.
     pub fn set_label(&self, label: &str) -> Result<SessionView> {
-        let label = label.trim();
-        let count = label.chars().count();
-        if count == 0 || count > MAX_LABEL_CHARS || label.chars().any(char::is_control) {
-            return Err(Error::Request {
-                what: "name",
-                expected: format!("1 to {MAX_LABEL_CHARS} letters"),
-                found: if count > MAX_LABEL_CHARS { format!("{count}") } else { format!("{label:?}") },
-            });
-        }
+        let label = check_label(label)?;
         let mut state = self.state();
         label.clone_into(&mut state.label);
+        state.is_named = true;
         state.save_project()?;
         for id in state.image_ids().collect::<Vec<_>>() {
             if matches!(state.images[id].saved, Saved::Written { .. }) {
@@ -334,6 +258,7 @@ impl Session {
         sdg_files::write_atomically(&path, &bytes)?;
         let picture = Picture { name: file_name(&path), path, size: [frame.width(), frame.height()] };
         let id = state.add_image(picture, Marks::default())?;
+        self.settle_place(&mut state, id)?;
         state.save_project()?;
         Ok(state.image_view(id))
     }
@@ -395,6 +320,12 @@ impl Session {
             Ok(model_path)
         };
         self.teaching.start(Arc::clone(&self.teacher), request, material, keep)
+    }
+
+    /// # Errors
+    /// A teaching goes on.
+    pub(crate) fn check_idle(&self) -> Result<()> {
+        self.teaching.check_idle()
     }
 
     /// State of the teaching, for the page.

@@ -12,20 +12,24 @@ use crate::marks::Marks;
 use crate::model_versions::{ModelVersions, Version, fingerprint};
 use crate::names::file_name;
 use crate::picture::Picture;
-use crate::project_file::{ProjectFile, Tried, relative};
+use crate::project_file::{ProjectFile, ProjectPlace, Tried, relative};
 use crate::views::{ImageView, ModelView, Saved, TrialPictureView};
 
 /// The present label, the pictures of the object and the pictures to try, each numbered by its place; what is removed keeps its
 /// number. The versions of the model.
 pub struct State {
     pub label: String,
+    /// Whether the person, or marks that were there, gave the label; it is a proposal otherwise.
+    pub is_named: bool,
     pub images: Vec<MarkedPicture>,
     pub trial_pictures: Vec<TrialPicture>,
     pub models: ModelVersions,
-    /// The folder of a session that is a project.
-    pub project: Option<PathBuf>,
-    /// Names of pictures of that folder that were removed earlier.
+    /// Where all this is kept; `None` until there is a photo.
+    pub place: Option<ProjectPlace>,
+    /// Names of pictures of its folder that were removed earlier.
     pub removed_earlier: BTreeSet<String>,
+    /// Pictures of its folder that were offered, in the order in which they were first seen: [`State::others`].
+    pub offered: Vec<PathBuf>,
     /// How far the hand opens, where a camera tells.
     pub max_opening_px: Option<f64>,
 }
@@ -90,7 +94,10 @@ impl State {
         self.images[id].saved = match written {
             Ok(true) => Saved::Written { file: file_name(&self.images[id].file) },
             Ok(false) => Saved::Nothing,
-            Err(error) => Saved::Refused { why: error.to_string() },
+            Err(error) => {
+                let by_disk = matches!(error, Error::Write(_) | Error::File { .. });
+                Saved::Refused { why: error.to_string(), by_disk }
+            }
         };
     }
 
@@ -149,15 +156,16 @@ impl State {
         self.models.versions.iter().enumerate().map(view).collect()
     }
 
-    /// Writes the project's file, where the session is a project.
+    /// Writes the project's file, where there is a photo to be kept.
     ///
     /// # Errors
     /// A folder that cannot be written to.
     pub fn save_project(&self) -> Result<()> {
-        let Some(folder) = &self.project else { return Ok(()) };
+        let Some(place) = &self.place else { return Ok(()) };
+        let folder = &place.folder;
         let name = |picture: &Picture| relative(folder, &picture.path);
         let mut file = ProjectFile {
-            label: Some(self.label.clone()),
+            label: self.is_named.then(|| self.label.clone()),
             photos: self.image_ids().map(|id| name(&self.images[id].picture)).collect(),
             removed: self.removed_earlier.clone(),
             models: self.models.versions.clone(),
@@ -179,7 +187,7 @@ impl State {
         for there in file.photos.iter().chain(file.tried.iter().map(|tried| &tried.file)) {
             file.removed.remove(there);
         }
-        file.write(folder)
+        file.write(place)
     }
 }
 

@@ -21,6 +21,8 @@ pub enum Saved {
     Refused {
         /// One line for the person at the page.
         why: String,
+        /// Whether the file could not be written, so that the same marks may be saved later.
+        by_disk: bool,
     },
 }
 
@@ -83,6 +85,15 @@ pub struct ModelView {
     pub is_stale: bool,
 }
 
+/// A picture of the project's folder that is not in the project.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct OtherView {
+    /// Its index in the session.
+    pub id: usize,
+    /// Its file's name.
+    pub name: String,
+}
+
 /// What two versions found in one picture to try.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ComparedPicture {
@@ -103,6 +114,10 @@ pub struct SessionView {
     pub id: String,
     /// The object's name.
     pub label: String,
+    /// Whether somebody gave that name; it is a proposal otherwise.
+    pub is_named: bool,
+    /// Pictures of the folder that are not in the project.
+    pub others: Vec<OtherView>,
     /// The pictures of it.
     pub images: Vec<ImageView>,
     /// Pictures to try.
@@ -113,8 +128,10 @@ pub struct SessionView {
     pub models: Vec<ModelView>,
     /// Whether the camera of the photos is calibrated, so that the part's size is known.
     pub is_calibrated: bool,
-    /// The folder, where the session is a project.
+    /// The project: its folder, or the file of a photo's; `None` until there is a photo.
     pub project: Option<String>,
+    /// Whether the page can leave this project for another.
+    pub can_close: bool,
     /// What the person should know of the project; pictures that are gone.
     pub notes: Vec<String>,
     /// The camera's address, if there is one.

@@ -1,6 +1,7 @@
 //! One program for all tests of this folder: each links the whole crate.
 #![allow(clippy::unwrap_used)]
 
+mod folder;
 mod live;
 mod project;
 mod refusals;

@@ -116,7 +116,7 @@ fn remedy(cause: &(dyn std::error::Error + 'static)) -> Option<String> {
         };
     }
     #[cfg(feature = "annotate")]
-    if let Some(sdg_annotate::Error::EmptyProject { .. } | sdg_annotate::Error::NoCamera) = cause.downcast_ref() {
+    if let Some(sdg_annotate::Error::NoCamera) = cause.downcast_ref() {
         return Some("--from takes pictures with a camera".to_owned());
     }
     if let Some(ConfigError::BothHeads) = cause.downcast_ref() {

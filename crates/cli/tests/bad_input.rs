@@ -181,7 +181,7 @@ fn wrong_usage_is_exit_code_2() {
     for arguments in [
         vec![],
         vec!["fly"],
-        vec!["annotate"],
+        vec!["annotate", "--try", "photo.png"],
         vec!["annotate", "photo.png", "--preset", "huge"],
         vec!["annotate", "photo.png", "--port", "70000"],
         vec!["teach", "--out", "m.sdg"],

@@ -252,6 +252,64 @@ fn instance(label: &str, group: u32, x: f64) -> Vec<Value> {
     ]
 }
 
+/// The shipped photo turned by quarters, with its marks moved along by a share of their length, as LabelMe.
+fn write_turned(folder: &Path, name: &str, quarters: u32, along: f64) {
+    let demonstration = read_json(&shipped("pendulum", "annotation.json"));
+    let mut photo = image::open(shipped("pendulum", "image.png")).unwrap().into_rgb8();
+    let points = |kind: &str| {
+        let shapes = demonstration["shapes"].as_array().unwrap();
+        let points = &shapes.iter().find(|s| s["shape_type"] == kind || s["label"] == kind).unwrap()["points"];
+        points.as_array().unwrap().iter().map(|p| [p[0].as_f64().unwrap(), p[1].as_f64().unwrap()]).collect::<Vec<_>>()
+    };
+    let (mut corners, mut line) = (points("rectangle"), [points("grasp_start")[0], points("grasp_end")[0]]);
+    let by = [0, 1].map(|axis| along * (line[1][axis] - line[0][axis]));
+    for point in &mut line {
+        *point = [point[0] + by[0], point[1] + by[1]];
+    }
+    for _ in 0..quarters {
+        let height = f64::from(photo.height());
+        for point in corners.iter_mut().chain(&mut line) {
+            *point = [height - point[1], point[0]];
+        }
+        photo = image::imageops::rotate90(&photo);
+    }
+    let shapes = [
+        json!({"label": "pendulum", "shape_type": "rectangle", "points": corners, "group_id": 1}),
+        json!({"label": "grasp_start", "shape_type": "point", "points": [line[0]], "group_id": 1}),
+        json!({"label": "grasp_end", "shape_type": "point", "points": [line[1]], "group_id": 1}),
+    ];
+    let labels = json!({"imageWidth": photo.width(), "imageHeight": photo.height(), "shapes": shapes});
+    fs::write(folder.join(name).with_extension("json"), labels.to_string()).unwrap();
+    photo.save(folder.join(name)).unwrap();
+}
+
+#[test]
+fn labels_of_another_grasp_and_a_copy_of_the_taught_photo_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = teach(folder.path());
+    let pictures = folder.path().join("pictures");
+    fs::create_dir(&pictures).unwrap();
+    // Saved as JPEG under another name, it is the photo that the model was taught from all the same.
+    write_turned(&pictures, "copy.jpg", 0, 0.0);
+    for quarters in 1..4 {
+        write_turned(&pictures, &format!("turned-{quarters}.png"), quarters, 0.8);
+    }
+    let told = evaluate(&pictures, &model, &folder.path().join("report"), &[]);
+    assert_eq!(told["left_out"][0], json!({"file": "copy.jpg", "why": "the model was taught from it"}));
+    assert_eq!((&told["parts"], &told["found"], &told["wrong"]), (&json!(3), &json!(0), &json!(3)));
+    let offset = &told["label_offset"];
+    assert_eq!((&offset["agreeing"]["count"], &offset["totals"]["found"]["count"]), (&json!(3), &json!(3)), "{offset}");
+    let page = fs::read_to_string(told["report"].as_str().unwrap()).unwrap();
+    assert!(page.contains("The labels mark another grasp"));
+
+    // Labels of the taught grasp have no offset.
+    for quarters in 1..4 {
+        write_turned(&pictures, &format!("turned-{quarters}.png"), quarters, 0.0);
+    }
+    let evaluated = evaluate(&pictures, &model, &folder.path().join("report"), &[]);
+    assert_eq!((&evaluated["found"], &evaluated["label_offset"]), (&json!(3), &Value::Null));
+}
+
 #[test]
 fn wrong_folders_are_refused_with_what_was_expected() {
     let teaching = tempfile::tempdir().unwrap();

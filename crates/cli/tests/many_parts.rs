@@ -48,6 +48,10 @@ fn parts_that_look_alike_are_told() {
     }
     let page = fs::read_to_string(found["report"].as_str().unwrap()).unwrap();
     assert!(page.contains("3 parts taught") && page.contains("Which look alike"));
+    // Each part's photo is on it, beside what its model finds.
+    for part in ["lever", "rod_end", "twin"] {
+        assert!(page.contains(&format!("{part}: ")), "{part}");
+    }
     // What was taught was taken, its times too; with another seed it would not be.
     assert_eq!(record("twin"), twin);
     let text = stdout(&["teach", "--model", "S", "--demos", &demos, "--out", &out]);

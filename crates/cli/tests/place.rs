@@ -82,7 +82,7 @@ fn the_simulated_arm_puts_the_part_down_behind_a_wall_and_looks_where_it_lies() 
     assert!(dry.status.success() && told.contains("down softly until something is felt, about "), "{told}");
     assert!(told.ends_with("nothing was moved\n"), "{told}");
 
-    let done = sdg(&[&call[..], &["--json"]].concat());
+    let done = sdg(&[&call[..], &["--json", "--out", &out]].concat());
     let told = String::from_utf8(done.stderr).unwrap();
     assert!(done.status.success() && told.contains("beside its place in \"shelf\""), "{told}");
     let line: Value = serde_json::from_slice(&done.stdout).unwrap();
@@ -93,6 +93,9 @@ fn the_simulated_arm_puts_the_part_down_behind_a_wall_and_looks_where_it_lies() 
         assert!(pressed.as_f64().unwrap() < 10.0, "{line}");
     }
     assert!(!Path::new(&states).exists(), "nothing went wrong");
+    let picture = image::open(Path::new(&out).join("grasp.png")).unwrap().into_rgb8();
+    assert!(told.contains("grasp.png") && picture.dimensions() == (800, 600), "{told}");
+    assert!(picture.pixels().any(|pixel| pixel != picture.get_pixel(0, 0)), "the cell is on it");
 
     let args = [
         "rehearse",

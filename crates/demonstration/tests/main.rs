@@ -3,5 +3,7 @@
 
 mod formats;
 mod outlines;
+#[path = "outlines/shadows.rs"]
+mod shadows;
 #[path = "outlines/simulated_person.rs"]
 mod simulated_person;

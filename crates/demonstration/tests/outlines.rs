@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
+use crate::shadows::{self, Lamp};
 use crate::simulated_person;
-use sdg_demonstration::{Demonstration, propose_outline};
-use sdg_geometry::BoundingBox;
+use sdg_demonstration::{Demonstration, propose_outline, propose_outline_with};
+use sdg_geometry::{BoundingBox, Polygon};
 
 /// Measured on the paper's eight parts: 0.954 as drawn and 0.957 a tenth looser; least the thin fuel line, 0.905 and 0.889.
 /// OpenCV's grabCut, with its five rounds, reaches 0.960 and 0.956 on the same boxes. On all twelve: 0.954 and 0.955.
@@ -82,4 +83,67 @@ fn two_clicks_correct_an_outline() {
     println!("median overlap {overlap:.3}, median share near after two clicks {near:.3}");
     assert!(overlap >= MIN_MEDIAN_OVERLAP, "{overlap}");
     assert!(near >= MIN_NEAR, "{near}");
+}
+
+/// Shadows of one lamp after the other: their directions, lengths and depths differ.
+fn lamp(number: usize) -> Lamp {
+    let dark = [0.5, 0.4, 0.3, 0.2][number % 4];
+    let length = [0.15, 0.25, 0.35][number % 3];
+    Lamp { direction: 0.4 + 2.1 * number as f64, length, left: [dark, 1.1 * dark, 1.35 * dark] }
+}
+
+/// An outline has taken a shadow in where it holds so much of it, beside the part.
+const SHADOW_IN: f64 = 0.4;
+const PART_IN: f64 = 0.85;
+/// It is removed where the outline is as good as that of the same photo without the shadow: at most so much more of the place where the
+/// shadow falls, and at least so much of the overlap with the true outline.
+const SHADOW_OUT: f64 = 0.15;
+const OVERLAP_KEPT: f64 = 0.9;
+/// Issue 47: eight of ten.
+const MIN_REMOVED: f64 = 0.8;
+
+/// One click or one stroke of a simulated person removes a shadow. Measured: 28 of 35 each; without the look for shadows 12 and 20.
+/// The first fifteen pictures, which the constants were chosen on, are left out (21 of 23 each); some of those here were looked at, too,
+/// in darker shadows.
+#[test]
+fn one_click_or_one_stroke_removes_a_shadow() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/outlines");
+    let (mut cases, mut removed) = (0usize, [0usize, 0]);
+    for number in 15..41 {
+        let read = |extension: &str| std::fs::read(folder.join(format!("generated-{number:02}.{extension}"))).unwrap();
+        let Demonstration { image, annotation } = Demonstration::decode(&read("jpg"), &read("json"), None).unwrap();
+        let truth = annotation.outline.as_ref().unwrap();
+        let without = propose_outline(&image, &annotation.bbox);
+        let overlap = |outline: &Polygon| simulated_person::agreement(outline, truth, &image).iou;
+        for which in [number, number + 5] {
+            let shaded = shadows::cast(&image, truth, &lamp(which));
+            let [shadow_without, _] = shaded.shares(&without);
+            let before = propose_outline(&shaded.image, &shaded.bbox);
+            let [shadow_before, part_before] = shaded.shares(&before);
+            if shadow_before < SHADOW_IN || part_before < PART_IN {
+                continue;
+            }
+            cases += 1;
+            let after = [1, 15].map(|num_points| {
+                let stroke = simulated_person::stroke(&before, &shaded.part, &shaded.bbox, num_points).unwrap();
+                assert!(!stroke.is_inside);
+                let after = propose_outline_with(&shaded.image, &shaded.bbox, &[stroke]);
+                [shaded.shares(&after)[0], overlap(&after)]
+            });
+            for (removed, [shadow, overlap_after]) in removed.iter_mut().zip(&after) {
+                let is_out =
+                    *shadow <= shadow_without + SHADOW_OUT && *overlap_after >= OVERLAP_KEPT * overlap(&without);
+                *removed += usize::from(is_out);
+            }
+            println!(
+                "{number}: shadow {shadow_before:.2}, part {part_before:.2}; after a click, a stroke {after:.2?}; without {:.2}",
+                overlap(&without)
+            );
+        }
+    }
+    println!("of {cases} shadows a click removes {}, a stroke {}", removed[0], removed[1]);
+    assert!(cases >= 10, "{cases} outlines with a shadow");
+    for removed in removed {
+        assert!(removed as f64 >= MIN_REMOVED * cases as f64, "{removed} of {cases}");
+    }
 }

@@ -1,6 +1,6 @@
 //! Requests about marked pictures.
 
-use sdg_demonstration::OutlineClick;
+use sdg_demonstration::OutlineStroke;
 use sdg_geometry::BoundingBox;
 use serde::{Deserialize, Serialize};
 
@@ -32,20 +32,23 @@ pub fn answer(session: &Session, request: &Request, method: &str, id: usize, res
 struct BoxRequest {
     #[serde(rename = "box")]
     bbox: [f64; 4],
-    /// In the order in which they were made.
+    /// In the order in which they were drawn.
     #[serde(default)]
-    clicks: Vec<ClickRequest>,
+    strokes: Vec<StrokeRequest>,
 }
 
 #[derive(Deserialize)]
-struct ClickRequest {
-    at: [f64; 2],
-    /// Whether the place belongs to the part.
+struct StrokeRequest {
+    /// One for a click.
+    points: Vec<[f64; 2]>,
+    /// Whether what lies under them belongs to the part.
     is_inside: bool,
 }
 
-/// More clicks than any hand makes for one outline; each costs some milliseconds.
-const MAX_CLICKS: usize = 100;
+/// More strokes than any hand draws for one outline; each costs some milliseconds.
+const MAX_STROKES: usize = 100;
+/// More points than the page sends of a stroke.
+const MAX_POINTS: usize = 1000;
 
 #[derive(Serialize)]
 struct Proposal {
@@ -53,12 +56,13 @@ struct Proposal {
 }
 
 fn propose_outline(session: &Session, id: usize, body: &[u8]) -> Result<Proposal> {
-    let BoxRequest { bbox: [x1, y1, x2, y2], clicks } = read("box", body)?;
-    if clicks.len() > MAX_CLICKS {
+    let BoxRequest { bbox: [x1, y1, x2, y2], strokes } = read("box", body)?;
+    let most = strokes.iter().map(|stroke| stroke.points.len()).max().unwrap_or(0);
+    if strokes.len() > MAX_STROKES || most > MAX_POINTS {
         return Err(Error::Request {
-            what: "clicks",
-            expected: format!("at most {MAX_CLICKS}"),
-            found: clicks.len().to_string(),
+            what: "strokes",
+            expected: format!("at most {MAX_STROKES} of at most {MAX_POINTS} points"),
+            found: format!("{}, the longest of {most}", strokes.len()),
         });
     }
     let picture = session.picture(id)?;
@@ -67,8 +71,11 @@ fn propose_outline(session: &Session, id: usize, body: &[u8]) -> Result<Proposal
         expected: "two corners".into(),
         found: error.to_string(),
     })?;
-    let of = |ClickRequest { at, is_inside }| OutlineClick { at: at.into(), is_inside };
-    let clicks: Vec<_> = clicks.into_iter().map(of).collect();
-    let outline = outline::propose(&picture.pixels()?, &bbox, &clicks);
+    let of = |StrokeRequest { points, is_inside }| OutlineStroke {
+        points: points.into_iter().map(Into::into).collect(),
+        is_inside,
+    };
+    let strokes: Vec<_> = strokes.into_iter().map(of).collect();
+    let outline = outline::propose(&picture.pixels()?, &bbox, &strokes);
     Ok(Proposal { outline: outline.map(|outline| outline.vertices.into_iter().map(Into::into).collect()) })
 }

@@ -6,12 +6,18 @@
 //! | request | does |
 //! |---|---|
 //! | `GET /`, `/page/{file}` | the page |
-//! | `GET /api/session` | all that the page starts from |
+//! | `GET /api/session` | all that the page starts from; `{"start": …}` where no project is open yet |
+//! | `POST /api/projects?name=&photo=` | makes a project of this name with this photo, and opens it |
+//! | `POST /api/projects/{id}/open` | opens a project of those in `start` |
+//! | `DELETE /api/projects` | leaves the project that is open |
+//! | `GET /api/others/{id}/picture` | another picture of the project's folder |
+//! | `POST /api/others/{id}/photo`, `/api/others/{id}/try` | makes it a photo of the part, or a picture to try |
+//! | `POST /api/images?name=` | takes a photo of the part |
 //! | `PUT /api/label` | renames the object |
 //! | `GET /api/images/{id}/picture` | a marked picture |
 //! | `PUT /api/images/{id}/marks` | takes marks, writes them, says what they suffice for |
 //! | `DELETE /api/images/{id}`, `/api/trial-pictures/{id}` | takes the picture out of the session; its file stays |
-//! | `POST /api/images/{id}/outline` | proposes an outline from a box and places that belong to the part or do not; null where nothing stands out |
+//! | `POST /api/images/{id}/outline` | proposes an outline from a box and strokes over what belongs to the part or does not; null where nothing stands out |
 //! | `GET /api/images/{id}/samples/{n}?seed=` | a sample of the marks, as JPEG |
 //! | `GET`, `POST`, `DELETE /api/teaching` | news of the teaching; starts it; ends it with what there is |
 //! | `POST /api/trial-pictures?name=` | takes a picture to try |
@@ -32,6 +38,8 @@ mod detections;
 mod images;
 mod live;
 mod models;
+mod others;
+mod projects;
 mod trial_pictures;
 
 use serde::Deserialize;
@@ -39,6 +47,7 @@ use serde::Deserialize;
 pub use answers::broken;
 use answers::{json_of, read};
 
+use crate::desk::Desk;
 use crate::error::Result;
 use crate::http::{Request, Response};
 use crate::page;
@@ -54,25 +63,40 @@ const SESSION_HEADER: &str = "sdg-session";
 
 /// How long the body of a request to `path` may be.
 pub fn max_body_bytes(path: &str) -> usize {
-    if path == "/api/trial-pictures" { MAX_PICTURE_BYTES as usize } else { MAX_JSON_BYTES }
+    let takes_picture = ["/api/trial-pictures", "/api/images", "/api/projects"].contains(&path);
+    if takes_picture { MAX_PICTURE_BYTES as usize } else { MAX_JSON_BYTES }
 }
 
 /// Answers a request that the guard has let pass.
-pub fn answer(session: &Session, request: &Request) -> Response {
+pub fn answer(desk: &Desk, request: &Request) -> Response {
     let head = &request.head;
-    let no_such_address = || Response::plain(404, "there is nothing at this address\n");
-    if head.all(SESSION_HEADER).any(|id| id != session.id()) {
+    let session = desk.session();
+    if head.all(SESSION_HEADER).any(|id| session.as_ref().is_none_or(|session| id != session.id())) {
         return Response::plain(412, "the pictures' numbers are those of another session\n");
     }
     let Some(path) = head.path.strip_prefix('/') else { return no_such_address() };
     let path: Vec<&str> = path.split('/').collect();
     match (head.method.as_str(), path.as_slice()) {
-        ("GET", [""]) => Response::new(200, "text/html; charset=utf-8", page::INDEX.as_bytes()),
+        ("GET", [""]) => Response::new(200, "text/html; charset=utf-8", page::index().into_bytes()),
         ("GET", ["page", name]) => match page::file(name) {
-            Some((media_type, text)) => Response::new(200, media_type, text.as_bytes()),
+            Some((media_type, text)) => Response::new(200, media_type, text.into_bytes()),
             None => no_such_address(),
         },
-        ("GET", ["api", "session"]) => json_of(Ok(session.view())),
+        ("GET", ["api", "session"]) => json_of(desk.view()),
+        (_, ["api", "projects", rest @ ..]) => projects::answer(desk, request, rest).unwrap_or_else(no_such_address),
+        (_, path) => match session {
+            Some(session) => of_session(&session, request, path),
+            None => Response::plain(409, "no project is open yet\n"),
+        },
+    }
+}
+
+fn no_such_address() -> Response {
+    Response::plain(404, "there is nothing at this address\n")
+}
+
+fn of_session(session: &Session, request: &Request, path: &[&str]) -> Response {
+    match (request.head.method.as_str(), path) {
         ("PUT", ["api", "label"]) => json_of(rename(session, &request.body)),
         ("GET", ["api", "teaching"]) => json_of(Ok(session.teaching_news())),
         ("POST", ["api", "teaching"]) => {
@@ -87,10 +111,12 @@ pub fn answer(session: &Session, request: &Request) -> Response {
             models::answer(session, method, id, rest).unwrap_or_else(no_such_address)
         }
         (method, ["api", "live", rest @ ..]) => live::answer(session, method, rest).unwrap_or_else(no_such_address),
-        (method, ["api", kind @ ("images" | "trial-pictures"), id, rest @ ..]) => {
+        ("POST", ["api", "images"]) => json_of(others::upload(session, request)),
+        (method, ["api", kind @ ("images" | "trial-pictures" | "others"), id, rest @ ..]) => {
             let Ok(id) = id.parse::<usize>() else { return no_such_address() };
             let answered = match *kind {
                 "images" => images::answer(session, request, method, id, rest),
+                "others" => others::answer(session, method, id, rest),
                 _ => trial_pictures::answer(session, request, method, id, rest),
             };
             answered.unwrap_or_else(no_such_address)

@@ -30,10 +30,11 @@ impl Session {
         // The name is for people; the file's own is ours.
         let extension = if bytes.starts_with(b"\x89PNG") { "png" } else { "jpg" };
         let shown: String = name.rsplit(['/', '\\']).next().unwrap_or(name).chars().take(MAX_LABEL_CHARS).collect();
-        std::fs::create_dir_all(&self.uploads).map_err(Error::file(&self.uploads, "cannot make this folder"))?;
         // Held until the picture is written: the next one finds its name taken.
         let mut state = self.state();
-        let path = free_name(&self.uploads.join("picture"), &shown, extension);
+        let folder = self.uploads(&state);
+        std::fs::create_dir_all(&folder).map_err(Error::file(&folder, "cannot make this folder"))?;
+        let path = free_name(&folder.join("picture"), &shown, extension);
         sdg_files::write_atomically(&path, bytes)?;
         let picture = Picture::open(&path).map_err(|error| {
             // What is no picture is not kept.
@@ -129,9 +130,8 @@ impl Session {
         if state.became(trial_id).is_some() {
             return Err(Error::Busy("this picture is a demonstration already"));
         }
-        let is_in_project = state.project.is_some();
         let mut picture = trial.picture;
-        if trial.uploaded || (is_in_project && picture.path.parent() == Some(&self.uploads)) {
+        if trial.uploaded || picture.path.parent() == Some(&self.uploads(&state)) {
             let extension = picture.path.extension().unwrap_or_default().to_string_lossy();
             let target = free_name(&self.home, &picture.name, &extension);
             let bytes = std::fs::read(&picture.path).map_err(Error::file(&picture.path, "cannot read"))?;
@@ -142,6 +142,7 @@ impl Session {
         let id = state.add_image(picture, marks)?;
         state.trial_pictures[trial_id].became = Some(id);
         state.trial_pictures[trial_id].is_absent = false;
+        self.settle_place(&mut state, id)?;
         state.save(id);
         state.save_project()?;
         Ok(state.image_view(id))

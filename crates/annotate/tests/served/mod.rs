@@ -11,8 +11,8 @@ use std::time::Duration;
 
 use image::{Rgb, RgbImage};
 use sdg_annotate::{
-    FoundGrasp, GraspTeacher, LiveOptions, LivePictures, Server, Session, SessionOptions, TaughtModel, TaughtSummary,
-    TeachRequest, TeacherError, TeachingMaterial, TeachingStep,
+    FoundGrasp, GraspTeacher, LiveOptions, LivePictures, RecentProjects, Server, Session, SessionOptions, Start,
+    TaughtModel, TaughtSummary, TeachRequest, TeacherError, TeachingMaterial, TeachingStep,
 };
 use sdg_demonstration::Demonstration;
 use sdg_geometry::{GraspLine, PlanarGrasp};
@@ -171,6 +171,25 @@ impl Served {
         Self::open(folder, options, PATIENCE)
     }
 
+    /// A server on the photo of a folder, as a photo is opened.
+    pub fn of_photo(folder: tempfile::TempDir, name: &str) -> Self {
+        let images = vec![(folder.path().join(name), None)];
+        Self::open(folder, SessionOptions { images, ..SessionOptions::default() }, PATIENCE)
+    }
+
+    /// A server without a project, whose new ones are made in the folder.
+    pub fn of_start(folder: tempfile::TempDir) -> Self {
+        let recent = RecentProjects::at(folder.path().join("state/recent.json"));
+        let noted = recent.clone();
+        let open = move |path: &std::path::Path| {
+            let options = SessionOptions { project: Some(path.to_owned()), ..SessionOptions::default() };
+            noted.note(path)?;
+            Ok(Session::open(&options, Arc::new(InPlace))?)
+        };
+        let start = Start { recent, folder: folder.path().to_owned(), open: Box::new(open) };
+        Self::serve(folder, Server::bind_start(start, 0, None).unwrap())
+    }
+
     /// Ends the server and gives its folder back.
     pub fn end(mut self) -> tempfile::TempDir {
         let folder = std::mem::replace(&mut self.folder, tempfile::tempdir().unwrap());
@@ -188,7 +207,10 @@ impl Served {
 
     fn open(folder: tempfile::TempDir, options: SessionOptions, patience: Duration) -> Self {
         let session = Session::open(&options, Arc::new(InPlace)).unwrap();
-        let server = Server::bind(session, 0).unwrap().with_patience(patience);
+        Self::serve(folder, Server::bind(session, 0).unwrap().with_patience(patience))
+    }
+
+    fn serve(folder: tempfile::TempDir, server: Server) -> Self {
         let url = server.url();
         let (address, token) = url.split_once("/?token=").unwrap();
         let (port, token) = (address.rsplit(':').next().unwrap().parse().unwrap(), token.to_owned());

@@ -72,7 +72,7 @@ pub struct GraspArgs {
     /// Drive a real arm from a thread that the kernel may delay; for simulated ones
     #[arg(long)]
     pub no_realtime: bool,
-    /// Folder for what --dry-run draws
+    /// Folder for what --dry-run draws, and for grasp.png, the cell after a simulated grasp
     #[arg(long, value_name = "DIR", default_value = "dry-run")]
     pub out: PathBuf,
     /// Where the arm's last second is written after an error, as CSV
@@ -161,7 +161,7 @@ fn prepare(args: &GraspArgs) -> Result<Prepared> {
 /// Grasps with an arm in MuJoCo.
 #[cfg(feature = "simulation")]
 fn simulated(args: &GraspArgs, prepared: &Prepared, interrupt: &Interrupt) -> Result<Outcome> {
-    use sdg_simulation::WorkcellConfig;
+    use sdg_simulation::{RenderConfig, WorkcellConfig};
 
     let Address::Sim(text) = &args.from else {
         let found = &args.from;
@@ -180,7 +180,15 @@ fn simulated(args: &GraspArgs, prepared: &Prepared, interrupt: &Interrupt) -> Re
         fingertip_beyond_tcp_m: sdg_simulation::FINGERTIP_BEYOND_TCP_M,
         ..prepared.workcell.safety_limits()
     };
-    attempt(args, prepared, &mut cell, limits, sdg_evaluation::SimulatedPictures, interrupt, None)
+    let outcome = attempt(args, prepared, &mut cell, limits, sdg_evaluation::SimulatedPictures, interrupt, None)?;
+    if matches!(outcome, Outcome::Done) && !args.dry_run {
+        sdg_files::prepare_folder(&args.out)?;
+        let path = args.out.join("grasp.png");
+        let render = RenderConfig { width: 800, height: 600, ..RenderConfig::default() };
+        sdg_files::write_png(&path, &cell.scene_image(render)?)?;
+        eprintln!("the cell after it: {}", path.display());
+    }
+    Ok(outcome)
 }
 
 #[cfg(not(feature = "simulation"))]
@@ -274,9 +282,9 @@ fn print_report(args: &GraspArgs, prepared: &Prepared, ended: &Ended, secs: f64,
     match (failed, &prepared.place) {
         (None, None) => {
             let width_mm = grasp.closed.map_or(f64::NAN, |hand| hand.opening_m * 1e3);
-            eprintln!(
-                "the part is held, {width_mm:.0} mm between the fingers ({secs:.1} s); sdg robot open lets it go"
-            );
+            // A simulated arm ends with the program.
+            let then = if robot == "sim" { "" } else { "; sdg robot open lets it go" };
+            eprintln!("the part is held, {width_mm:.0} mm between the fingers ({secs:.1} s){then}");
             Ok(Outcome::Done)
         }
         (None, Some((goal, _))) => {

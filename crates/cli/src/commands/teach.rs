@@ -4,7 +4,7 @@ use std::fmt::Display;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use anyhow::Result;
 use clap::Args as ClapArgs;
@@ -145,6 +145,7 @@ pub(super) fn teach_to_file(
 
 /// Checks everything that can be wrong before it starts to take minutes.
 pub fn run(args: &TeachArgs) -> Result<Outcome> {
+    let started = Instant::now();
     let mut options = options(args)?;
     let files = TeachingFiles {
         demonstrations: &demonstrations::pairs(&args.demonstrations)?,
@@ -200,6 +201,7 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
             "out": args.out.display().to_string(),
             "bytes": bytes.len(),
             "teach_seconds": facts.seconds,
+            "seconds": started.elapsed().as_secs_f64(),
             "teaching": facts,
             "held_back": figures.to_json(),
             "failure": failure,
@@ -208,7 +210,10 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
         });
         println!("{}", json_line(&line)?);
     } else {
-        println!("taught \"{}\" in {:.1} s{}", taught.model.object(), facts.seconds, taught_words::training(&taught));
+        // What a person waits for, not the teaching alone.
+        let (seconds, training) = (started.elapsed().as_secs_f64(), taught_words::training(&taught));
+        let object = taught.model.object();
+        println!("taught \"{object}\" in {seconds:.1} s, of which the teaching took {:.1} s{training}", facts.seconds);
         println!("{}", figures.in_words());
         let tolerance = taught.model.size_tolerance();
         println!("looks for it at {} to {} times its size in the photo", tolerance.start(), tolerance.end());

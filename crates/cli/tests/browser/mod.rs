@@ -3,10 +3,12 @@
 //! Needs Chromium, and axe-core from npm in target/browser-test: `make test-browser` installs both. Screenshots are kept in
 //! target/browser-test.
 
+mod corrections;
 mod drawn;
 mod keyboard;
 mod live;
 pub(crate) mod page;
 mod photo_to_grasp;
 mod project;
+mod projects;
 mod small_screen;

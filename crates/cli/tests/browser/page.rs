@@ -57,6 +57,13 @@ impl Page {
         self.server.wait().unwrap();
     }
 
+    /// As on a full disk, no file can be written; or they can again.
+    pub fn fill_disk(&self, is_full: bool) {
+        let limit = if is_full { "--fsize=0:unlimited" } else { "--fsize=unlimited:unlimited" };
+        let status = Command::new("prlimit").args(["--pid", &self.server.id().to_string(), limit]).status();
+        assert!(status.unwrap().success(), "prlimit of Debian's util-linux");
+    }
+
     /// Starts it again with the same arguments.
     pub fn start_server(&mut self) {
         (self.server, self.url) = serve(&self.folder, &self.arguments);
@@ -174,12 +181,15 @@ pub fn assert_accessible(browser: &Browser, about: &str) {
 }
 
 fn serve(folder: &TempDir, arguments: &[String]) -> (Child, String) {
-    let mut server = Command::new(env!("CARGO_BIN_EXE_sdg"))
+    // A file larger than a test allows is then an error, as on a full disk, instead of the program's end.
+    let mut server = Command::new("sh")
+        .args(["-c", "trap '' XFSZ; exec \"$0\" \"$@\"", env!("CARGO_BIN_EXE_sdg")])
         .args(["annotate", "--no-browser", "--json"])
         .args(arguments)
         .current_dir(folder.path())
         // It is ended without a word, and what it keeps for the session goes with the folder.
         .env("TMPDIR", folder.path())
+        .env("XDG_STATE_HOME", folder.path().join("state"))
         .stdout(Stdio::piped())
         .spawn()
         .unwrap();

@@ -18,6 +18,14 @@ const MIN_SHADED_WEIGHT: f32 = 0.05;
 const DARKEST_SHADE: f32 = 0.5;
 /// Variance of hue in a shadow, beyond that in the light: other lamps reach into it.
 const SHADE_VARIANCE: f32 = 0.3;
+/// The same where a person said that it is a shadow.
+const DARKEST_SHADE_SAID: f32 = 0.3;
+/// What is hardly darker than the surroundings is no shadow.
+const BRIGHTEST_SAID: f32 = 0.92;
+/// Other light in a shadow that a person pointed out moves a* and b* by at most so much.
+const MAX_TINT: f32 = 14.0;
+/// Variance beside that of the colours in the light, in a shadow that a person pointed out: its depth and tint change from place to place.
+const SAID_VARIANCE: f32 = 0.8;
 /// L* of a colour of no light, in units in which a shadow scales L*, a* and b* alike.
 const BLACK: f32 = 16.0;
 
@@ -72,6 +80,30 @@ impl Component {
         };
         off(1) + off(2) < EXPLAINED
     }
+
+    /// Whether the colour lies between this one and this one in the shadow.
+    fn explains_under(&self, color: &Vector3<f32>, shade: &Shade) -> bool {
+        if self.weight < MIN_SHADED_WEIGHT {
+            return false;
+        }
+        let black = Vector3::new(-BLACK, 0.0, 0.0);
+        let lit = self.mean;
+        let dark = (lit - black) * shade.factor + black + Vector3::new(0.0, shade.tint[0], shade.tint[1]);
+        let way = dark - lit;
+        // A shadow is a little darker than where it was pointed out, too.
+        let along = ((color - lit).dot(&way) / way.norm_squared().max(1.0)).clamp(0.0, 1.15);
+        let off = color - (lit + way * along);
+        let scale = 1.0 - along * (1.0 - shade.factor.min(1.0));
+        let covariance = self.covariance * (scale * scale) + Matrix3::identity() * SAID_VARIANCE;
+        covariance.try_inverse().is_some_and(|precision| off.dot(&(precision * off)) < EXPLAINED)
+    }
+}
+
+/// What a shadow does to a colour: L* above [`BLACK`], a* and b* are scaled, and a* and b* moved by the other light in the shadow.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Shade {
+    factor: f32,
+    tint: [f32; 2],
 }
 
 /// Mean and covariance.
@@ -150,6 +182,25 @@ impl ColorMixture {
     pub fn explains(&self, color: &Lab) -> bool {
         let color = vector(color);
         self.components.iter().any(|component| component.distance_squared(&color) < EXPLAINED)
+    }
+
+    /// The shadow in which one of the colours learnt from looks like this one: the Gaussian that needs the least tint for it.
+    pub fn shade_of(&self, color: &Lab) -> Option<Shade> {
+        let color = vector(color);
+        let shades =
+            self.components.iter().filter(|component| component.weight >= MIN_SHADED_WEIGHT).map(|component| {
+                let factor = (color.x + BLACK) / (component.mean.x + BLACK);
+                Shade { factor, tint: [1, 2].map(|axis| color[axis] - factor * component.mean[axis]) }
+            });
+        let possible = shades.filter(|shade| (DARKEST_SHADE_SAID..BRIGHTEST_SAID).contains(&shade.factor));
+        let tint = |shade: &Shade| shade.tint[0].hypot(shade.tint[1]);
+        possible.filter(|shade| tint(shade) <= MAX_TINT).min_by(|a, b| tint(a).total_cmp(&tint(b)))
+    }
+
+    /// Whether the colour is one of those learnt from in this shadow, or in less of it.
+    pub fn explains_under(&self, color: &Lab, shade: &Shade) -> bool {
+        let color = vector(color);
+        self.components.iter().any(|component| component.explains_under(&color, shade))
     }
 
     /// Whether the colour is one of those learnt from in a shadow.

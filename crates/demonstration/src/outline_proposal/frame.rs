@@ -4,10 +4,10 @@ use image::{RgbImage, imageops};
 use nalgebra::Point2;
 use sdg_geometry::{BoundingBox, Mask, Polygon};
 
-use super::click::{Click, OutlineClick};
 use super::color_mixture::ColorMixture;
 use super::lab::Lab;
 use super::minimal_cut::{self, Edges, minimal_cut};
+use super::stroke::{OutlineStroke, Stroke};
 
 /// Surroundings around the box, as a share of its longer side …
 const MARGIN_SHARE: f64 = 0.2;
@@ -85,13 +85,29 @@ impl Frame {
         self.colors.len() / self.width
     }
 
-    /// The click in pixels of the frame; `None` beside the box.
-    pub fn click(&self, click: &OutlineClick) -> Option<Click> {
-        let x = (click.at.x - self.origin[0]) / self.scale[0];
-        let y = (click.at.y - self.origin[1]) / self.scale[1];
-        let lies_in = (0.0..self.width as f64).contains(&x) && (0.0..self.height() as f64).contains(&y);
-        let click = lies_in.then_some(Click { x: x as usize, y: y as usize, is_inside: click.is_inside })?;
-        self.candidates[click.y * self.width + click.x].then_some(click)
+    /// The stroke in pixels of the frame, as far as it runs in the box; `None` beside the box.
+    pub fn stroke(&self, stroke: &OutlineStroke) -> Option<Stroke> {
+        let in_frame = |at: &Point2<f64>| {
+            Point2::new((at.x - self.origin[0]) / self.scale[0], (at.y - self.origin[1]) / self.scale[1])
+        };
+        let points: Vec<_> = stroke.points.iter().map(in_frame).collect();
+        let mut pixels = Vec::new();
+        let (first, last) = (points.first()?, points.last()?);
+        for (from, to) in points.iter().zip(points.iter().skip(1)).chain([(first, first), (last, last)]) {
+            // Two steps a pixel leave none out.
+            let steps = (2.0 * (to - from).norm()).ceil().min(2.0 * (self.width + self.height()) as f64) as usize;
+            for step in 0..=steps {
+                let at = from + (to - from) * (step as f64 / steps.max(1) as f64);
+                let lies_in = (0.0..self.width as f64).contains(&at.x) && (0.0..self.height() as f64).contains(&at.y);
+                let pixel = if lies_in { at.y as usize * self.width + at.x as usize } else { continue };
+                if self.candidates[pixel] {
+                    pixels.push(pixel);
+                }
+            }
+        }
+        pixels.sort_unstable();
+        pixels.dedup();
+        (!pixels.is_empty()).then_some(Stroke { pixels, is_inside: stroke.is_inside })
     }
 
     pub fn mask(&self, in_part: &[bool]) -> Mask {
@@ -136,6 +152,21 @@ impl Frame {
             mixtures = Some([part, surroundings]);
         }
         Some(in_part)
+    }
+
+    /// The share of the border of the marked pixels that runs along edges of the picture, in [0, 1].
+    pub fn share_along_edges(&self, marked: &[bool]) -> f64 {
+        let (width, height) = (self.width, self.height());
+        let (mut length, mut along_edges) = (0.0, 0.0);
+        for at in 0..marked.len() {
+            let right = at % width + 1 < width && marked[at] != marked[at + 1];
+            let below = at / width + 1 < height && marked[at] != marked[at + width];
+            for _ in 0..usize::from(right) + usize::from(below) {
+                length += 1.0;
+                along_edges += f64::from(self.edges.strength(at));
+            }
+        }
+        along_edges / f64::max(length, 1.0)
     }
 
     /// The colours of the marked pixels, and those of the others.

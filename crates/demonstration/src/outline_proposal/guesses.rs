@@ -93,7 +93,7 @@ fn lightness_threshold(frame: &Frame) -> f32 {
 /// How well the largest piece of a cut suits what a person meant with the box: the share of its border that runs along edges of
 /// the picture, in [0, 1], less what it leaves empty of the box. With that piece.
 fn score(frame: &Frame, cut: &[bool]) -> Option<(f64, Vec<bool>)> {
-    let (width, height) = (frame.width, frame.height());
+    let width = frame.width;
     let piece = pieces(cut, width).into_iter().max_by_key(Vec::len)?;
     let mut part = vec![false; cut.len()];
     piece.iter().for_each(|&at| part[at] = true);
@@ -109,14 +109,5 @@ fn score(frame: &Frame, cut: &[bool]) -> Option<(f64, Vec<bool>)> {
         [(from - low) / side, (high - to) / side]
     });
     let gap = gaps.fold(0.0, f64::max);
-    let (mut length, mut along_edges) = (0.0, 0.0);
-    for at in 0..part.len() {
-        let right = at % width + 1 < width && part[at] != part[at + 1];
-        let below = at / width + 1 < height && part[at] != part[at + width];
-        for _ in 0..usize::from(right) + usize::from(below) {
-            length += 1.0;
-            along_edges += f64::from(frame.edges.strength(at));
-        }
-    }
-    Some((along_edges / f64::max(length, 1.0) - GAP_COST * (gap - MAX_GAP).max(0.0), part))
+    Some((frame.share_along_edges(&part) - GAP_COST * (gap - MAX_GAP).max(0.0), part))
 }

@@ -8,7 +8,7 @@
 //!         ├─▶ two ColorMixtures ─ evidence of each pixel ─ minimal_cut ─┐   a few rounds for each guess
 //!         └───────────────────────────◀─────────────────────────────────┤
 //!              the largest piece that runs along edges and reaches the box ─ outer_outline ─ Polygon
-//! clicks ─ the pieces of the picture that they mean stay on their side while what is around them is cut again
+//! strokes ─ the pieces of the picture that they mean stay on their side while what is around them is cut again
 //! ```
 //!
 //! The energy is that of GrabCut (Rother, Kolmogorov, Blake 2004): how badly each pixel's colour suits its side, and the
@@ -20,21 +20,21 @@
 //!
 //! Absent: any knowledge of parts, and randomness. The same photo and box give the same outline.
 
-mod click;
-mod clicks;
 mod color_mixture;
 mod frame;
 mod guesses;
 mod lab;
 mod minimal_cut;
 mod pieces;
+mod stroke;
+mod strokes;
 
 use image::RgbImage;
 use sdg_geometry::{BoundingBox, Polygon, outer_outline};
 
-pub use click::OutlineClick;
-use clicks::Correction;
 use frame::Frame;
+pub use stroke::OutlineStroke;
+use strokes::Correction;
 
 /// Pixels of the frame that is cut; larger ones are shrunk. Bounds the time.
 const MAX_PIXELS: f64 = 60_000.0;
@@ -53,13 +53,13 @@ pub fn propose_outline(image: &RgbImage, bbox: &BoundingBox) -> Polygon {
     propose_outline_with(image, bbox, &[])
 }
 
-/// The same, corrected by clicks, in the order in which they were made: each means the piece of the picture that it lies on. Clicks
+/// The same, corrected by strokes, in the order in which they were drawn: each means the piece of the picture that it lies on. Strokes
 /// outside the box count for nothing.
-pub fn propose_outline_with(image: &RgbImage, bbox: &BoundingBox, clicks: &[OutlineClick]) -> Polygon {
+pub fn propose_outline_with(image: &RgbImage, bbox: &BoundingBox, strokes: &[OutlineStroke]) -> Polygon {
     let inside = bbox.clip(f64::from(image.width()), f64::from(image.height()));
     let nothing_found = || Polygon::from_box(&if inside.area() > 0.0 { inside } else { *bbox });
     let Some(frame) = Frame::cut_out(image, &inside, MAX_PIXELS) else { return nothing_found() };
-    let Some(in_part) = segment(&frame, clicks) else { return nothing_found() };
+    let Some(in_part) = segment(&frame, strokes) else { return nothing_found() };
     let Some(outline) = outer_outline(&frame.mask(&in_part)) else { return nothing_found() };
     // Pieces of the mask reach the edges of whole pixels, the box may lie within one.
     let outline = frame.in_photo(&outline, &inside);
@@ -71,15 +71,15 @@ pub fn propose_outline_with(image: &RgbImage, bbox: &BoundingBox, clicks: &[Outl
 }
 
 /// The part's pixels; `None` where nothing stands out.
-fn segment(frame: &Frame, clicks: &[OutlineClick]) -> Option<Vec<bool>> {
+fn segment(frame: &Frame, strokes: &[OutlineStroke]) -> Option<Vec<bool>> {
     let found = guesses::likeliest_cut(frame, ROUNDS);
-    let clicks: Vec<_> = clicks.iter().filter_map(|click| frame.click(click)).collect();
-    if clicks.is_empty() {
+    let strokes: Vec<_> = strokes.iter().filter_map(|stroke| frame.stroke(stroke)).collect();
+    if strokes.is_empty() {
         return found;
     }
-    // Without anything that stands out, what was clicked does.
+    // Without anything that stands out, what a stroke means does.
     let mut correction = Correction::new(frame, found.unwrap_or_else(|| vec![false; frame.colors.len()]));
-    clicks.iter().for_each(|click| correction.apply(click));
+    strokes.iter().for_each(|stroke| correction.apply(stroke));
     Some(correction.in_part)
 }
 

@@ -1,7 +1,9 @@
-//! A person who clicks where a proposed outline is wrong: into the widest part of the largest wrong piece.
+//! A person who corrects a proposed outline: with a click into the widest part of the largest wrong piece, or with a stroke along it.
 
-use nalgebra::Point2;
-use sdg_demonstration::{OutlineClick, propose_outline_with};
+use std::collections::HashSet;
+
+use nalgebra::{Matrix2, Point2, SymmetricEigen};
+use sdg_demonstration::{OutlineStroke, propose_outline_with};
 use sdg_geometry::{BoundingBox, Mask, Polygon};
 
 use image::RgbImage;
@@ -31,22 +33,47 @@ pub fn agreement(proposed: &Polygon, truth: &Polygon, image: &RgbImage) -> Agree
 
 /// The outlines after no, one, two … clicks.
 pub fn outlines(image: &RgbImage, bbox: &BoundingBox, truth: &Polygon, num_clicks: usize) -> Vec<Polygon> {
-    let (width, height) = image.dimensions();
-    let truth = truth.rasterize(width, height);
+    let truth = truth.rasterize(image.width(), image.height());
     let mut clicks = Vec::new();
     let mut outlines = vec![propose_outline_with(image, bbox, &clicks)];
     for _ in 0..num_clicks {
-        let proposed = outlines[outlines.len() - 1].rasterize(width, height);
-        let Some(place) = widest_of_largest_error(&proposed, &truth, bbox) else { break };
-        let at = Point2::new(f64::from(place[0]) + 0.5, f64::from(place[1]) + 0.5);
-        clicks.push(OutlineClick { at, is_inside: truth.get(place[0], place[1]) });
+        let Some(click) = stroke(&outlines[outlines.len() - 1], &truth, bbox, 1) else { break };
+        clicks.push(click);
         outlines.push(propose_outline_with(image, bbox, &clicks));
     }
     outlines
 }
 
-/// The pixel that is farthest from the border of the largest connected wrong piece of one kind.
-fn widest_of_largest_error(proposed: &Mask, truth: &Mask, bbox: &BoundingBox) -> Option<[u32; 2]> {
+/// A stroke of so many points along the largest wrong piece, through its widest part; of one point, a click there.
+pub fn stroke(proposed: &Polygon, truth: &Mask, bbox: &BoundingBox, num_points: usize) -> Option<OutlineStroke> {
+    let proposed = proposed.rasterize(truth.width(), truth.height());
+    let (place, piece) = widest_of_largest_error(&proposed, truth, bbox)?;
+    let at = |[x, y]: [u32; 2]| Point2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
+    let is_inside = truth.get(place[0], place[1]);
+    let middle = at(place);
+    // Along the piece: towards where most of it lies from its widest part, on both sides, as far as the piece goes.
+    let scatter = piece.iter().map(|&pixel| at(pixel) - middle).map(|off| off * off.transpose()).sum::<Matrix2<f64>>();
+    let eigen = SymmetricEigen::new(scatter);
+    let along = eigen.eigenvectors.column(eigen.eigenvalues.imax()).into_owned();
+    let lies_in = |point: &Point2<f64>| piece.contains(&[point.x as u32, point.y as u32]);
+    let steps = |towards: f64| (0..).map(move |step| middle + along * (towards * f64::from(step))).take_while(lies_in);
+    let mut line: Vec<Point2<f64>> = steps(-1.0).collect();
+    line.reverse();
+    line.extend(steps(1.0).skip(1));
+    // Not to the very rim, as people do.
+    let rim = line.len() / 6;
+    let line = &line[rim..line.len() - rim];
+    let points = match num_points {
+        1 => vec![middle],
+        _ => (0..num_points).map(|i| line[i * (line.len() - 1) / (num_points - 1)]).collect(),
+    };
+    Some(OutlineStroke { points, is_inside })
+}
+
+type Pixel = [u32; 2];
+
+/// The largest connected wrong piece of one kind, after its pixel that is farthest from its border.
+fn widest_of_largest_error(proposed: &Mask, truth: &Mask, bbox: &BoundingBox) -> Option<(Pixel, HashSet<Pixel>)> {
     let (width, height) = (truth.width(), truth.height());
     let kind = |x: u32, y: u32| {
         let lies_in = bbox.contains(&Point2::new(f64::from(x) + 0.5, f64::from(y) + 0.5));
@@ -81,6 +108,8 @@ fn widest_of_largest_error(proposed: &Mask, truth: &Mask, bbox: &BoundingBox) ->
         }
     }
     // Peeled layer by layer: the last pixel left is the widest place.
+    let place = |at: usize| [(at % width as usize) as u32, (at / width as usize) as u32];
+    let piece = largest.iter().map(|&at| place(at)).collect();
     let mut left = vec![false; kinds.len()];
     largest.iter().for_each(|&at| left[at] = true);
     let mut layer = largest;
@@ -94,7 +123,7 @@ fn widest_of_largest_error(proposed: &Mask, truth: &Mask, bbox: &BoundingBox) ->
         rim.iter().for_each(|&at| left[at] = false);
         layer = inner;
     }
-    Some([(widest % width as usize) as u32, (widest / width as usize) as u32])
+    Some((place(widest), piece))
 }
 
 fn neighbours(at: usize, width: usize, count: usize) -> Vec<usize> {

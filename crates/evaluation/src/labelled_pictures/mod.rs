@@ -12,6 +12,7 @@
 //! detection to one instance. A picture that the model was taught from is no test and is left out.
 
 mod folder;
+mod label_offset;
 mod page;
 mod picture;
 mod records;
@@ -21,6 +22,7 @@ mod taught;
 mod truth_file;
 
 pub use folder::LabelledFolder;
+pub use label_offset::{LabelOffset, label_offset};
 pub use page::{in_words, page};
 pub use picture::{Instance, LabelledPicture};
 pub use records::{Evaluated, by_kind_json, by_min_score, to_json};

@@ -11,6 +11,7 @@ use sdg_report::{
     Tone, draw_box, draw_grasp_jaws, draw_keypoints, draw_label, draw_line, draw_polygon,
 };
 
+use super::label_offset::{LabelOffset, label_offset};
 use super::records::Evaluated;
 use super::score::{HitError, Judged, Outcome, Tested, Totals, sweep};
 use crate::footer::FOOTER;
@@ -50,7 +51,7 @@ pub fn page(evaluated: &Evaluated, command: &str) -> Result<Report> {
         report = report.key_figure(key_figure);
     }
     report = report
-        .section(at_a_glance(&totals))
+        .section(at_a_glance(&totals, label_offset(&evaluated.tested, evaluated.min_score).as_ref()))
         .section(
             Section::new("The least score")
                 .lead("The same detections, counted with other limits.")
@@ -115,7 +116,7 @@ fn key_figures(totals: &Totals) -> Vec<KeyFigure> {
     figures
 }
 
-fn at_a_glance(totals: &Totals) -> Section {
+fn at_a_glance(totals: &Totals, offset: Option<&LabelOffset>) -> Section {
     let quiet = Share { count: totals.false_alarms.of - totals.false_alarms.count, of: totals.false_alarms.of };
     let rows = [("parts found", totals.found), ("pictures clean", totals.clean), ("quiet without the part", quiet)];
     let mut chart = ShareChart::new("Found, clean and quiet");
@@ -127,6 +128,10 @@ fn at_a_glance(totals: &Totals) -> Section {
     let mut section = Section::new("At a glance")
         .lead("A picture is clean when something on it is right and nothing is wrong.")
         .shares(chart);
+    if let Some(offset) = offset {
+        let words = offset.in_words();
+        section = section.notice(Tone::Warning, format!("T{}.", &words[1..]));
+    }
     if totals.optional.of > 0 {
         section = section
             .paragraph(format!("Optional instances, which are neither missed nor wrong: {} found.", totals.optional));

@@ -6,6 +6,7 @@ use sdg_geometry::BoundingBox;
 use sdg_grasp::{DetectionRecord, GraspModel, ModelKind, Verification};
 use serde_json::{Value, json};
 
+use super::label_offset::label_offset;
 use super::picture::LeftOut;
 use super::score::{Hit, Judged, Tested, Totals, TrueGrasp, by_kind, judge, sweep};
 
@@ -63,6 +64,7 @@ pub fn to_json(evaluated: &Evaluated, report: &Path) -> Value {
         "false_alarms": totals.false_alarms.count,
         "pictures_without_part": totals.false_alarms.of,
         "errors": totals.errors,
+        "label_offset": label_offset(&evaluated.tested, evaluated.min_score),
         "pictures": pictures,
         "by_kind": by_kind_json(&tested, evaluated.min_score),
         "by_min_score": by_min_score(&tested),

@@ -16,9 +16,9 @@ use super::picture::{Instance, LabelledPicture};
 use crate::statistics::Share;
 
 /// A hit lies at most so far from the instance's marks, in diagonals of the instance.
-const MAX_DISTANCE_DIAGONALS: f64 = 0.04;
+pub(super) const MAX_DISTANCE_DIAGONALS: f64 = 0.04;
 /// A hit is turned against the instance's marks by at most so much.
-const MAX_ANGLE_DEG: f64 = 10.0;
+pub(super) const MAX_ANGLE_DEG: f64 = 10.0;
 /// A detection is on an optional instance without a grasp when their boxes overlap so much.
 const SAME_PART_IOU: f64 = 0.5;
 /// Steps of the least score at which everything is counted again.

@@ -2,6 +2,7 @@
 
 use sdg_grasp::Verification;
 
+use super::label_offset::label_offset;
 use super::records::Evaluated;
 use super::score::{Totals, by_kind};
 
@@ -46,6 +47,9 @@ pub fn summary(evaluated: &Evaluated, totals: &Totals) -> String {
             errors.p95_percent,
             errors.p95_deg
         ));
+    }
+    if let Some(offset) = label_offset(&evaluated.tested, evaluated.min_score) {
+        line(offset.in_words());
     }
     if evaluated.others > 0 {
         line(format!("not counted: {} instances of other labels", evaluated.others));

@@ -10,6 +10,8 @@ use crate::machine::machine;
 
 /// Pairs of photos that are shown; the table has all.
 const MAX_SHOWN: usize = 24;
+/// Parts whose photos are shown; more would make a page that no browser likes to open.
+const MAX_PHOTOS: usize = 200;
 /// Of two photos beside each other, each so wide, px.
 const PHOTO_WIDTH: u32 = 360;
 
@@ -39,7 +41,7 @@ pub fn page(findings: &Findings, photos: &[RgbImage], command: &str) -> Report {
             .table(table)
     });
     report
-        .section(all_parts(findings))
+        .section(all_parts(findings, photos))
         .section(Section::new("This run").facts([("machine", machine())]).command(command))
         .footer(FOOTER)
 }
@@ -81,7 +83,7 @@ fn look_alikes(findings: &Findings, photos: &[RgbImage]) -> Section {
         .table(table)
 }
 
-fn all_parts(findings: &Findings) -> Section {
+fn all_parts(findings: &Findings, photos: &[RgbImage]) -> Section {
     let mut table = Table::new(vec![
         Column::text("part"),
         Column::number("teaching").unit("s"),
@@ -119,6 +121,20 @@ fn all_parts(findings: &Findings) -> Section {
     Section::new("Every part")
         .lead("On samples made of its photos that nothing was taught with. The most alike is the other photo on which its model has its best score.")
         .table(table)
+        .gallery(GallerySize::Small, photos_of_parts(findings, photos))
+}
+
+/// The photo that each part was taught from, with its name and what its model finds.
+fn photos_of_parts(findings: &Findings, photos: &[RgbImage]) -> Vec<Figure> {
+    let figure = |(name, photo): (&String, &RgbImage)| {
+        let outcome = findings.parts.iter().find(|(known, _)| known == name).map(|(_, outcome)| outcome);
+        let figures = match outcome {
+            Some(PartOutcome::Taught { found, parts, .. }) => format!("{name}: {found} of {parts} found"),
+            _ => name.clone(),
+        };
+        Figure::photo(contact_sheet(std::slice::from_ref(photo), 1, PHOTO_WIDTH)).caption(figures)
+    };
+    findings.taught.iter().zip(photos).take(MAX_PHOTOS).map(figure).collect()
 }
 
 /// A model's score on its own photo, its best on another, and which that is.

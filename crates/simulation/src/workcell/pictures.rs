@@ -11,7 +11,7 @@ use crate::controller::ArmReference;
 use crate::error::{Result, SimulationError};
 use crate::lens::Frustum;
 use crate::record::{RecordConfig, Recorder};
-use crate::render::{Renderer, Segmentation};
+use crate::render::{RenderConfig, Renderer, Segmentation};
 
 impl Workcell {
     /// What the wrist camera sees now.
@@ -62,6 +62,15 @@ impl Workcell {
         self.panda_ids.set_position(&mut self.data, &solution.q);
         self.reference = ArmReference::at_rest(solution.q);
         self.data.forward()
+    }
+
+    /// A picture of the whole workcell from outside, as it is.
+    ///
+    /// # Errors
+    /// As [`Renderer::new`].
+    pub fn scene_image(&mut self, render: RenderConfig) -> Result<RgbImage> {
+        let mut renderer = Renderer::new(self.data.model(), render)?;
+        renderer.image(&mut self.data, self.scene_camera)
     }
 
     /// A picture of the whole workcell from outside with the arm somewhere else, fingers at an opening (m): for plans.

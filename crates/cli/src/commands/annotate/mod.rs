@@ -1,6 +1,8 @@
 //! `sdg annotate`: the annotation page.
 
 #[cfg(feature = "annotate")]
+mod recent;
+#[cfg(feature = "annotate")]
 mod run;
 
 use std::path::PathBuf;
@@ -21,10 +23,15 @@ pub struct AnnotateArgs {
     /// to ANNOTATION; another tool's file is read and left as it is. With --from, one that is not there yet is the name
     /// of the photo that is taken
     ///
-    /// Or one folder, DIR: a project, which is opened again where it was left, with its photos, versions of the model and tried
-    /// pictures (sdg-project.json in it says what is what). In a new one the pictures that have marks beside them are photos of the
-    /// part, the others pictures to try
-    #[arg(required_unless_present = "from", value_name = "IMAGE[:ANNOTATION] | DIR")]
+    /// A photo is opened again where it was left, with its versions of the model, corrections and tried pictures
+    /// (IMAGE.sdg-project.json beside it says what is what); nothing else of its folder is taken in
+    ///
+    /// Or one folder, DIR: a project likewise (sdg-project.json in it). In a new one the pictures that have marks beside them are
+    /// photos of the part, the others pictures to try; without any marks the page asks which picture is the photo
+    ///
+    /// Without IMAGE, DIR and --from the page offers the projects that were opened before, and makes a new one in the current folder
+    /// of a photo that is dropped on it
+    #[arg(value_name = "IMAGE[:ANNOTATION] | DIR")]
     pub images: Vec<String>,
     /// Live pictures, to take photos on the page and to try the model on: v4l:, v4l:/dev/video2, http://HOST/PATH,
     /// 'cmd:PROGRAM ARGUMENTS', dir:FOLDER, file:PATH or sim:PART. Photos are written as photo.png, photo-2.png … into the current

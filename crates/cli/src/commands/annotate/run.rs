@@ -7,15 +7,18 @@ use std::sync::Arc;
 
 use anyhow::{Result, anyhow};
 use nalgebra::Point2;
-use sdg_annotate::{CameraPictures, LiveOptions, Server, Session, SessionOptions, SizeCheck};
+use sdg_annotate::{
+    CameraPictures, LiveOptions, OpenProject, RecentProjects, Server, Session, SessionOptions, SizeCheck, Start,
+};
 use sdg_camera::{Address, OpenOptions, PixelFrame};
 use sdg_files::{FileError, WriterLock};
+use sdg_grasp::Preset;
 use sdg_inputs::UNREADABLE_EXTENSIONS;
 use sdg_inputs::camera_files::CameraFile;
 use sdg_kinematics::HAND_OPENING_MAX_M;
 use serde_json::json;
 
-use super::AnnotateArgs;
+use super::{AnnotateArgs, recent};
 use crate::demonstrations;
 use crate::exit::{Outcome, Usage, one_line};
 use crate::interrupt::Interrupt;
@@ -41,7 +44,50 @@ pub fn run(args: &AnnotateArgs) -> Result<Outcome> {
     let preset = args.preset.parse().map_err(|error| Usage(format!("--preset: {error}")))?;
     let camera = args.camera.file.as_deref().map(CameraFile::read).transpose()?;
     let camera = camera.map(|camera| (camera, args.camera.heights_m()));
-    let project = project(&args.images)?;
+    let token = args.token_file.as_deref().map(sdg_annotate::token_of_file).transpose()?;
+    let recent = recent::projects();
+    let server = if args.images.is_empty() && args.from.is_none() {
+        if args.out.is_some() || !args.trial_pictures.is_empty() {
+            return Err(Usage(
+                "expected IMAGE or DIR with --out and --try, found none (without them, sdg annotate alone offers the projects)".into(),
+            )
+            .into());
+        }
+        let start = Start {
+            // Without a home there is no list that outlives the page.
+            recent: recent.unwrap_or_else(|| RecentProjects::at(".sdg-recent-projects.json".into())),
+            folder: PathBuf::new(),
+            open: opener(preset, camera),
+        };
+        Server::bind_start(start, args.port, token.as_deref())?
+    } else {
+        let project = project(&args.images)?;
+        let session = open(args, project, preset, camera, token)?;
+        Server::bind(session, args.port)?
+    };
+    let url = server.url();
+    if args.json {
+        println!("{}", json!({"url": url}));
+    } else {
+        println!("mark the grasp at {url}");
+        println!("Ctrl-C ends it; marks are saved as they are made");
+    }
+    if !args.no_browser {
+        open_browser(&url);
+    }
+    let interrupt = Interrupt::watch();
+    server.run(move || interrupt.is_requested())?;
+    Ok(Outcome::Done)
+}
+
+/// Opens what the arguments name, and what belongs to it.
+fn open(
+    args: &AnnotateArgs,
+    project: Option<PathBuf>,
+    preset: Preset,
+    camera: Option<(CameraFile, [f64; 2])>,
+    token: Option<String>,
+) -> Result<Session> {
     let arguments = args.images.iter().filter(|_| project.is_none());
     let mut images: Vec<(PathBuf, Option<PathBuf>)> = arguments.map(|argument| split(argument)).collect();
     let photo_path = match (&args.from, &project) {
@@ -49,7 +95,6 @@ pub fn run(args: &AnnotateArgs) -> Result<Outcome> {
         (Some(_), Some(folder)) => Some(folder.join("photo.png")),
         (Some(_), None) => Some(photo_path(&mut images)?),
     };
-    let token = args.token_file.as_deref().map(sdg_annotate::token_of_file).transpose()?;
     // Marks are made for minutes before the first is written.
     for written in images.first().map(|(image, _)| image).into_iter().chain(&photo_path) {
         sdg_files::check_writable(&written.with_extension("json"))?;
@@ -59,9 +104,13 @@ pub fn run(args: &AnnotateArgs) -> Result<Outcome> {
     }
     let marks = images.iter().map(|(image, marks)| marks.clone().unwrap_or_else(|| image.with_extension("json")));
     let photo = photo_path.iter().map(|photo| photo.with_extension("json"));
-    let project_file = project.iter().map(|folder| folder.join("sdg-project.json"));
+    let project_file = match (&project, images.first()) {
+        (Some(folder), _) => Some(folder.join("sdg-project.json")),
+        (None, Some((photo, _))) => Some(sdg_annotate::project_of_photo(photo)?),
+        (None, None) => None,
+    };
     let written: BTreeSet<PathBuf> = marks.chain(photo).chain(project_file).collect();
-    let _locks = written.iter().map(|written| lock(written)).collect::<Result<Vec<_>>>()?;
+    let locks = written.iter().map(|written| lock(written)).collect::<Result<Vec<_>>>()?;
     for folder in args.trial_pictures.iter().filter(|path| path.is_dir()) {
         for path in sdg_files::entries(folder)? {
             // What stands beside pictures is no news; a picture that is not read is.
@@ -78,14 +127,7 @@ pub fn run(args: &AnnotateArgs) -> Result<Outcome> {
     let calibration = camera.as_ref().map(|(file, _)| file.clone());
     let open = |(from, photo_path)| open_camera(from, args.request.options(), calibration, photo_path);
     let live = args.from.clone().zip(photo_path).map(open).transpose()?;
-    // Where the photo's middle shows the marks' plane; nearly the same all over a table that is seen from above.
-    let max_opening_px = camera.as_ref().and_then(|(file, [mark_height_m, _])| {
-        let [width, height] = file.size_px();
-        let middle = Point2::new(0.5 * f64::from(width), 0.5 * f64::from(height));
-        let over_table = &file.over_table;
-        let scale = over_table.camera.metres_per_pixel(&middle, over_table.table_height_m + mark_height_m)?;
-        Some(HAND_OPENING_MAX_M / scale)
-    });
+    let opened = project.clone().or_else(|| images.first().map(|(photo, _)| photo.clone()));
     let options = SessionOptions {
         images,
         trial_pictures: args.trial_pictures.clone(),
@@ -93,23 +135,42 @@ pub fn run(args: &AnnotateArgs) -> Result<Outcome> {
         live,
         project,
         token,
-        max_opening_px,
+        max_opening_px: camera.as_ref().and_then(max_opening_px),
     };
     let session = Session::open(&options, Arc::new(PageTeacher { preset, camera }))?;
-    let server = Server::bind(session, args.port)?;
-    let url = server.url();
-    if args.json {
-        println!("{}", json!({"url": url}));
-    } else {
-        println!("mark the grasp at {url}");
-        println!("Ctrl-C ends it; marks are saved as they are made");
+    if let Some(opened) = opened {
+        recent::note(&opened);
     }
-    if !args.no_browser {
-        open_browser(&url);
-    }
-    let interrupt = Interrupt::watch();
-    server.run(move || interrupt.is_requested())?;
-    Ok(Outcome::Done)
+    Ok(session.holding(locks.into_iter().flatten().collect()))
+}
+
+/// Opens the project that is chosen on the page: a folder, or a photo.
+fn opener(preset: Preset, camera: Option<(CameraFile, [f64; 2])>) -> OpenProject {
+    Box::new(move |path| {
+        let is_folder = path.is_dir();
+        let written = if is_folder { path.join("sdg-project.json") } else { sdg_annotate::project_of_photo(path)? };
+        sdg_files::check_writable(&written)?;
+        let marks = (!is_folder).then(|| path.with_extension("json"));
+        let locks = marks.into_iter().chain([written]).map(|written| lock(&written)).collect::<Result<Vec<_>>>()?;
+        let options = SessionOptions {
+            images: if is_folder { Vec::new() } else { vec![(path.to_owned(), None)] },
+            project: is_folder.then(|| path.to_owned()),
+            max_opening_px: camera.as_ref().and_then(max_opening_px),
+            ..SessionOptions::default()
+        };
+        let session = Session::open(&options, Arc::new(PageTeacher { preset, camera: camera.clone() }))?;
+        recent::note(path);
+        Ok(session.holding(locks.into_iter().flatten().collect()))
+    })
+}
+
+/// How far the hand opens where the photo's middle shows the marks' plane; nearly the same all over a table that is seen from above.
+fn max_opening_px((file, [mark_height_m, _]): &(CameraFile, [f64; 2])) -> Option<f64> {
+    let [width, height] = file.size_px();
+    let middle = Point2::new(0.5 * f64::from(width), 0.5 * f64::from(height));
+    let over_table = &file.over_table;
+    let scale = over_table.camera.metres_per_pixel(&middle, over_table.table_height_m + mark_height_m)?;
+    Some(HAND_OPENING_MAX_M / scale)
 }
 
 /// With a calibration its size is asked for, and pictures of another size are a fault.

@@ -1,0 +1,114 @@
+// The other pictures of the project's folder, and photos from elsewhere: seen, and taken in one by one.
+
+import { api } from "./api.js";
+import { button } from "./buttons.js";
+import { adopt } from "./editing.js";
+import { changed, isLive, state } from "./store.js";
+import { openImage } from "./strip.js";
+import { openTab } from "./tabs.js";
+import { toast } from "./toast.js";
+
+const by = (id) => document.getElementById(id);
+const dialog = by("folder");
+/** What a chosen picture becomes: photo or try. */
+let wanted = "photo";
+
+const isWithoutPhoto = () => !state.images.length && !state.camera;
+
+async function refresh() {
+  const { others, label, is_named: isNamed, models } = await api.session();
+  Object.assign(state, { others, label, isNamed, models });
+}
+
+function took(view) {
+  const at = state.images.findIndex((photo) => photo.id === view.id);
+  if (at < 0) state.images.push(adopt(view));
+  openTab("mark");
+  openImage(at < 0 ? state.images.length - 1 : at);
+}
+
+/** Runs what takes pictures in; what goes wrong is told. */
+async function take(work) {
+  try {
+    await work();
+    await refresh();
+  } catch (error) {
+    toast(error.message);
+  }
+  render();
+  changed();
+}
+
+const takePhoto = (id) => take(async () => {
+  took(await api.addPhoto(id));
+  dialog.close();
+});
+
+const takeTrial = async (id) => {
+  const view = await api.addOtherTrial(id);
+  state.trialPictures.push({ ...view, detections: null });
+};
+
+/** A photo from elsewhere, which is copied beside the others. */
+export const uploadPhoto = (file) => take(async () => {
+  took(await api.uploadPhoto(file));
+  dialog.close();
+});
+
+function render() {
+  const isPhoto = wanted === "photo";
+  by("folder-title").textContent = isPhoto ? (state.images.length ? "Add a photo of the part" : "Which picture is the photo of the part?") : "Pictures of this folder";
+  by("folder-how").textContent = !state.others.length
+    ? "There is no other picture in the project’s folder."
+    : isPhoto
+      ? "The best one shows the part whole and alone, nothing over it. The others can be tried later."
+      : "Choose those to try the model on.";
+  const all = state.others.length > 1 && !isPhoto;
+  by("folder-all").hidden = !all;
+  by("folder-all").textContent = `Add all ${state.others.length}`;
+  by("folder-choose").hidden = !isPhoto;
+  by("folder-list").replaceChildren(...state.others.map(({ id, name }) => {
+    const item = document.createElement("li");
+    const choose = button("", () => (isPhoto ? takePhoto(id) : take(() => takeTrial(id))));
+    const picture = Object.assign(document.createElement("img"), { alt: "", loading: "lazy", src: api.otherUrl(id) });
+    choose.append(picture, Object.assign(document.createElement("span"), { textContent: name }));
+    item.append(choose);
+    return item;
+  }));
+}
+
+export async function openFolder(as) {
+  wanted = as;
+  await refresh().catch(() => null);
+  render();
+  dialog.showModal();
+}
+
+by("folder-all").addEventListener("click", () => take(async () => {
+  for (const { id } of state.others) await takeTrial(id);
+  dialog.close();
+}));
+by("folder-choose").addEventListener("click", () => by("photo-input").click());
+by("photo-input").addEventListener("change", () => {
+  const [file] = by("photo-input").files;
+  by("photo-input").value = "";
+  if (file) uploadPhoto(file);
+});
+for (const id of ["add-photo", "choose-photo"]) by(id).addEventListener("click", () => openFolder("photo"));
+by("add-others").addEventListener("click", () => openFolder("try"));
+
+export function renderFolder() {
+  by("choose").hidden = !isWithoutPhoto();
+  by("mark-work").hidden = isWithoutPhoto() || (isLive() && state.tab === "mark");
+  by("add-others").hidden = !state.others.length;
+  by("add-others").textContent = `From this folder (${state.others.length})…`;
+}
+
+by("projects").addEventListener("click", async () => {
+  try {
+    await api.closeProject();
+    location.reload();
+  } catch (error) {
+    toast(error.message);
+  }
+});

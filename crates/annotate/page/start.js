@@ -1,0 +1,69 @@
+// Without a project: one of those that were opened before, or a new one of a photo.
+
+import { api } from "./api.js";
+import { button } from "./buttons.js";
+
+const by = (id) => document.getElementById(id);
+const PICTURE = /\.(png|jpe?g|webp|bmp|tiff?)$/i;
+/** What cameras call any picture. */
+const ANY_NAME = /^(photo|image|picture|img|pic|dscn?f?|pxl|p|demo|frame|screenshot)?[\W\d_]*$/i;
+let photo = null;
+
+function fail(message) {
+  by("start-error").hidden = !message;
+  by("start-error").textContent = message;
+}
+
+async function go(work) {
+  try {
+    fail("");
+    await work();
+    location.reload();
+  } catch (error) {
+    fail(error.message);
+  }
+}
+
+function choose(file) {
+  if (!file) return;
+  if (!PICTURE.test(file.name)) return fail(`${file.name}: expected a picture: PNG, JPEG, WebP, BMP or TIFF.`);
+  fail("");
+  photo = file;
+  const shown = by("new-photo");
+  URL.revokeObjectURL(shown.src);
+  shown.src = URL.createObjectURL(file);
+  shown.alt = file.name;
+  by("new-part").hidden = false;
+  const stem = file.name.replace(/\.\w+$/, "");
+  if (!by("new-name").value && !ANY_NAME.test(stem)) by("new-name").value = stem.slice(0, 60);
+  by("new-name").focus();
+}
+
+export function showStart({ folder, recent }) {
+  for (const part of document.querySelectorAll("main, .steps")) part.hidden = true;
+  by("start").hidden = false;
+  document.title = "Projects · Teach a grasp";
+  by("new-where").textContent = `Photo, marks and models go into a new folder of this name in ${folder}.`;
+  by("new-choose").addEventListener("click", () => by("new-input").click());
+  by("new-input").addEventListener("change", () => choose(by("new-input").files[0]));
+  by("new-part").addEventListener("submit", (event) => {
+    event.preventDefault();
+    go(() => api.createProject(by("new-name").value, photo));
+  });
+  for (const kind of ["dragover", "dragleave", "drop"]) {
+    document.body.addEventListener(kind, (event) => {
+      event.preventDefault();
+      by("new-drop").classList.toggle("dropping", kind === "dragover");
+      if (kind === "drop") choose(event.dataTransfer.files[0]);
+    });
+  }
+  by("recent").hidden = !recent.length;
+  by("recent-list").replaceChildren(...recent.map(({ id, name, within, opened_secs: secs }) => {
+    const item = document.createElement("li");
+    const open = button("", () => go(() => api.openProject(id)));
+    const when = new Date(secs * 1000).toLocaleString();
+    for (const [tag, text] of [["b", name], ["small", within], ["small", when]]) open.append(Object.assign(document.createElement(tag), { textContent: text }));
+    item.append(open);
+    return item;
+  }));
+}

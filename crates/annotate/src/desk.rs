@@ -1,0 +1,162 @@
+//! What the server answers from: a session or, until a project is chosen on the page, the projects that there are.
+
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, PoisonError, RwLock};
+
+use serde::Serialize;
+
+use crate::error::{Error, Result, TeacherError};
+use crate::names::{file_name, safe_stem};
+use crate::picture::Picture;
+use crate::recent::RecentProjects;
+use crate::session::{Session, check_label};
+use crate::views::SessionView;
+
+/// Opens the project in a folder, or that of a photo.
+pub type OpenProject = Box<dyn Fn(&Path) -> std::result::Result<Session, TeacherError> + Send + Sync>;
+
+/// Where projects are chosen and made.
+pub struct Start {
+    /// Projects that were opened before.
+    pub recent: RecentProjects,
+    /// New projects are made in this folder.
+    pub folder: PathBuf,
+    /// Opens the one that is chosen.
+    pub open: OpenProject,
+}
+
+/// The session, if there is one, and where another is chosen, if it can be.
+pub struct Desk {
+    session: RwLock<Option<Arc<Session>>>,
+    start: Option<Start>,
+}
+
+/// What the page starts from.
+#[derive(Serialize)]
+#[serde(untagged)]
+pub enum FirstView {
+    Session(Box<SessionView>),
+    Start { start: StartView },
+}
+
+#[derive(Serialize)]
+pub struct StartView {
+    /// Where a new project is made.
+    folder: String,
+    recent: Vec<RecentView>,
+}
+
+#[derive(Serialize)]
+struct RecentView {
+    id: usize,
+    name: String,
+    /// The folder that it lies in.
+    within: String,
+    opened_secs: u64,
+}
+
+impl Desk {
+    pub fn of_session(session: Session) -> Self {
+        Self { session: RwLock::new(Some(Arc::new(session))), start: None }
+    }
+
+    pub fn of_start(start: Start) -> Self {
+        Self { session: RwLock::new(None), start: Some(start) }
+    }
+
+    pub fn session(&self) -> Option<Arc<Session>> {
+        self.session.read().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    pub fn view(&self) -> Result<FirstView> {
+        match self.session() {
+            Some(session) => {
+                let can_close = self.start.is_some();
+                Ok(FirstView::Session(Box::new(SessionView { can_close, ..session.view() })))
+            }
+            None => Ok(FirstView::Start { start: self.start()?.view() }),
+        }
+    }
+
+    fn start(&self) -> Result<&Start> {
+        self.start
+            .as_ref()
+            .ok_or(Error::Busy("this page was opened for one project; without an argument it offers all"))
+    }
+
+    fn take(&self, open: impl FnOnce(&Start) -> Result<Session>) -> Result<FirstView> {
+        let start = self.start()?;
+        let mut session = self.session.write().unwrap_or_else(PoisonError::into_inner);
+        if session.is_some() {
+            return Err(Error::Busy("another project is open already: load the page again"));
+        }
+        *session = Some(Arc::new(open(start)?));
+        drop(session);
+        self.view()
+    }
+
+    /// Opens a project that was opened before.
+    ///
+    /// # Errors
+    /// No such project, one that cannot be opened, another that is open.
+    pub fn open(&self, id: usize) -> Result<FirstView> {
+        self.take(|start| {
+            let recent = start.recent.list();
+            let count = recent.len();
+            let project = recent.get(id).ok_or(Error::NoSuchPicture { id, count })?;
+            (start.open)(&project.path).map_err(Error::Teacher)
+        })
+    }
+
+    /// Makes a project of this name and puts a photo in it.
+    ///
+    /// # Errors
+    /// A name that is taken or none, bytes that are no picture, a folder that cannot be made.
+    pub fn create(&self, name: &str, photo: &str, bytes: &[u8]) -> Result<FirstView> {
+        self.take(|start| {
+            let name = check_label(name)?;
+            let photo = photo.rsplit(['/', '\\']).next().unwrap_or(photo);
+            Picture::check(bytes, photo)?;
+            let folder = start.folder.join(safe_stem(name));
+            std::fs::create_dir(&folder).map_err(Error::file(&folder, "cannot make a new folder of this name"))?;
+            let extension = Path::new(photo).extension().unwrap_or_default().to_string_lossy().to_lowercase();
+            let stem = safe_stem(&Path::new(photo).file_stem().unwrap_or_default().to_string_lossy());
+            let extension = if extension.is_empty() { "png" } else { &extension };
+            sdg_files::write_atomically(&folder.join(format!("{stem}.{extension}")), bytes)?;
+            let session = (start.open)(&folder).map_err(Error::Teacher)?;
+            session.set_label(name)?;
+            Ok(session)
+        })
+    }
+
+    /// Leaves the project, so that another can be chosen.
+    ///
+    /// # Errors
+    /// A page of one project, a teaching that goes on.
+    pub fn close(&self) -> Result<FirstView> {
+        self.start()?;
+        let mut session = self.session.write().unwrap_or_else(PoisonError::into_inner);
+        if let Some(session) = &*session {
+            session.check_idle()?;
+        }
+        *session = None;
+        drop(session);
+        self.view()
+    }
+}
+
+impl Start {
+    fn view(&self) -> StartView {
+        let shown = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned()).display().to_string();
+        let recent = self.recent.list().into_iter().enumerate().map(|(id, project)| RecentView {
+            id,
+            name: file_name(&project.path),
+            within: project.path.parent().map(shown).unwrap_or_default(),
+            opened_secs: project.opened_secs,
+        });
+        StartView {
+            recent: recent.collect(),
+            folder: shown(if self.folder.as_os_str().is_empty() { Path::new(".") } else { &self.folder }),
+        }
+    }
+}

@@ -1,0 +1,19 @@
+//! Requests about which project is open.
+
+use super::answers::json_of;
+use crate::desk::Desk;
+use crate::http::{Request, Response};
+
+/// Answers what is asked of the projects; `None` where there is no such address.
+pub fn answer(desk: &Desk, request: &Request, rest: &[&str]) -> Option<Response> {
+    let head = &request.head;
+    Some(match (head.method.as_str(), rest) {
+        ("POST", []) => {
+            let value = |name: &str| head.query_value(name).unwrap_or_default();
+            json_of(desk.create(&value("name"), &value("photo"), &request.body))
+        }
+        ("DELETE", []) => json_of(desk.close()),
+        ("POST", [id, "open"]) => json_of(desk.open(id.parse().ok()?)),
+        _ => return None,
+    })
+}

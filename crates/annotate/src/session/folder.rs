@@ -1,0 +1,123 @@
+//! The other pictures of a project's folder: seen by the person, and taken in one by one. Photos that come from the page.
+
+use std::path::{Path, PathBuf};
+
+use super::{MAX_TRIAL_PICTURES, Session};
+use crate::error::{Error, Result};
+use crate::names::{file_name, free_name};
+use crate::picture::{Picture, pictures_in};
+use crate::session_state::{MarkedPicture, State, TrialPicture};
+use crate::views::{ImageView, OtherView, TrialPictureView};
+
+/// Other pictures that are offered: a folder of all photos of a year is no part's.
+const MAX_OFFERED: usize = 500;
+
+impl State {
+    /// The pictures of the project's folder that are not in the project. Numbers stay as long as the session lasts.
+    pub fn others(&mut self) -> Vec<OtherView> {
+        let Some(place) = &self.place else { return Vec::new() };
+        let listed = if place.folder.as_os_str().is_empty() { Path::new(".") } else { &place.folder };
+        // A folder that cannot be listed offers nothing; what is wrong with it is told where it is written to.
+        for path in pictures_in(listed).unwrap_or_default() {
+            let path = place.folder.join(path.file_name().unwrap_or_default());
+            if self.offered.len() < MAX_OFFERED && !self.offered.contains(&path) {
+                self.offered.push(path);
+            }
+        }
+        let view = |(id, path): (usize, &PathBuf)| OtherView { id, name: file_name(path) };
+        self.offered.iter().enumerate().filter(|(_, path)| self.is_other(path)).map(view).collect()
+    }
+
+    fn is_other(&self, path: &Path) -> bool {
+        let is_photo = self.image_ids().any(|id| self.images[id].picture.path == path);
+        let is_tried = self.trial_ids().any(|id| self.trial_pictures[id].picture.path == path);
+        !is_photo && !is_tried && path.is_file()
+    }
+
+    fn other(&self, id: usize) -> Result<&Path> {
+        let there = self.offered.get(id).filter(|path| self.is_other(path));
+        there.map(PathBuf::as_path).ok_or(Error::NoSuchPicture { id, count: self.offered.len() })
+    }
+}
+
+impl Session {
+    /// Another picture of the folder.
+    ///
+    /// # Errors
+    /// No such picture, a file that is none.
+    pub(crate) fn other_picture(&self, id: usize) -> Result<Picture> {
+        let path = self.state().other(id)?.to_owned();
+        Picture::open(&path)
+    }
+
+    /// Makes another picture of the folder a photo of the part, with the marks that stand beside it.
+    ///
+    /// # Errors
+    /// No such picture, marks that belong to another, a project that cannot be written.
+    pub fn add_photo(&self, id: usize) -> Result<ImageView> {
+        let mut state = self.state();
+        let path = state.other(id)?.to_owned();
+        // Taken out before and put in again, it is the same photo.
+        let known = state.images.iter().position(|image| image.picture.path == path);
+        let id = match known {
+            Some(id) => {
+                state.images[id].is_removed = false;
+                id
+            }
+            None => {
+                let (image, label) = MarkedPicture::open(&path, None)?;
+                if let Some(label) = label.filter(|_| !state.is_named) {
+                    (state.label, state.is_named) = (label, true);
+                }
+                state.images.push(image);
+                state.images.len() - 1
+            }
+        };
+        state.save_project()?;
+        Ok(state.image_view(id))
+    }
+
+    /// Makes another picture of the folder one to try.
+    ///
+    /// # Errors
+    /// No such picture, more than a session keeps, a project that cannot be written.
+    pub fn add_other_trial(&self, id: usize) -> Result<TrialPictureView> {
+        let mut state = self.state();
+        let path = state.other(id)?.to_owned();
+        let known = state.trial_pictures.iter().position(|trial| trial.picture.path == path);
+        if known.is_none() && state.trial_pictures.len() >= MAX_TRIAL_PICTURES {
+            return Err(Error::TooManyPictures { most: MAX_TRIAL_PICTURES });
+        }
+        let id = match known {
+            Some(id) => {
+                state.trial_pictures[id].is_removed = false;
+                id
+            }
+            None => {
+                state.trial_pictures.push(TrialPicture::new(Picture::open(&path)?, false));
+                state.trial_pictures.len() - 1
+            }
+        };
+        state.save_project()?;
+        Ok(state.trial_picture_view(id))
+    }
+
+    /// Takes a photo of the part from the page; it is written beside the first photo under a name that is not taken.
+    ///
+    /// # Errors
+    /// Bytes that are no picture, a file that cannot be written.
+    pub fn upload_photo(&self, name: &str, bytes: &[u8]) -> Result<ImageView> {
+        let shown = name.rsplit(['/', '\\']).next().unwrap_or(name);
+        Picture::check(bytes, shown)?;
+        let extension = Path::new(shown).extension().unwrap_or_default().to_string_lossy().to_lowercase();
+        let mut state = self.state();
+        let path = free_name(&self.home, shown, if extension.is_empty() { "png" } else { &extension });
+        sdg_files::write_atomically(&path, bytes)?;
+        let (image, _) = MarkedPicture::open(&path, None)?;
+        state.images.push(image);
+        let id = state.images.len() - 1;
+        self.settle_place(&mut state, id)?;
+        state.save_project()?;
+        Ok(state.image_view(id))
+    }
+}

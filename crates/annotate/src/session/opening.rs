@@ -1,0 +1,165 @@
+//! A session is opened: the project where it was left, the pictures that were named, and the model in use.
+
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex};
+
+use super::{MAX_TRIAL_PICTURES, Session, SessionOptions};
+use crate::error::{Error, Result};
+use crate::guard::new_token;
+use crate::live::LiveDesk;
+use crate::model_versions::ModelVersions;
+use crate::names::proposed_label;
+use crate::picture::{Picture, pictures_in};
+use crate::preview::Previews;
+use crate::project_file::{ProjectFile, ProjectPlace, TRIED_FOLDER, relative};
+use crate::session_state::{MarkedPicture, State, TrialPicture};
+use crate::teacher::GraspTeacher;
+use crate::teaching::Teaching;
+
+impl Session {
+    /// Opens pictures, their marks and their project.
+    ///
+    /// # Errors
+    /// Neither picture nor camera, a picture that cannot be read, or marks that belong to another.
+    pub fn open(options: &SessionOptions, teacher: Arc<dyn GraspTeacher>) -> Result<Self> {
+        let place = match (&options.project, options.images.first()) {
+            (Some(folder), _) => Some(ProjectPlace::of_folder(folder)),
+            (None, Some((photo, _))) => Some(ProjectPlace::of_photo(photo)?),
+            (None, None) => None,
+        };
+        let (project, mut notes) = match &place {
+            Some(place) => ProjectFile::open(place)?,
+            None => (ProjectFile::default(), Vec::new()),
+        };
+        notes.iter_mut().for_each(|gone| *gone += " is not there any more.");
+        let folder = place.as_ref().map_or(Path::new(""), |place| &place.folder).to_owned();
+        let mut photos = options.images.clone();
+        for name in &project.photos {
+            if !photos.iter().any(|(path, _)| relative(&folder, path) == *name) {
+                photos.push((folder.join(name), None));
+            }
+        }
+        let first = photos.first().map(|(path, _)| path.clone());
+        let of_camera = || options.live.as_ref().map(|live| live.photo_path.clone());
+        let home = match &options.project {
+            Some(folder) => folder.join("photo.png"),
+            None => first.clone().or_else(of_camera).ok_or(Error::NoImage)?,
+        };
+        let mut label = project.label.clone();
+        let images = photos
+            .iter()
+            .map(|(path, annotation)| {
+                let (image, named) = MarkedPicture::open(path, annotation.as_deref())?;
+                label = label.take().or(named);
+                Ok(image)
+            })
+            .collect::<Result<Vec<_>>>()?;
+        let trial_pictures = trial_pictures(&project, &folder, &images, &options.trial_pictures)?;
+        let temporary = match place {
+            Some(_) => None,
+            None => {
+                let made = tempfile::Builder::new().prefix("sdg-annotate-").tempdir();
+                Some(made.map_err(Error::file(&std::env::temp_dir(), "cannot make a folder in it"))?)
+            }
+        };
+        let models = ModelVersions {
+            folder: options.model_path.as_ref().unwrap_or(&home).with_file_name("models"),
+            versions: project.models,
+            current: project.current_model,
+        };
+        let teaching = Arc::new(Teaching::default());
+        if let Some(id) = models.current {
+            let opened = models
+                .read(id)
+                .and_then(|bytes| teacher.open(&bytes, &models.versions[id].summary).map_err(Error::Teacher));
+            match opened {
+                Ok(model) => teaching.set_model(Arc::from(model)),
+                Err(error) => notes.push(format!("The model cannot be read: {error}")),
+            }
+        }
+        // A camera's photo is not called after the photo that is taken first.
+        let proposal = || proposed_label(first.as_deref(), home.parent().unwrap_or(Path::new("")));
+        let state = State {
+            is_named: label.is_some(),
+            label: label.unwrap_or_else(proposal),
+            images,
+            trial_pictures,
+            models,
+            place,
+            removed_earlier: project.removed,
+            offered: Vec::new(),
+            max_opening_px: options.max_opening_px,
+        };
+        state.save_project()?;
+        Ok(Self {
+            teacher,
+            teaching,
+            previews: Previews::default(),
+            model_path: options.model_path.clone(),
+            home,
+            live: options.live.clone().map(LiveDesk::new),
+            temporary,
+            locks: Vec::new(),
+            state: Arc::new(Mutex::new(state)),
+            id: new_token()?,
+            token: options.token.clone(),
+            notes,
+        })
+    }
+
+    /// The folder of pictures that come from the page.
+    pub(super) fn uploads(&self, state: &State) -> PathBuf {
+        match (&state.place, &self.temporary) {
+            (None, Some(temporary)) => temporary.path().to_owned(),
+            _ => self.home.with_file_name(TRIED_FOLDER),
+        }
+    }
+
+    /// The first photo of a camera has a project from now on; pictures that were tried before are kept in it.
+    pub(super) fn settle_place(&self, state: &mut State, id: usize) -> Result<()> {
+        let Some(temporary) = self.temporary.as_ref().filter(|_| state.place.is_none()) else { return Ok(()) };
+        state.place = Some(ProjectPlace::of_photo(&state.images[id].picture.path)?);
+        let folder = self.uploads(state);
+        for trial in &mut state.trial_pictures {
+            let path = &trial.picture.path;
+            if let Ok(name) = path.strip_prefix(temporary.path()) {
+                let kept = folder.join(name);
+                std::fs::create_dir_all(&folder).map_err(Error::file(&folder, "cannot make this folder"))?;
+                std::fs::copy(path, &kept).map_err(Error::file(&kept, "cannot write"))?;
+                trial.picture.path = kept;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Those of the project, then those that were named and are not among them.
+fn trial_pictures(
+    project: &ProjectFile,
+    folder: &Path,
+    images: &[MarkedPicture],
+    named: &[PathBuf],
+) -> Result<Vec<TrialPicture>> {
+    let mut trial_pictures: Vec<TrialPicture> = Vec::new();
+    for tried in &project.tried {
+        let picture = Picture { name: tried.name.clone(), ..Picture::open(&folder.join(&tried.file))? };
+        let is = |photo: &String, image: &MarkedPicture| relative(folder, &image.picture.path) == *photo;
+        let became = tried.became.as_ref().and_then(|photo| images.iter().position(|image| is(photo, image)));
+        trial_pictures.push(TrialPicture { became, is_absent: tried.absent, ..TrialPicture::new(picture, false) });
+    }
+    for path in named {
+        let paths = if path.is_dir() { pictures_in(path)? } else { vec![path.clone()] };
+        for path in paths {
+            let is = |known: &Path| relative(folder, known) == relative(folder, &path);
+            let taken = images.iter().any(|image| is(&image.picture.path))
+                || trial_pictures.iter().any(|trial| is(&trial.picture.path));
+            if !taken {
+                trial_pictures.push(TrialPicture::new(Picture::open(&path)?, false));
+            }
+        }
+    }
+    if trial_pictures.len() > MAX_TRIAL_PICTURES {
+        return Err(Error::TooManyPictures { most: MAX_TRIAL_PICTURES });
+    }
+    Ok(trial_pictures)
+}

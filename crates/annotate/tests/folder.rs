@@ -1,0 +1,130 @@
+//! A photo's own project, the other pictures of its folder, and projects that are chosen on the page.
+
+use crate::served::{Served, photo_png};
+use serde_json::{Value, json};
+
+const MARKS: &str = r#"{"box": [40, 40, 140, 60], "grasp": {"start": [80, 50], "end": [100, 50], "jaw_width": 24}}"#;
+
+fn folder_of(names: &[&str]) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for name in names {
+        std::fs::write(folder.path().join(name), photo_png()).unwrap();
+    }
+    folder
+}
+
+fn session(served: &Served) -> Value {
+    served.ask("GET", "/api/session", b"").json()
+}
+
+fn names(list: &Value) -> Vec<&str> {
+    list.as_array().unwrap().iter().map(|one| one["name"].as_str().unwrap()).collect()
+}
+
+fn teach(served: &Served) {
+    served.ask("POST", "/api/teaching", b"{\"model\": \"S\"}").json();
+    while served.ask("GET", "/api/teaching", b"").json()["status"] != "done" {
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+}
+
+#[test]
+fn a_photo_is_opened_again_with_its_models_corrections_and_tried_pictures() {
+    let served = Served::of_photo(folder_of(&["rod.png", "other.png", "table.png"]), "rod.png");
+    let first = session(&served);
+    assert_eq!((&first["label"], &first["is_named"]), (&json!("rod"), &json!(false)), "the photo's name is proposed");
+    assert_eq!(names(&first["others"]), ["other.png", "table.png"]);
+    assert!(!served.folder.path().join("rod.sdg-project.json").exists(), "a look leaves nothing behind");
+    served.ask("PUT", "/api/images/0/marks", MARKS.as_bytes()).json();
+    teach(&served);
+    served.ask("POST", "/api/trial-pictures?name=found.png", &photo_png()).json();
+    served.ask("POST", "/api/trial-pictures?name=empty.png", &photo_png()).json();
+    served.ask("POST", "/api/trial-pictures/0/accept", MARKS.as_bytes()).json();
+    served.ask("PUT", "/api/trial-pictures/1/absent", b"{\"absent\": true}").json();
+    let left = session(&served);
+
+    let served = Served::of_photo(served.end(), "rod.png");
+    let again = session(&served);
+    for what in ["label", "images", "trial_pictures", "models"] {
+        assert_eq!(again[what], left[what], "{what}");
+    }
+    assert_eq!(names(&again["others"]), ["other.png", "table.png"]);
+    assert_eq!(names(&again["images"]), ["rod.png", "found.png"]);
+    assert_eq!(again["trial_pictures"][0]["became"], 1);
+    assert_eq!(again["models"][0]["is_current"], true);
+    // Another photo of the folder knows nothing of it.
+    let served = Served::of_photo(served.end(), "other.png");
+    let other = session(&served);
+    assert_eq!((names(&other["images"]), other["models"].as_array().unwrap().len()), (vec!["other.png"], 0));
+}
+
+#[test]
+fn a_photo_of_a_folders_project_opens_that_without_what_has_come_since() {
+    let served = Served::of_project(folder_of(&["a.png"]));
+    assert_eq!(names(&session(&served)["images"]), ["a.png"], "where there is one picture, there is no choice");
+    served.ask("PUT", "/api/images/0/marks", MARKS.as_bytes()).json();
+    teach(&served);
+    let folder = served.end();
+    std::fs::write(folder.path().join("new.png"), photo_png()).unwrap();
+    let again = session(&Served::of_photo(folder, "a.png"));
+    assert_eq!((again["models"].as_array().unwrap().len(), names(&again["others"])), (1, vec!["new.png"]));
+    assert_eq!(again["trial_pictures"], json!([]));
+}
+
+#[test]
+fn in_a_new_folder_the_photo_is_chosen_and_others_are_added_and_removed() {
+    let served = Served::of_project(folder_of(&["a.png", "b.png", "c.png"]));
+    let first = session(&served);
+    assert_eq!(
+        (first["images"].as_array().unwrap().len(), names(&first["others"])),
+        (0, vec!["a.png", "b.png", "c.png"])
+    );
+    assert_eq!(served.ask("GET", "/api/others/1/picture", b"").body, photo_png());
+    let chosen = served.ask("POST", "/api/others/1/photo", b"").json();
+    assert_eq!((&chosen["name"], &chosen["id"]), (&json!("b.png"), &json!(0)));
+    assert_eq!(served.ask("POST", "/api/others/1/photo", b"").status, 404, "it is in the project");
+    let tried = served.ask("POST", "/api/others/2/try", b"").json();
+    assert_eq!(tried["name"], "c.png");
+    assert_eq!(names(&session(&served)["others"]), ["a.png"]);
+    served.ask("DELETE", "/api/trial-pictures/0", b"").json();
+    assert_eq!(names(&session(&served)["others"]), ["a.png", "c.png"]);
+    // A photo from elsewhere is copied beside the others.
+    let uploaded = served.ask("POST", "/api/images?name=../b.png", &photo_png()).json();
+    assert_eq!(uploaded["name"], "b-2.png");
+    assert_eq!(served.ask("POST", "/api/images?name=no.png", b"no picture").status, 422);
+    assert!(!served.folder.path().join("no.png").exists());
+
+    // What was not taken in is not taken in by opening the folder again.
+    let again = session(&Served::of_project(served.end()));
+    assert_eq!((names(&again["images"]), names(&again["others"])), (vec!["b.png", "b-2.png"], vec!["a.png", "c.png"]));
+}
+
+#[test]
+fn without_a_project_one_is_made_of_a_photo_and_opened_again() {
+    let served = Served::of_start(tempfile::tempdir().unwrap());
+    let start = session(&served)["start"].clone();
+    assert_eq!((&start["recent"], &start["folder"]), (&json!([]), &json!(served.folder.path().display().to_string())));
+    assert_eq!(served.ask("GET", "/api/teaching", b"").status, 409);
+    assert_eq!(served.ask("POST", "/api/projects?name=wing%20bolt&photo=IMG_1.png", b"no picture").status, 422);
+    assert!(!served.folder.path().join("wing_bolt").exists(), "nothing is left of what failed");
+    let made = served.ask("POST", "/api/projects?name=wing%20bolt&photo=IMG_1.png", &photo_png()).json();
+    assert_eq!(
+        (&made["label"], &made["is_named"], names(&made["images"])),
+        (&json!("wing bolt"), &json!(true), vec!["IMG_1.png"])
+    );
+    assert_eq!(served.ask("POST", "/api/projects?name=lid&photo=a.png", &photo_png()).status, 409, "one at a time");
+    served.ask("PUT", "/api/images/0/marks", MARKS.as_bytes()).json();
+
+    let start = served.ask("DELETE", "/api/projects", b"").json()["start"].clone();
+    assert_eq!(names(&start["recent"]), ["wing_bolt"]);
+    let taken = served.ask("POST", "/api/projects?name=wing%20bolt&photo=a.png", &photo_png());
+    assert!(taken.status == 500 && taken.text().contains("wing_bolt"), "{}", taken.text());
+    assert_eq!(served.ask("POST", "/api/projects/7/open", b"").status, 404);
+    let again = served.ask("POST", "/api/projects/0/open", b"").json();
+    assert_eq!(
+        (&again["label"], again["images"][0]["marks"]["box"].clone()),
+        (&json!("wing bolt"), json!([40.0, 40.0, 140.0, 60.0]))
+    );
+    // A page of one project offers no others.
+    assert_eq!(Served::start().ask("DELETE", "/api/projects", b"").status, 409);
+}

@@ -1,0 +1,133 @@
+//! What corrects marks: strokes over an outline, the box drawn to it, the gripper turned along a straight part.
+
+use image::{Rgb, RgbImage};
+use nalgebra::{Point2, Vector2};
+use sdg_demonstration::propose_outline;
+use sdg_geometry::BoundingBox;
+use serde_json::json;
+
+use super::page::Page;
+
+/// A straight part of one of several forms, and how it lies.
+struct Straight {
+    image: RgbImage,
+    bbox: BoundingBox,
+    /// Of its axis, in degrees.
+    angle_deg: f64,
+    /// On its shank, a little beside the axis, as a person clicks.
+    click: Point2<f64>,
+}
+
+/// The same numbers in every run: steps of the golden ratio.
+fn spread(number: usize, step: f64) -> f64 {
+    (number as f64 * step).fract()
+}
+
+fn straight(number: usize) -> Straight {
+    let angle = std::f64::consts::PI * spread(number, 0.618_034);
+    let (along, across) = (Vector2::new(angle.cos(), angle.sin()), Vector2::new(-angle.sin(), angle.cos()));
+    let half_length = 70.0 + 60.0 * spread(number, 0.414_214);
+    let half_width = half_length * (0.1 + 0.12 * spread(number, 0.732_051));
+    let middle = Point2::new(160.0 + 8.0 * spread(number, 0.317), 150.0 + 8.0 * spread(number, 0.237));
+    let thread = if number % 3 == 1 { 1.2 } else { 0.0 };
+    let head = if number % 3 == 2 { 1.7 } else { 1.0 };
+    let is_part = |point: Point2<f64>| {
+        let (t, s) = ((point - middle).dot(&along), (point - middle).dot(&across));
+        let is_head = t > 0.72 * half_length;
+        let half = if is_head { head * half_width } else { half_width + thread * (t * 1.1).sin() };
+        t.abs() < half_length && s.abs() < half
+    };
+    let image = RgbImage::from_fn(330, 300, |x, y| {
+        // Nine places a pixel make soft edges.
+        let places =
+            (0..9).map(|i| Point2::new(f64::from(x) + f64::from(i % 3) / 3.0, f64::from(y) + f64::from(i / 3) / 3.0));
+        let share = places.filter(|&place| is_part(place)).count() as f64 / 9.0;
+        let grain = f64::from((x * 7 + y * 13 + x * y % 17) % 11);
+        let value = |part: f64, table: f64| (share * part + (1.0 - share) * table + grain) as u8;
+        Rgb([value(90.0, 168.0), value(94.0, 163.0), value(100.0, 150.0)])
+    });
+    let reach = |axis: usize| (along[axis] * half_length).abs() + (across[axis] * head * half_width).abs() + 4.0;
+    let bbox = BoundingBox {
+        x1: middle.x - reach(0),
+        y1: middle.y - reach(1),
+        x2: middle.x + reach(0),
+        y2: middle.y + reach(1),
+    };
+    let beside = half_width * (spread(number, 0.531) - 0.5);
+    let click = middle + along * (half_length * (0.7 * spread(number, 0.83) - 0.45)) + across * beside;
+    Straight { image, bbox, angle_deg: angle.to_degrees(), click }
+}
+
+/// Issue 47.
+const MAX_OFF_DEG: f64 = 3.0;
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn a_gripper_on_a_straight_part_is_turned_along_its_axis() {
+    let page = Page::open();
+    let mut offs = Vec::new();
+    for number in 0..36 {
+        let Straight { image, bbox, angle_deg, click } = straight(number);
+        let outline: Vec<_> = propose_outline(&image, &bbox).vertices.iter().map(|v| [v.x, v.y]).collect();
+        let script =
+            "return import('/page/geometry.js').then(({ placedAt }) => placedAt(arguments[0], arguments[1]).angle)"
+                .replace("arguments[0]", &json!([click.x, click.y]).to_string())
+                .replace("arguments[1]", &json!(outline).to_string());
+        let angle = page.browser.run(&script, &[]).unwrap().as_f64().unwrap().to_degrees();
+        let off = (angle - angle_deg + 90.0).rem_euclid(180.0) - 90.0;
+        println!("{number}: axis {angle_deg:.1}°, off by {off:.2}°");
+        offs.push(off.abs());
+    }
+    let most = offs.iter().copied().fold(0.0, f64::max);
+    println!("most {most:.2}°");
+    assert!(most <= MAX_OFF_DEG, "{most}°");
+}
+
+/// A light plate with a dark shadow to its right, on a grey table.
+fn shaded_plate() -> RgbImage {
+    RgbImage::from_fn(640, 480, |x, y| {
+        let grain = ((x * 7 + y * 13) % 7) as u8;
+        let is_plate = (200..340).contains(&x) && (180..260).contains(&y);
+        let is_shadow = (240..420).contains(&x) && (205..285).contains(&y);
+        if is_plate {
+            Rgb([205 + grain, 170 + grain, 60])
+        } else if is_shadow {
+            Rgb([58 + grain, 60 + grain, 74 + grain])
+        } else {
+            Rgb([140 + grain, 140 + grain, 136 + grain])
+        }
+    })
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn a_stroke_removes_a_shadow_and_the_box_is_drawn_to_the_outline() {
+    let folder = tempfile::tempdir().unwrap();
+    shaded_plate().save(folder.path().join("photo.png")).unwrap();
+    let page = Page::open_in(folder, &["photo.png"]);
+    page.wait_for("the photo", "return document.getElementById('photo').naturalWidth");
+    let corners = [[196.0, 176.0], [300.0, 250.0], [424.0, 289.0]].map(|place| page.on_screen(place));
+    page.browser.drag(&corners).unwrap();
+    page.wait_for("the outline", "return document.querySelector('#do-outline.done') !== null");
+    page.settle();
+    let plate = 140.0 * 80.0;
+    assert!(page.saved().outline.unwrap().area() > 1.5 * plate, "the shadow is in the outline");
+    page.click("[data-tool=out]");
+    let stroke = [[370.0, 230.0], [380.0, 260.0], [390.0, 275.0]].map(|place| page.on_screen(place));
+    page.browser.drag(&stroke).unwrap();
+    page.settle();
+    let saved = page.saved();
+    let area = saved.outline.unwrap().area();
+    assert!((area / plate - 1.0).abs() < 0.1, "{area} of {plate}");
+    let bbox = saved.bbox;
+    assert!(bbox.x2 < 350.0 && bbox.y2 < 270.0 && bbox.x1 < 201.0 && bbox.y1 < 181.0, "{bbox:?}");
+    let strokes = "return document.querySelectorAll('#overlay .strokes path').length";
+    assert_eq!(page.browser.run(strokes, &[]).unwrap(), json!(2));
+    page.screenshot("corrections-1-stroke");
+    page.assert_accessible("a stroke over a shadow");
+    page.browser.press(&["\u{e009}", "z"]).unwrap();
+    page.settle();
+    let back = page.saved();
+    assert!(back.outline.unwrap().area() > 1.5 * plate && back.bbox.x2 > 420.0, "undone, both are as they were");
+    page.assert_quiet();
+}
