@@ -12,7 +12,7 @@ pub struct Instance {
     pub bbox: BoundingBox,
     /// The marked grasp; an optional instance may lack it.
     pub grasp: Option<GraspLine>,
-    /// Neither missed nor wrong: flagged so, or what the model was taught from.
+    /// Neither missed nor wrong: flagged so, what the model was taught from, or not wholly in the region that it searches.
     pub optional: bool,
     /// Where the labels say it.
     pub extent: Option<Extent>,
@@ -42,6 +42,15 @@ pub struct LabelledPicture {
 }
 
 impl LabelledPicture {
+    /// Makes optional what does not lie wholly in the part of the picture that is searched.
+    pub fn mark_outside(&mut self, searched: &BoundingBox) {
+        for instance in &mut self.instances {
+            let BoundingBox { x1, y1, x2, y2 } = instance.bbox;
+            let is_inside = searched.x1 <= x1 && searched.y1 <= y1 && x2 <= searched.x2 && y2 <= searched.y2;
+            instance.optional |= !is_inside;
+        }
+    }
+
     /// The file's name.
     pub fn name(&self) -> String {
         file_name(&self.path)
