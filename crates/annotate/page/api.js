@@ -75,6 +75,7 @@ const MAX_KEEPALIVE_CHARS = 20000;
 export const api = {
   session: (options) => send("GET", "/api/session", undefined, options),
   rename: (label) => json("PUT", "/api/label", { label }),
+  setRegion: (region) => inTurn(() => json("PUT", "/api/region", region)),
   // `keepalive`: marks made just before the page is closed are saved, too.
   saveMarks: (id, marks) => json("PUT", `/api/images/${id}/marks`, marks, { keepalive: JSON.stringify(marks).length < MAX_KEEPALIVE_CHARS }),
   proposeOutline: (id, box, clicks) => json("POST", `/api/images/${id}/outline`, { box, clicks }),

@@ -6,6 +6,7 @@ import "./gestures.js";
 import { renderLive } from "./live.js";
 import { renderMarkPanel } from "./mark_panel.js";
 import { renderOverlay } from "./overlay.js";
+import { renderRegion } from "./region.js";
 import { renderSamples } from "./samples.js";
 import { beat, sendKept } from "./server_end.js";
 import { onChange, state } from "./store.js";
@@ -41,7 +42,7 @@ by("zoom-fit").addEventListener("click", fitOrPart);
 onChange(() => {
   // Until the server has answered there is nothing to show.
   if (!state.images.length && !state.camera) return;
-  for (const render of [renderTabs, renderView, renderOverlay, renderStrip, renderMarkPanel, renderSamples, renderTeach, renderVersions, renderTry, renderLive]) render();
+  for (const render of [renderTabs, renderView, renderOverlay, renderStrip, renderMarkPanel, renderSamples, renderTeach, renderVersions, renderTry, renderLive, renderRegion]) render();
   document.title = `${shownName()} · Teach a grasp`;
 });
 
@@ -56,6 +57,7 @@ try {
     modelPath: session.model_path,
     project: session.project,
     models: session.models,
+    region: session.region,
     isCalibrated: session.is_calibrated,
     hasModel: session.models.some((model) => model.is_current),
     images: session.images.map(adopt),

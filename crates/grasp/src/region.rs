@@ -104,9 +104,7 @@ impl SearchRegion {
     /// # Errors
     /// A region without pixels, one that reaches out of the picture, one that was given for pictures of another size.
     pub fn check(&self, [width, height]: [u32; 2]) -> std::result::Result<(), RegionError> {
-        if self.width == 0 || self.height == 0 {
-            return Err(RegionError::Empty { region: *self });
-        }
+        self.check_pixels()?;
         if let Some([expected_width, expected_height]) = self.picture.filter(|expected| *expected != [width, height]) {
             return Err(RegionError::OtherPicture { expected_width, expected_height, width, height });
         }
@@ -115,6 +113,10 @@ impl SearchRegion {
             return Err(RegionError::Outside { region: *self, width, height });
         }
         Ok(())
+    }
+
+    fn check_pixels(&self) -> std::result::Result<(), RegionError> {
+        if self.width == 0 || self.height == 0 { Err(RegionError::Empty { region: *self }) } else { Ok(()) }
     }
 
     /// Whether a part lies in it: its grasp point, and at least half of its outline's area.
@@ -138,8 +140,9 @@ impl SearchRegion {
 /// # Errors
 /// As [`SearchRegion::check`], and a region that the part does not fit in.
 pub(crate) fn check_region(region: &SearchRegion, demonstrations: Option<&Vec<TaughtDemonstration>>) -> Result<()> {
-    region.check(region.picture.unwrap_or([u32::MAX; 2]))?;
-    if let Some((picture, demonstrations)) = region.picture.zip(demonstrations) {
+    let Some(picture) = region.picture else { return Ok(region.check_pixels()?) };
+    region.check(picture)?;
+    if let Some(demonstrations) = demonstrations {
         SearchWindow::about(&region.bounds(), region, picture, demonstrations)?;
     }
     Ok(())

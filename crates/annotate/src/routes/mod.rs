@@ -8,6 +8,7 @@
 //! | `GET /`, `/page/{file}` | the page |
 //! | `GET /api/session` | all that the page starts from |
 //! | `PUT /api/label` | renames the object |
+//! | `PUT /api/region` | the part of pictures that is searched from now on; null for all of them |
 //! | `GET /api/images/{id}/picture` | a marked picture |
 //! | `PUT /api/images/{id}/marks` | takes marks, writes them, says what they suffice for |
 //! | `DELETE /api/images/{id}`, `/api/trial-pictures/{id}` | takes the picture out of the session; its file stays |
@@ -74,6 +75,9 @@ pub fn answer(session: &Session, request: &Request) -> Response {
         },
         ("GET", ["api", "session"]) => json_of(Ok(session.view())),
         ("PUT", ["api", "label"]) => json_of(rename(session, &request.body)),
+        ("PUT", ["api", "region"]) => json_of(
+            read("region", &request.body).and_then(|region| session.set_region(region)).map(|()| session.view()),
+        ),
         ("GET", ["api", "teaching"]) => json_of(Ok(session.teaching_news())),
         ("POST", ["api", "teaching"]) => {
             json_of(read("teaching", &request.body).and_then(|asked| session.start_teaching(asked)))

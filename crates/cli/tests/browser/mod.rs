@@ -9,4 +9,5 @@ mod live;
 pub(crate) mod page;
 mod photo_to_grasp;
 mod project;
+mod region;
 mod small_screen;

@@ -5,8 +5,10 @@ use sdg_geometry::BoundingBox;
 
 use crate::resampled::PixelRect;
 
-/// Cells across and down, of which the mean colours are compared.
-const CELLS: [u32; 2] = [32, 24];
+/// Most cells across and down, of which the mean colours are compared, and the shortest side of a cell: the mean of fewer pixels would be
+/// noise. Chosen by hand.
+const MAX_CELLS: [u32; 2] = [32, 24];
+const MIN_CELL_PX: u32 = 8;
 /// Pixels across and down of which a cell's mean is made: more of a large picture would take longer than following a part.
 const MAX_SAMPLES: u32 = 20;
 /// A mean that changes by more, in grey values, shows other things. Chosen by hand: above what noise and lamps do, below what a
@@ -17,22 +19,27 @@ const MAX_CHANGE: f32 = 6.0;
 #[derive(Debug, Clone)]
 pub(super) struct CoarseView {
     window: PixelRect,
+    /// Cells across and down.
+    cells: [u32; 2],
     means: Vec<[f32; 3]>,
 }
 
 impl CoarseView {
     pub(super) fn new(picture: &RgbImage, window: &PixelRect) -> Self {
-        let means = (0..CELLS[1]).flat_map(|row| (0..CELLS[0]).map(move |column| [column, row]));
-        Self { window: *window, means: means.map(|cell| mean(picture, window, cell)).collect() }
+        let size = [window.width, window.height];
+        let cells = [0, 1].map(|axis| (size[axis] / MIN_CELL_PX).clamp(1, MAX_CELLS[axis]));
+        let places = (0..cells[1]).flat_map(|row| (0..cells[0]).map(move |column| [column, row]));
+        Self { window: *window, cells, means: places.map(|cell| mean(picture, window, cells, cell)).collect() }
     }
 
     /// Whether anything changed that does not lie in one of the boxes, or at their border.
     pub(super) fn has_changed_beside(&self, before: &Self, boxes: &[BoundingBox]) -> bool {
         let PixelRect { left, top, width, height } = self.window;
         let [left, top] = [left, top].map(f64::from);
-        let (width, height) = (f64::from(width) / f64::from(CELLS[0]), f64::from(height) / f64::from(CELLS[1]));
+        let [columns, rows] = self.cells;
+        let (width, height) = (f64::from(width) / f64::from(columns), f64::from(height) / f64::from(rows));
         let is_beside = |idx: usize| {
-            let [column, row] = [idx % CELLS[0] as usize, idx / CELLS[0] as usize].map(|cell| cell as f64);
+            let [column, row] = [idx % columns as usize, idx / columns as usize].map(|cell| cell as f64);
             let touches = |part: &BoundingBox| {
                 (part.x1 - width..part.x2 + width).contains(&(left + (column + 0.5) * width))
                     && (part.y1 - height..part.y2 + height).contains(&(top + (row + 0.5) * height))
@@ -44,9 +51,9 @@ impl CoarseView {
     }
 }
 
-fn mean(picture: &RgbImage, window: &PixelRect, cell: [u32; 2]) -> [f32; 3] {
+fn mean(picture: &RgbImage, window: &PixelRect, cells: [u32; 2], cell: [u32; 2]) -> [f32; 3] {
     let (corner, size) = ([window.left, window.top], [window.width, window.height]);
-    let [from, to] = [0, 1].map(|end| [0, 1].map(|axis| corner[axis] + (cell[axis] + end) * size[axis] / CELLS[axis]));
+    let [from, to] = [0, 1].map(|end| [0, 1].map(|axis| corner[axis] + (cell[axis] + end) * size[axis] / cells[axis]));
     let steps = [0, 1].map(|axis| (to[axis] - from[axis]).div_ceil(MAX_SAMPLES).max(1) as usize);
     let (mut sum, mut count) = ([0_u32; 3], 0_u32);
     for y in (from[1]..to[1]).step_by(steps[1]) {
