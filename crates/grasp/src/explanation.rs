@@ -6,7 +6,8 @@ use sdg_shape::Differences;
 
 use crate::detection::GraspDetection;
 use crate::model::GraspModel;
-use crate::region::{SearchRegion, SearchWindow};
+use crate::region::SearchRegion;
+use crate::search_window::SearchWindow;
 use crate::sizes::SizeRange;
 use crate::verification::{SearchedImage, differences};
 

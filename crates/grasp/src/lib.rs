@@ -81,10 +81,13 @@ mod pose;
 mod prepared;
 mod record;
 mod region;
+#[cfg(all(test, feature = "teach"))]
+mod region_tests;
 mod resampled;
 mod round_top;
 mod safetensors_file;
 mod same_part;
+mod search_window;
 mod sighting;
 mod sizes;
 mod slanted;

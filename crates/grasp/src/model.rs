@@ -18,8 +18,9 @@ use crate::detection::{Found, GraspDetection, Placement};
 use crate::error::{GraspError, Result};
 use crate::facts::{ModelKind, TeachingFacts};
 use crate::models::{Network, PoseCandidate, Proposals};
-use crate::region::{SearchRegion, SearchWindow, check_region};
+use crate::region::SearchRegion;
 use crate::same_part::{SAME_PART_IOU, are_outlines_of_same_part};
+use crate::search_window::{SearchWindow, check_region};
 use crate::sighting::{Sighting, sightings};
 use crate::slanted::{LevelImage, explains_more, suggested_slant};
 use crate::taught::TaughtDemonstration;
@@ -205,7 +206,7 @@ impl GraspModel {
         };
         region.check(size)?;
         let window = SearchWindow::about(&region.bounds(), region, size, &self.demonstrations)?;
-        self.find_in(&window.cut(image), &window, verification, |detection| region.has(detection)).await
+        self.find_in(&window.cut(image), &window, verification, |detection| detection.lies_in(region)).await
     }
 
     /// What is found in the image that a window was cut out as, in pixels of the whole, of which that counts for which `counts` holds.

@@ -19,16 +19,16 @@ use image::RgbImage;
 use nalgebra::{Isometry3, Point2, Point3, Rotation2, UnitQuaternion, Vector2, Vector3};
 use sdg_geometry::{Angle, BoundingBox, PlanView, PlanarGrasp, Polygon, PosedCamera, Workspace};
 
-pub use self::demonstration::{pictures_from_above, seen_from_above};
+pub use self::demonstration::{check_region_from_above, pictures_from_above, seen_from_above};
 use self::region::RegionInPlan;
-pub use self::region::check_region_from_above;
 pub use self::uncertainty::{Circumstances, ErrorLength, Uncertainty};
 use crate::detection::{Found, GraspDetection};
 use crate::error::{GraspError, Result};
 use crate::lengths::Lengths;
 use crate::model::{GraspModel, Verification};
-use crate::region::{SearchRegion, SearchWindow};
+use crate::region::SearchRegion;
 use crate::resampled::{PixelRect, PlanMap};
+use crate::search_window::SearchWindow;
 
 /// A table and a camera over it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -99,7 +99,7 @@ impl PlanDetector {
         let lengths = model.facts().lengths.ok_or(GraspError::NoLengths)?;
         let view = plan_view(over_table, &lengths)?;
         let map = PlanMap::new(&over_table.camera, &view);
-        let region = model.region().map(|region| RegionInPlan::new(region, over_table, &view)).transpose()?;
+        let region = model.region().map(|region| RegionInPlan::new(region, &over_table.camera, &view)).transpose()?;
         // The model is shown plan views, whose pixels are not those of the region.
         let model = model.with_region(None)?.of_known_size()?;
         Ok(Self { model, over_table: *over_table, lengths, view, map, region, sizes: None })
@@ -132,7 +132,7 @@ impl PlanDetector {
     /// A camera that does not see the plane; nothing is changed then.
     pub fn move_to(&mut self, over_table: &CameraOverTable) -> Result<()> {
         let view = plan_view(over_table, &self.lengths)?;
-        let region = self.region().map(|region| RegionInPlan::new(region, over_table, &view)).transpose()?;
+        let region = self.region().map(|region| RegionInPlan::new(region, &over_table.camera, &view)).transpose()?;
         (self.view, self.region) = (view, region);
         self.map = PlanMap::new(&over_table.camera, &self.view);
         self.over_table = *over_table;
@@ -145,7 +145,7 @@ impl PlanDetector {
     /// A region that reaches out of the camera's pictures or is for others, that does not show the plane, or that the part does not fit in;
     /// nothing is changed then.
     pub fn look_in(&mut self, region: Option<&SearchRegion>) -> Result<()> {
-        let region = region.map(|region| RegionInPlan::new(region, &self.over_table, &self.view)).transpose()?;
+        let region = region.map(|region| RegionInPlan::new(region, &self.over_table.camera, &self.view)).transpose()?;
         if let Some(region) = &region {
             region.window([self.view.width, self.view.height], self.model.demonstrations())?;
         }
@@ -198,7 +198,7 @@ impl PlanDetector {
     /// Whether a detection in the plan view lies in the region of the picture that is searched; any does where all of it is.
     pub(crate) fn is_in_region(&self, detection: &GraspDetection) -> bool {
         let has =
-            |region: &RegionInPlan| self.in_picture(detection.clone()).is_some_and(|seen| region.region.has(&seen));
+            |region: &RegionInPlan| self.in_picture(detection.clone()).is_some_and(|seen| seen.lies_in(&region.region));
         self.region.as_ref().is_none_or(has)
     }
 

@@ -1,14 +1,11 @@
 //! A region of the picture in the plan view.
 
 use nalgebra::Point2;
-use sdg_demonstration::Demonstration;
-use sdg_geometry::{BoundingBox, PlanView};
+use sdg_geometry::{BoundingBox, PlanView, PosedCamera};
 
-use super::{CameraOverTable, plan_view};
-use crate::check_config::CheckConfig;
 use crate::error::Result;
-use crate::lengths::Lengths;
-use crate::region::{RegionError, SearchRegion, SearchWindow};
+use crate::region::{RegionError, SearchRegion};
+use crate::search_window::SearchWindow;
 use crate::taught::TaughtDemonstration;
 
 /// Points of each edge of the region that are looked up: a lens bends it.
@@ -26,8 +23,7 @@ pub(super) struct RegionInPlan {
 impl RegionInPlan {
     /// # Errors
     /// A region that is not of the camera's pictures, or that shows nothing of the plan view.
-    pub(super) fn new(region: &SearchRegion, over_table: &CameraOverTable, view: &PlanView) -> Result<Self> {
-        let camera = &over_table.camera;
+    pub(super) fn new(region: &SearchRegion, camera: &PosedCamera, view: &PlanView) -> Result<Self> {
         region.check([camera.intrinsics.width, camera.intrinsics.height])?;
         let edges = region.bounds();
         let along = |low: f64, high: f64, k: u32| low + (high - low) * f64::from(k) / f64::from(POINTS_A_SIDE);
@@ -50,26 +46,4 @@ impl RegionInPlan {
     pub(super) fn window(&self, view_size: [u32; 2], demonstrations: &[TaughtDemonstration]) -> Result<SearchWindow> {
         SearchWindow::about(&self.bounds, &self.region, view_size, demonstrations)
     }
-}
-
-/// Whether a region of a camera's pictures can be searched for the part of demonstrations that [`super::seen_from_above`] made.
-///
-/// # Errors
-/// A region that reaches out of the pictures or is for others, that does not show the plane, or that the part does not fit in.
-pub fn check_region_from_above(
-    region: &SearchRegion,
-    demonstrations: &[Demonstration],
-    over_table: &CameraOverTable,
-    lengths: &Lengths,
-) -> Result<()> {
-    let view = plan_view(over_table, lengths)?;
-    let in_plan = |demonstration: &Demonstration| {
-        let mut taught = TaughtDemonstration::new(demonstration)?;
-        taught.marks.photo_size = None;
-        let mut check = taught.check().clone();
-        check.search.scales = CheckConfig::KNOWN_SIZE_TOLERANCE;
-        taught.with_check(check)
-    };
-    let taught = demonstrations.iter().map(in_plan).collect::<Result<Vec<_>>>()?;
-    RegionInPlan::new(region, over_table, &view)?.window([view.width, view.height], &taught).map(|_| ())
 }

@@ -49,7 +49,7 @@ use crate::model::GraspModel;
 use crate::models::mask::MaskMatcher;
 use crate::models::{Network, Proposals, Reading};
 use crate::network_evidence::NetworkEvidence;
-use crate::region::check_region;
+use crate::search_window::check_region;
 use crate::taught::TaughtDemonstration;
 
 use absent::AbsentSamples;

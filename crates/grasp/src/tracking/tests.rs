@@ -214,8 +214,7 @@ fn with_a_region_parts_are_followed_in_it_alone() {
     assert!(num_followed > 30, "{num_followed}");
     assert_eq!(told[79][0].state, TrackState::Lost);
     // What changes beside the region is not searched for before the frame is answered.
-    let mut config = TrackerConfig::default();
-    config.moves_within = Duration::ZERO;
+    let config = TrackerConfig { moves_within: Duration::ZERO, ..TrackerConfig::default() };
     let model = drawn_part::model(SIZE).with_region(Some(region)).unwrap();
     let mut tracker = Tracker::new(model.into(), config);
     let still = at(110.0, 120.0, 0.0);

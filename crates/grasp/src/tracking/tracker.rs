@@ -470,7 +470,7 @@ impl Tracker {
 /// is searched.
 fn shown_within(detector: &PartDetector, mut detection: GraspDetection, size: [u32; 2]) -> Option<Shown> {
     detection.bbox = detection.bbox.clip(f64::from(size[0]), f64::from(size[1]));
-    let is_in_region = |shown: &Shown| detector.region().is_none_or(|region| region.has(&shown.0));
+    let is_in_region = |shown: &Shown| detector.region().is_none_or(|region| shown.0.lies_in(region));
     detector.output(detection).filter(is_in_region)
 }
 

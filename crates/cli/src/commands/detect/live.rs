@@ -16,8 +16,8 @@ use sdg_cell::{FoundRecord, FrameDetector, Frames, Next, Part, Perception, drawi
 use sdg_grasp::{TrackState, TrackerConfig, Verification};
 use serde::Serialize;
 
-use super::RegionRecord;
 use super::args::DetectArgs;
+use super::region_record::RegionRecord;
 use crate::exit::{Outcome, Usage, one_line};
 use crate::found_text::Wording;
 use crate::interrupt::Interrupt;

@@ -3,6 +3,7 @@
 mod args;
 mod inputs;
 mod live;
+mod region_record;
 
 use std::collections::BTreeSet;
 use std::io::Write;
@@ -11,11 +12,12 @@ use std::time::Instant;
 use anyhow::{Context, Result, bail};
 use image::RgbImage;
 use sdg_cell::{DEFAULT_MIN_SCORE, Found, FoundRecord, Perception, drawing};
-use sdg_grasp::{CheckConfig, GraspDetection, SearchRegion, Verification};
+use sdg_grasp::{CheckConfig, GraspDetection, Verification};
 use sdg_inputs::{PictureInput, PictureInputs, camera_files, pictures_of_argument};
 use serde::Serialize;
 
 pub use args::DetectArgs;
+use region_record::RegionRecord;
 
 use crate::commands::devices;
 use crate::exit::{Outcome, Usage, one_line};
@@ -247,22 +249,6 @@ struct ImageLine<'a> {
     region: Option<RegionRecord>,
     num_refused: usize,
     detections: Vec<PictureRecord>,
-}
-
-/// The part of the picture that was searched; pixels.
-#[derive(Serialize)]
-struct RegionRecord {
-    x: u32,
-    y: u32,
-    width: u32,
-    height: u32,
-}
-
-impl RegionRecord {
-    fn of(region: &SearchRegion) -> Self {
-        let SearchRegion { x, y, width, height, .. } = *region;
-        Self { x, y, width, height }
-    }
 }
 
 /// A detection and what helps to understand it.

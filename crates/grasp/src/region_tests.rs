@@ -3,12 +3,13 @@
 use std::ops::ControlFlow;
 
 use image::RgbImage;
-use sdg_geometry::{Angle, PlanarGrasp};
+use sdg_geometry::{Angle, BoundingBox, PlanarGrasp};
 
-use super::*;
+use crate::detection::GraspDetection;
 use crate::drawn_part::{self, at};
 use crate::facts::{ModelKind, TurnSource};
 use crate::model::{GraspModel, Verification};
+use crate::region::SearchRegion;
 use crate::teach::{TeachOptions, teach};
 
 const SIZE: [u32; 2] = [480, 360];
@@ -46,7 +47,7 @@ fn in_a_region_is_found_what_the_whole_picture_has_there() {
     for (x, y) in (0..=280).step_by(35).flat_map(|x| (0..=160).step_by(40).map(move |y| (x, y))) {
         let region = SearchRegion::new([x, y, 200, 200]);
         let found = accepted(&model.clone().with_region(Some(region)).unwrap(), &picture);
-        let expected: Vec<_> = whole.iter().filter(|detection| region.has(detection)).collect();
+        let expected: Vec<_> = whole.iter().filter(|detection| detection.lies_in(&region)).collect();
         assert_eq!(found.len(), expected.len(), "{region}: {found:#?}");
         for detection in expected {
             let apart = |found: &GraspDetection| (found.grasp.center() - detection.grasp.center()).norm();
@@ -93,7 +94,7 @@ fn the_best_outside_takes_no_place_of_one_inside() {
         model.with_region(Some(region)).unwrap().with_max_detections(1).unwrap(),
     ] {
         let found = model.detect(&picture, Verification::ByShape).unwrap();
-        assert!(found.len() == 1 && region.has(&found[0]) && found[0].is_accepted(), "{found:?}");
+        assert!(found.len() == 1 && found[0].lies_in(&region) && found[0].is_accepted(), "{found:?}");
     }
 }
 
@@ -132,12 +133,12 @@ fn half_of_a_part_and_its_grasp_point_decide() {
         light: 1.0,
     };
     // Its box reaches from x − 20 to x + 20, and is grasped 5 to the right of the middle.
-    assert!(region.has(&detection(120.0, 70.0)));
-    assert!(region.has(&detection(100.0, 70.0)), "half");
-    assert!(!region.has(&detection(99.0, 70.0)), "less than half");
-    assert!(region.has(&detection(154.9, 70.0)) && !region.has(&detection(155.0, 70.0)), "the grasp point");
+    assert!(detection(120.0, 70.0).lies_in(&region));
+    assert!(detection(100.0, 70.0).lies_in(&region), "half");
+    assert!(!detection(99.0, 70.0).lies_in(&region), "less than half");
+    assert!(detection(154.9, 70.0).lies_in(&region) && !detection(155.0, 70.0).lies_in(&region), "the grasp point");
     // A quarter, though the grasp point is in.
-    assert!(!region.has(&detection(99.0, 51.0)));
+    assert!(!detection(99.0, 51.0).lies_in(&region));
 }
 
 #[test]
@@ -169,13 +170,4 @@ fn regions_that_cannot_be_searched_are_refused_each_with_its_reason() {
     let demonstration = drawn_part::demonstration(SIZE);
     let error = teach(&[demonstration], &options, &mut |_| ControlFlow::Break(())).unwrap_err().to_string();
     assert_eq!(error, small);
-}
-
-#[test]
-fn extents_by_hand() {
-    // 3 × 4 turned by 30°: the diagonal, and the shorter side.
-    let turn = PlanarSimilarity { angle: Angle::from_degrees(30.0), ..PlanarSimilarity::IDENTITY };
-    let rectangle = Polygon::from_box(&BoundingBox { x1: 0.0, y1: 0.0, x2: 3.0, y2: 4.0 }).transformed(&turn);
-    let [length, across] = extents(&rectangle);
-    assert!((length - 5.0).abs() < 1e-9 && (across - 3.0).abs() < 1e-9, "{length} {across}");
 }
