@@ -130,15 +130,20 @@ class Linemod:
                 self.templates.append((degrees, middle + border - (left, top)))
 
     def find(self, picture):
-        # The response maps need sides that the strides of both levels divide.
+        # The response maps need sides that the strides of both levels divide, and where a template reaches out of the picture,
+        # its search reads beyond its memory: a part's length of border keeps it within.
+        border = math.ceil(self.part.extent)
+        height, width = (side + 2 * border for side in picture.shape[:2])
         padded = cv2.copyMakeBorder(
-            picture, 0, (-picture.shape[0]) % 80, 0, (-picture.shape[1]) % 80, cv2.BORDER_REPLICATE
+            picture, border, border + -height % 80, border, border + -width % 80, cv2.BORDER_REPLICATE
         )
         matches, _ = self.detector.match([padded], self.LEAST_SIMILARITY)
         found = []
         for match in matches[:4000]:
             degrees, middle = self.templates[match.template_id]
-            found.append((match.x + middle[0], match.y + middle[1], degrees, match.similarity / 100))
+            x, y = match.x + middle[0] - border, match.y + middle[1] - border
+            if 0 <= x < picture.shape[1] and 0 <= y < picture.shape[0]:
+                found.append((x, y, degrees, match.similarity / 100))
         return apart(found, 0.25 * self.part.extent)
 
 
