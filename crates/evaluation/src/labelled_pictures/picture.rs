@@ -69,3 +69,22 @@ pub struct LeftOut {
 pub(super) fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_reaches_out_of_the_searched_part_may_be_missed() {
+        let instance = |x1: f64| {
+            let bbox = BoundingBox { x1, y1: 20.0, x2: x1 + 40.0, y2: 60.0 };
+            Instance { bbox, grasp: None, optional: false, extent: None }
+        };
+        let instances = [10.0, 60.0, 61.0, 150.0].map(instance).to_vec();
+        let mut picture =
+            LabelledPicture { path: "a.png".into(), labels: "a.json".into(), size: [200, 100], instances, kind: None };
+        picture.mark_outside(&BoundingBox { x1: 10.0, y1: 10.0, x2: 100.0, y2: 60.0 });
+        let optional: Vec<bool> = picture.instances.iter().map(|instance| instance.optional).collect();
+        assert_eq!(optional, [false, false, true, true]);
+    }
+}
