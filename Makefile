@@ -5,7 +5,7 @@ CARGO ?= cargo
 PROFILE := --release
 
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo web edge test test-compile test-browser walk acceptance test-v4l test-peers test-ros2 test-slurm slurm-image network-grasps placing heights test-wgpu test-ndarray test-torch package lint base-weights bench bench-browser bench-planning clean
+.PHONY: help setup build demo web edge test test-compile test-browser walk acceptance test-v4l test-peers test-ros2 test-slurm slurm-image network-grasps placing heights test-wgpu test-ndarray test-torch package lint base-weights bench bench-search bench-browser bench-planning clean
 
 help: ## Lists the targets
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
@@ -140,10 +140,18 @@ base-weights: setup ## Pretrains preset edge on generated parts (hours; goes on 
 		--comparison $(BASE_WEIGHTS)/comparison.safetensors --out $(BASE_WEIGHTS)/edge.safetensors \
 		--commit $$(git rev-parse --short HEAD)
 
-bench: setup ## Our speed against PyTorch, ONNX Runtime, OpenVINO, albumentations (BENCH=--quick: sooner)
+bench: setup ## Our speed against PyTorch, ONNX Runtime, OpenVINO, albumentations (BENCH=--quick: sooner), and bench-search
 	@scripts/build.sh --bin sdg --bin sdg-bench
 	benches/peers/install.sh target/bench/venv
 	target/release/sdg-bench compare --results benches/RESULTS.md $(BENCH)
+	@$(MAKE) bench-search QUICK=$(findstring --quick,$(BENCH))
+
+# Without a folder of sets shipped parts are measured alone. Of the sets only those are opened that constants are or were fitted on.
+bench-search: setup ## Model S against corrmatch, OpenCV's matchTemplate and LINEMOD, and its curves of time (SETS=FOLDER; QUICK=1: shipped parts, nothing is written)
+	@scripts/build.sh --bin sdg-bench
+	benches/peers/install-matchers.sh target/bench/matchers
+	target/release/sdg-bench matchers $(if $(QUICK),--rounds 1,--sets "$(or $(SETS),../shared)" --results benches/RESULTS.md)
+	target/release/sdg-bench curves $(if $(QUICK),--secs 0.2,--results benches/RESULTS.md)
 
 # After `make bench`, which leaves PyTorch and a taught model; npm fetches onnxruntime-web.
 bench-browser: web ## The page's speed against onnxruntime-web in headless Chromium

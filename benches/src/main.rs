@@ -17,12 +17,15 @@
 
 mod browser;
 mod compare;
+mod curves;
 mod edge;
+mod matchers;
 mod network;
 mod protocol;
 mod registry;
 mod results;
 mod scene;
+mod turned_parts;
 mod works;
 
 use std::path::PathBuf;
@@ -47,6 +50,10 @@ enum Command {
     Compare(compare::CompareArgs),
     /// The page's detection against onnxruntime-web's in the same page of a headless Chromium
     Browser(browser::BrowserArgs),
+    /// The time of model S against pixels, parts in the picture and edge points
+    Curves(curves::CurvesArgs),
+    /// Model S beside corrmatch and OpenCV's matchers: times, found and wrong ones
+    Matchers(matchers::MatchersArgs),
     /// Size, start, memory and frames a second of the program for small machines, on one core
     Edge(edge::EdgeArgs),
     /// Runs one of our works when asked on standard input; `compare` starts it
@@ -65,6 +72,8 @@ fn main() -> ExitCode {
     let result = match Args::parse().command {
         Command::Compare(args) => compare::run(&args),
         Command::Browser(args) => browser::run(&args),
+        Command::Curves(args) => curves::run(&args),
+        Command::Matchers(args) => matchers::run(&args),
         Command::Edge(args) => edge::run(&args),
         Command::Work(args) => protocol::serve(|| works::build(&args)),
         Command::Weights { network, out } => network.write_weights(&out),

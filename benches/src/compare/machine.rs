@@ -8,14 +8,20 @@ pub struct Machine {
     pub processor: String,
     /// Cores that this process may use.
     pub cores: usize,
-    /// The widest instructions that matter here.
-    pub instructions: &'static str,
+    /// The wide instructions that it has, of those that matter here.
+    pub instructions: String,
     pub memory_gib: f64,
     /// The commit that was measured, with a plus sign where files differ from it.
     pub commit: String,
 }
 
 impl Machine {
+    /// The machine and the commit in a line.
+    pub fn in_words(&self) -> String {
+        let Self { processor, cores, instructions, memory_gib, commit } = self;
+        format!("{processor}, {cores} cores ({instructions}), {memory_gib:.0} GiB; commit {commit}")
+    }
+
     /// Asks the system; what it does not tell is "unknown".
     pub fn read() -> Self {
         let processor = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
@@ -51,15 +57,28 @@ fn processor_name(cpuinfo: &str) -> String {
     format!("{} (family {}, model {})", of("model name"), of("cpu family"), of("model"))
 }
 
-fn instructions(cpuinfo: &str) -> &'static str {
-    let has = |flag| value(cpuinfo, "flags").is_some_and(|flags| flags.split_whitespace().any(|one| one == flag));
-    if has("avx512f") {
-        "AVX-512"
-    } else if has("avx2") {
-        "AVX2"
-    } else {
-        "neither AVX-512 nor AVX2"
-    }
+/// Features that programs choose their code by, as Linux names them on x86 and on Arm.
+const FEATURES: [&str; 13] = [
+    "sse4_1",
+    "avx",
+    "avx2",
+    "fma",
+    "f16c",
+    "avx512f",
+    "avx512bw",
+    "avx512dq",
+    "avx512vl",
+    "avx512_vnni",
+    "avx512_bf16",
+    "asimd",
+    "sve",
+];
+
+fn instructions(cpuinfo: &str) -> String {
+    let flags = value(cpuinfo, "flags").or_else(|| value(cpuinfo, "Features")).unwrap_or_default();
+    let has = |feature: &&&str| flags.split_whitespace().any(|flag| flag == **feature);
+    let found: Vec<&str> = FEATURES.iter().filter(has).copied().collect();
+    if found.is_empty() { "no wide instructions known".to_owned() } else { found.join(" ") }
 }
 
 #[cfg(test)]
@@ -71,7 +90,9 @@ mod tests {
         let cpuinfo = "processor\t: 0\ncpu family\t: 25\nmodel\t\t: 17\nmodel name\t: AMD EPYC\n\
                        flags\t\t: fpu avx2 avx512f\n\nprocessor\t: 1\nmodel name\t: other\n";
         assert_eq!(processor_name(cpuinfo), "AMD EPYC (family 25, model 17)");
-        assert_eq!(instructions(cpuinfo), "AVX-512");
-        assert_eq!(instructions("flags : avx avx2"), "AVX2");
+        assert_eq!(instructions(cpuinfo), "avx2 avx512f");
+        assert_eq!(instructions("flags : avx avx2 fma"), "avx avx2 fma");
+        assert_eq!(instructions("Features : fp asimd"), "asimd");
+        assert_eq!(instructions(""), "no wide instructions known");
     }
 }

@@ -106,12 +106,11 @@ impl Report {
 
     /// One line on machine, versions and peak.
     pub fn heading(&self) -> String {
-        let Machine { processor, cores, instructions, memory_gib, commit } = &self.machine;
         let peak = self.peak_gflops.map_or("unknown".to_owned(), |peak| format!("{peak:.0} GFLOP/s"));
         let versions = if self.versions.is_empty() { String::new() } else { format!(" {}.", self.versions.join(", ")) };
         format!(
-            "{processor}, {cores} cores, {instructions}, {memory_gib:.0} GiB; {} threads a side; commit {commit}.{versions} \
-             Peak of a product of matrices: {peak}.",
+            "{}; {} threads a side.{versions} Peak of a product of matrices: {peak}.",
+            self.machine.in_words(),
             self.threads
         )
     }
@@ -242,7 +241,7 @@ mod tests {
         let machine = Machine {
             processor: "test".to_owned(),
             cores: 2,
-            instructions: "AVX2",
+            instructions: "avx2".to_owned(),
             memory_gib: 8.0,
             commit: "abc".to_owned(),
         };

@@ -12,6 +12,7 @@ mod teaching;
 use anyhow::{Context, Result, bail};
 
 pub use args::WorkArgs;
+pub use demonstration::read_demonstration;
 
 use crate::network::Network;
 use crate::protocol::Work;

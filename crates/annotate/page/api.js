@@ -82,6 +82,7 @@ export const api = {
   otherUrl: (id) => `/api/others/${id}/picture`,
   uploadPhoto: (file) => send("POST", `/api/images?name=${encodeURIComponent(file.name)}`, file),
   rename: (label) => json("PUT", "/api/label", { label }),
+  setRegion: (region) => inTurn(() => json("PUT", "/api/region", region)),
   // `keepalive`: marks made just before the page is closed are saved, too.
   saveMarks: (id, marks) => json("PUT", `/api/images/${id}/marks`, marks, { keepalive: JSON.stringify(marks).length < MAX_KEEPALIVE_CHARS }),
   proposeOutline: (id, box, strokes) => json("POST", `/api/images/${id}/outline`, { box, strokes }),

@@ -4,6 +4,7 @@ import { add, direction, dot, fittedWidth, gripperOf, norm, quarter, sub, times 
 import { boxDrawn, closeOutline, commit, placeGripper, setBox, setGripper, setTool, strokeOutline } from "./editing.js";
 import { changed, image, isMarking, marks, region, size, state } from "./store.js";
 import { KNOB_PX } from "./overlay.js";
+import { abandonRegion, drawingRegion, isChoosingRegion } from "./region.js";
 import { pan, toPhoto, zoom } from "./view.js";
 
 const stage = document.getElementById("stage");
@@ -199,7 +200,9 @@ function nearestVertex(place) {
 function begin(event, at) {
   const from = toPhoto(at);
   const taken = event.target.closest?.("[data-kind]");
-  if (event.button === 1 || spaceHeld || !isMarking()) return panning();
+  if (event.button === 1 || spaceHeld) return panning();
+  if (isChoosingRegion()) return drawingRegion(from);
+  if (!isMarking()) return panning();
   if (taken?.dataset.kind === "draft" && taken.dataset.vertex === "0") {
     return { move() {}, end: () => closeOutline(state.draft.points) };
   }
@@ -298,6 +301,7 @@ export function holdSpace(held) {
 
 /** Ends what is being drawn; without, lets go of what is selected. */
 export function letGo() {
+  abandonRegion();
   if (gesture || state.draft) return abandon();
   Object.assign(state, { selected: null, vertex: null });
   setTool("select");

@@ -7,6 +7,7 @@ import "./gestures.js";
 import { renderLive } from "./live.js";
 import { renderMarkPanel } from "./mark_panel.js";
 import { renderOverlay } from "./overlay.js";
+import { renderRegion } from "./region.js";
 import { renderSamples } from "./samples.js";
 import { beat, renderUnsaved, sendKept } from "./server_end.js";
 import { showStart } from "./start.js";
@@ -43,7 +44,7 @@ by("zoom-fit").addEventListener("click", fitOrPart);
 onChange(() => {
   // Until the server has answered there is nothing to show.
   if (state.project === undefined) return;
-  for (const render of [renderTabs, renderView, renderOverlay, renderStrip, renderMarkPanel, renderSamples, renderTeach, renderVersions, renderTry, renderLive, renderFolder, renderUnsaved]) render();
+  for (const render of [renderTabs, renderView, renderOverlay, renderStrip, renderMarkPanel, renderSamples, renderTeach, renderVersions, renderTry, renderLive, renderRegion, renderFolder, renderUnsaved]) render();
   document.title = `${shownName() || "Photo"} · Teach a grasp`;
 });
 
@@ -68,6 +69,7 @@ async function open(session) {
     modelPath: session.model_path,
     project: session.project,
     models: session.models,
+    region: session.region,
     isCalibrated: session.is_calibrated,
     hasModel: session.models.some((model) => model.is_current),
     images: session.images.map(adopt),

@@ -37,6 +37,8 @@ export const state = {
   /** The order of the pictures to try in their row: as they were added, by score, by state. */
   sortedBy: "added",
   showDifferences: true,
+  /** The part of the pictures that is searched, and for pictures of which size; null for all of them. */
+  region: null,
   teaching: { status: "idle", losses: [], validations: [] },
   /** The part of the photo in view: screen = photo · scale + [x, y]. */
   view: { scale: 1, x: 0, y: 0, fitted: true },

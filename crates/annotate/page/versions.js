@@ -40,8 +40,7 @@ export function gradeOf({ figures }) {
 async function use(id) {
   try {
     const session = await api.useModel(id);
-    state.models = session.models;
-    state.hasModel = true;
+    Object.assign(state, { models: session.models, region: session.region, hasModel: true });
     for (const trial of [...state.trialPictures, state.live]) trial.detections = null;
     toast("This version is used now, and stands under the model’s name.");
   } catch (error) {

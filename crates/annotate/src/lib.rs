@@ -43,6 +43,7 @@ mod picture;
 mod preview;
 mod project_file;
 mod recent;
+mod region;
 mod routes;
 mod server;
 mod session;
@@ -62,6 +63,7 @@ pub use live::{Live, LiveFault, LiveFaultKind, LiveFrame, LiveOptions, LivePictu
 pub use marks::{GraspMarks, Marks};
 pub use project_file::project_of_photo;
 pub use recent::{RecentProject, RecentProjects};
+pub use region::Region;
 pub use sdg_demonstration::ModelKind;
 pub use server::Server;
 pub use session::{Session, SessionOptions};

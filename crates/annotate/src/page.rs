@@ -26,6 +26,7 @@ const FILES: &[(&str, &str, &str)] = &[
     ("main.js", SCRIPT, include_str!("../page/main.js")),
     ("mark_panel.js", SCRIPT, include_str!("../page/mark_panel.js")),
     ("overlay.js", SCRIPT, include_str!("../page/overlay.js")),
+    ("region.js", SCRIPT, include_str!("../page/region.js")),
     ("server_end.js", SCRIPT, include_str!("../page/server_end.js")),
     ("samples.js", SCRIPT, include_str!("../page/samples.js")),
     ("store.js", SCRIPT, include_str!("../page/store.js")),

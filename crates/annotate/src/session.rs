@@ -22,6 +22,7 @@ use crate::names::{file_name, free_numbered, safe_stem};
 use crate::picture::{Picture, png};
 use crate::preview::{Previews, SampleKey};
 use crate::project_file::ProjectPlace;
+use crate::region::Region;
 use crate::session_state::State;
 use crate::teacher::{GraspTeacher, TaughtModel, TeachRequest, TeachingMaterial};
 use crate::teaching::{News, Teaching};
@@ -128,6 +129,7 @@ impl Session {
             trial_pictures: state.trial_ids().map(|id| state.trial_picture_view(id)).collect(),
             model_path: self.model_path(&state).display().to_string(),
             models: state.model_views(),
+            region: state.region,
             is_calibrated: state.max_opening_px.is_some(),
             project: state.place.as_ref().map(ProjectPlace::shown),
             can_close: false,
@@ -224,8 +226,25 @@ impl Session {
         let summary = state.models.get(id)?.summary.clone();
         let model = self.teacher.open(&state.models.read(id)?, &summary).map_err(Error::Teacher)?;
         state.models.use_version(&path, id)?;
+        state.region = model.region();
         self.teaching.set_model(Arc::from(model));
         state.save_project()
+    }
+
+    /// Searches this part of pictures alone from now on, with the model in use and with those that are taught; all of them with `None`.
+    ///
+    /// # Errors
+    /// A region that is none, or that the model cannot search; a teaching that goes on, whose model has the region that it began with.
+    pub fn set_region(&self, region: Option<Region>) -> Result<()> {
+        self.teaching.check_idle()?;
+        if let Some(region) = &region {
+            region.check()?;
+        }
+        if let Ok(model) = self.teaching.model() {
+            model.look_in(region).map_err(Error::Teacher)?;
+        }
+        self.state().region = region;
+        Ok(())
     }
 
     /// The camera.
@@ -294,6 +313,7 @@ impl Session {
     /// A request without sense, a teaching that goes on already, marks that do not suffice.
     pub fn start_teaching(&self, request: TeachRequest) -> Result<News> {
         request.check()?;
+        let request = TeachRequest { region: self.state().region, ..request };
         self.teaching.check_idle()?;
         let demonstrations = self.demonstrations(request.model)?;
         let (model_path, negatives, fingerprint) = {

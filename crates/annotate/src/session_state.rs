@@ -13,6 +13,7 @@ use crate::model_versions::{ModelVersions, Version, fingerprint};
 use crate::names::file_name;
 use crate::picture::Picture;
 use crate::project_file::{ProjectFile, ProjectPlace, Tried, relative};
+use crate::region::Region;
 use crate::views::{ImageView, ModelView, Saved, TrialPictureView};
 
 /// The present label, the pictures of the object and the pictures to try, each numbered by its place; what is removed keeps its
@@ -32,6 +33,8 @@ pub struct State {
     pub offered: Vec<PathBuf>,
     /// How far the hand opens, where a camera tells.
     pub max_opening_px: Option<f64>,
+    /// The part of pictures that the model in use searches, and that the next one will.
+    pub region: Option<Region>,
 }
 
 /// A picture of the object and what is marked on it.

@@ -9,6 +9,7 @@ use sdg_geometry::{BoundingBox, PlanarGrasp, Polygon};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, TeacherError};
+use crate::region::Region;
 
 /// More steps than any teaching has.
 const MAX_STEPS: usize = 1_000_000;
@@ -54,6 +55,15 @@ pub trait TaughtModel: Send + Sync {
     /// A model that cannot be written down.
     fn to_bytes(&self) -> Result<Vec<u8>, TeacherError>;
 
+    /// The part of pictures that is searched; all of them where `None`.
+    fn region(&self) -> Option<Region>;
+
+    /// Searches this part of pictures alone from now on; all of them with `None`. The model file stays as it is.
+    ///
+    /// # Errors
+    /// A region that the part does not fit in, or that is not of the camera's pictures.
+    fn look_in(&self, region: Option<Region>) -> Result<(), TeacherError>;
+
     /// Finds the part, best score first; those below 0.5 are listed too.
     ///
     /// # Errors
@@ -90,6 +100,9 @@ pub struct TeachRequest {
     /// Decides every random choice.
     #[serde(default = "one_seed")]
     pub seed: u64,
+    /// The part of pictures that the model searches. The session says it, not the page.
+    #[serde(skip)]
+    pub region: Option<Region>,
 }
 
 fn one() -> u32 {

@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use crate::advice::Advice;
 use crate::marks::Marks;
+use crate::region::Region;
 use crate::teacher::TaughtSummary;
 
 /// Whether the marks stand on the disk.
@@ -126,6 +127,8 @@ pub struct SessionView {
     pub model_path: String,
     /// Versions of the model, oldest first.
     pub models: Vec<ModelView>,
+    /// The part of pictures that is searched; all of them where `None`.
+    pub region: Option<Region>,
     /// Whether the camera of the photos is calibrated, so that the part's size is known.
     pub is_calibrated: bool,
     /// The project: its folder, or the file of a photo's; `None` until there is a photo.

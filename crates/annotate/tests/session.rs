@@ -123,3 +123,48 @@ fn a_taught_model_is_tried_and_what_it_found_becomes_a_demonstration() {
     assert_eq!(served.ask("POST", "/api/trial-pictures/0/accept", body.as_bytes()).status, 409, "once is enough");
     assert_eq!(served.ask("GET", "/api/images/1/picture", b"").body, served::photo_png());
 }
+
+#[test]
+fn a_region_holds_for_what_is_detected_and_what_is_taught() {
+    let served = Served::start();
+    put_marks(&served, &marks());
+    served.ask("POST", "/api/trial-pictures?name=table.png", &served::photo_png()).json();
+    let put = |body: &Value| served.ask("PUT", "/api/region", body.to_string().as_bytes());
+    let num_found = || {
+        let found = served.ask("POST", "/api/trial-pictures/0/detect", b"").json();
+        found["detections"].as_array().unwrap().len()
+    };
+    let region = |x: u32, width: u32| json!({"x": x, "y": 10, "width": width, "height": 80, "picture": [200, 100]});
+    for (wrong, why) in [
+        (region(150, 60), "a part of the picture of 200 × 100 pixels"),
+        (region(0, 0), "at least 1 × 1 pixels"),
+        (json!({"x": 0.5, "y": 0, "width": 9, "height": 9}), "region"),
+        (json!([1, 2, 3, 4, 5, 6]), "region"),
+    ] {
+        let answer = put(&wrong);
+        assert!(answer.status == 422 && answer.text().contains(why), "{wrong}: {}", answer.text());
+    }
+    assert_eq!(served.ask("GET", "/api/session", b"").json()["region"], Value::Null);
+
+    // Before there is a model it is that of the first one.
+    assert_eq!(put(&region(0, 120)).json()["region"], region(0, 120));
+    served.ask("POST", "/api/teaching", b"{\"model\": \"S\"}").json();
+    assert_eq!(wait_for(&served, &["done", "failed"])["status"], "done");
+    assert_eq!(num_found(), 1);
+    // What the model refuses changes nothing.
+    let small = put(&region(0, 20));
+    assert!(small.status == 422 && small.text().contains("does not fit in"), "{}", small.text());
+    assert_eq!(served.ask("GET", "/api/session", b"").json()["region"], region(0, 120));
+    // The part's middle is at (90, 50).
+    let below = json!({"x": 0, "y": 60, "width": 120, "height": 40, "picture": [200, 100]});
+    assert_eq!((put(&below).status, num_found()), (200, 0));
+    assert_eq!((put(&Value::Null).json()["region"].clone(), num_found()), (Value::Null, 1));
+
+    let long = json!({"model": "S", "steps": 100_000}).to_string();
+    served.ask("POST", "/api/teaching", long.as_bytes()).json();
+    assert_eq!(put(&Value::Null).status, 409, "not while a model is taught with another region");
+    served.ask("DELETE", "/api/teaching", b"").json();
+    wait_for(&served, &["failed"]);
+    let forged = json!({"model": "S", "region": region(0, 120)}).to_string();
+    assert_eq!(served.ask("POST", "/api/teaching", forged.as_bytes()).status, 422, "the session says the region");
+}

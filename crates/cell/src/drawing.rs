@@ -3,7 +3,7 @@
 use image::{Rgb, RgbImage};
 use nalgebra::Point2;
 use sdg_geometry::{BoundingBox, Keypoint};
-use sdg_grasp::{Differences, GraspDetection};
+use sdg_grasp::{Differences, GraspDetection, SearchRegion};
 use sdg_report::{
     Color, DetectionMark, Pen, Verdict, draw_box, draw_detection, draw_label, draw_polygon, label_bounds, line_width,
 };
@@ -53,6 +53,13 @@ pub fn draw_parts(drawn: &mut RgbImage, parts: &[Part], min_score: f64) {
     for part in parts.iter().rev().filter(|part| part.is_seen(min_score)) {
         draw_numbered(drawn, &part.found.detection, true, part.track.map(|(number, ..)| number));
     }
+}
+
+/// Draws the frame of the part of the picture that is searched, where not all of it is.
+pub fn draw_region(drawn: &mut RgbImage, region: Option<&SearchRegion>) {
+    let Some(region) = region else { return };
+    let width = line_width(drawn);
+    draw_box(drawn, &region.bounds(), &Pen::new(Color::NEUTRAL).width(width).dashed(8.0 * width, 4.0 * width));
 }
 
 fn draw_numbered(drawn: &mut RgbImage, detection: &GraspDetection, is_accepted: bool, number: Option<u64>) {
@@ -175,6 +182,18 @@ mod tests {
             assert!(taken[..i].iter().all(|other| other.intersection(one) == 0.0), "{taken:?}");
             assert!(one.y2 <= 300.0 && one.y1 >= 0.0);
         }
+    }
+
+    #[test]
+    fn a_region_is_a_frame_about_its_pixels() {
+        let mut drawn = RgbImage::new(400, 300);
+        draw_region(&mut drawn, None);
+        assert_eq!(drawn, RgbImage::new(400, 300));
+        draw_region(&mut drawn, Some(&SearchRegion::new([100, 50, 200, 160])));
+        let is_bright = |x: u32, y: u32| drawn.get_pixel(x, y).0[0] > 128;
+        let count = |points: &mut dyn Iterator<Item = (u32, u32)>| points.filter(|&(x, y)| is_bright(x, y)).count();
+        assert!(count(&mut (100..300).map(|x| (x, 50))) > 100 && count(&mut (50..210).map(|y| (100, y))) > 80);
+        assert_eq!(count(&mut (110..290).flat_map(|x| (60..200).map(move |y| (x, y)))), 0);
     }
 
     #[test]

@@ -8,8 +8,8 @@ use sdg_calibration::{CalibratedCamera, CameraFileError, Frame};
 use sdg_demonstration::PixelFrame;
 use sdg_geometry::PinholeCamera;
 use sdg_grasp::{
-    CameraOverTable, Differences, GraspDetection, GraspModel, PartDetector, PlanDetection, PlanDetector, PlanarPose,
-    TaughtDemonstration, Verification,
+    CameraOverTable, Differences, GraspDetection, GraspError, GraspModel, PartDetector, PlanDetection, PlanDetector,
+    PlanarPose, SearchRegion, TaughtDemonstration, Verification,
 };
 
 use crate::error::Result;
@@ -100,10 +100,31 @@ impl Perception {
         }
     }
 
+    /// Searches this part of pictures alone, in their pixels, instead of the part that the model's file says; all of them with `None`.
+    ///
+    /// # Errors
+    /// A region without pixels, and one that cannot be of these pictures, as far as their size is known, or that the part does not fit in;
+    /// nothing is changed then.
+    pub fn look_in(&mut self, region: Option<SearchRegion>) -> Result<()> {
+        match &mut self.view {
+            View::AnyCamera(model) => **model = GraspModel::clone(model).with_region(region)?,
+            View::OverTable(detector, _) => detector.look_in(region.as_ref())?,
+        }
+        Ok(())
+    }
+
+    /// The part of pictures that is searched, in their pixels; all of them where `None`.
+    pub fn region(&self) -> Option<&SearchRegion> {
+        match &self.view {
+            View::AnyCamera(model) => model.region(),
+            View::OverTable(detector, _) => detector.region(),
+        }
+    }
+
     /// Finds the part in a picture, best score first.
     ///
     /// # Errors
-    /// A picture of another size than the calibrated camera's; the model's own errors.
+    /// A picture of another size than the calibrated camera's or than the region is for; the model's own errors.
     pub fn detect(&self, picture: &RgbImage, verification: Verification) -> Result<Vec<Found>> {
         self.check_picture(picture)?;
         Ok(match &self.view {
@@ -118,11 +139,19 @@ impl Perception {
         })
     }
 
-    /// Whether a picture can be the calibrated camera's.
+    /// Whether a picture can be the calibrated camera's, and whether the region is one of it.
     ///
     /// # Errors
-    /// A picture of another size.
+    /// A picture of another size, and a region that does not lie in it.
     pub fn check_picture(&self, picture: &RgbImage) -> Result<()> {
+        self.check_size(picture)?;
+        if let Some(region) = self.region() {
+            region.check(picture.dimensions().into()).map_err(GraspError::from)?;
+        }
+        Ok(())
+    }
+
+    fn check_size(&self, picture: &RgbImage) -> Result<()> {
         let View::OverTable(_, place) = &self.view else { return Ok(()) };
         let PinholeCamera { width, height, .. } = place.camera.intrinsics;
         let (found_width, found_height) = picture.dimensions();
@@ -209,7 +238,7 @@ impl Perception {
         picture: &RgbImage,
         find: fn(&RgbImage, &[TaughtDemonstration]) -> Vec<Point2<f64>>,
     ) -> Result<Vec<Point2<f64>>> {
-        self.check_picture(picture)?;
+        self.check_size(picture)?;
         Ok(match &self.view {
             View::AnyCamera(model) => find(picture, model.demonstrations()),
             View::OverTable(detector, _) => {

@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use sdg_calibration::CalibrationError;
 use sdg_cell::CellError;
 use sdg_evaluation::EvaluationError;
-use sdg_grasp::GraspError;
+use sdg_grasp::{GraspError, RegionError};
 use sdg_inputs::ConfigError;
 use sdg_robot::RobotError;
 
@@ -86,6 +86,9 @@ pub fn one_line(error: &anyhow::Error) -> String {
 /// The option that helps with an error of a library, which knows no options.
 fn remedy(cause: &(dyn std::error::Error + 'static)) -> Option<String> {
     let of_model = |error: &GraspError| match error {
+        GraspError::Region(RegionError::OtherPicture { .. }) => Some(
+            "sdg detect --region X,Y,W,H searches another one, and --region all searches all of the picture".to_owned(),
+        ),
         GraspError::NoLengths => Some("teach it again with --camera and --mark-height-mm".to_owned()),
         GraspError::BackendNotBuilt { asked, .. } => Some(format!("build sdg-cli with --features {asked}")),
         _ => None,

@@ -123,7 +123,7 @@ impl Wording<'_> {
     /// each follows.
     pub fn nothing(&self, refused: &[&GraspDetection], are_listed: bool) -> String {
         let Some(best) = refused.iter().max_by(|a, b| a.score.total_cmp(&b.score)) else {
-            return format!("nothing to grasp{}", self.of_other_size().unwrap_or_default());
+            return format!("nothing to grasp{}{}", self.in_region(), self.of_other_size().unwrap_or_default());
         };
         let which = if refused.len() == 1 { "" } else { ", the best of them" };
         let see_all = if are_listed { "" } else { " (see --all)" };
@@ -133,12 +133,18 @@ impl Wording<'_> {
         let other_size =
             best.advice().filter(|_| best.score >= MIN_ADVISED_SCORE).map_or_else(|| self.of_other_size(), |_| None);
         format!(
-            "nothing accepted; {} refused{which} at ({x:.0}, {y:.0}): {}, score {:.2}{see_all}: {why}{}",
+            "nothing accepted{}; {} refused{which} at ({x:.0}, {y:.0}): {}, score {:.2}{see_all}: {why}{}",
+            self.in_region(),
             refused.len(),
             self.measured(best),
             best.score,
             other_size.unwrap_or_default()
         )
+    }
+
+    /// Where a part of the picture is searched: which.
+    fn in_region(&self) -> String {
+        self.detector.region().map(|region| format!(" in {region}")).unwrap_or_default()
     }
 
     /// Where the picture has another number of pixels than the photo: that the part may have a size that is not looked for.

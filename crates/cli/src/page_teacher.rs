@@ -2,13 +2,13 @@
 
 use std::borrow::Cow;
 use std::ops::ControlFlow;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 use image::RgbImage;
 use sdg_annotate::{
-    Figures, FoundGrasp, GraspPose, GraspTeacher, NegativesRefused, Refusal, TaughtModel, TaughtSummary, TeachRequest,
-    TeacherError, TeachingMaterial, TeachingStep,
+    Figures, FoundGrasp, GraspPose, GraspTeacher, NegativesRefused, Refusal, Region, TaughtModel, TaughtSummary,
+    TeachRequest, TeacherError, TeachingMaterial, TeachingStep,
 };
 use sdg_calibration::Frame;
 use sdg_cell::DEFAULT_MIN_SCORE;
@@ -17,7 +17,10 @@ use sdg_evaluation::TaughtFile;
 use sdg_evaluation::held_back::HeldBackFigures;
 use sdg_evaluation::{Share, wilson_interval};
 use sdg_geometry::RotationalSymmetry;
-use sdg_grasp::{Advice, CheckConfig, GraspModel, PlanarPose, Preset, TeachOptions, TeachingEvent, Verification};
+use sdg_grasp::{
+    Advice, CheckConfig, GraspModel, PlanarPose, Preset, SearchRegion, TeachOptions, TeachingEvent, Verification,
+    check_region_from_above,
+};
 use sdg_inputs::camera_files::CameraFile;
 
 use crate::found_text::{MIN_ADVISED_SCORE, Wording};
@@ -51,13 +54,17 @@ impl GraspTeacher for PageTeacher {
         if request.fixed_height {
             options.size_tolerance = CheckConfig::FIXED_HEIGHT_TOLERANCE;
         }
+        options.region = request.region.as_ref().map(search_region);
         options.negatives.clone_from(&material.negatives);
         let mut demonstrations = Cow::Borrowed(material.demonstrations.as_slice());
         if let Some((camera, [mark, grasp])) = &self.camera {
             let (seen, lengths) = camera.seen_from_above(&demonstrations, *mark, *grasp)?;
-            demonstrations = Cow::Owned(seen);
             options.negatives = camera.pictures_from_above(&options.negatives, &lengths)?;
+            if let Some(region) = &options.region {
+                check_region_from_above(region, &seen, &camera.over_table, &lengths)?;
+            }
             options.lengths = Some(lengths);
+            demonstrations = Cow::Owned(seen);
         }
         let file = TaughtFile::teach(&demonstrations, &options, &mut |event| observe(step(event)))?;
         let figures = file.figures(&demonstrations, request.seed)?;
@@ -80,6 +87,16 @@ impl PageTeacher {
             Some((camera, _)) => camera.perception(model),
         }
     }
+}
+
+fn search_region(region: &Region) -> SearchRegion {
+    let Region { x, y, width, height, picture } = *region;
+    SearchRegion { picture, ..SearchRegion::new([x, y, width, height]) }
+}
+
+fn page_region(region: &SearchRegion) -> Region {
+    let SearchRegion { x, y, width, height, picture } = *region;
+    Region { x, y, width, height, picture }
 }
 
 /// `seconds` is what the person waited: teaching, and trying the model on held-back samples.
@@ -132,8 +149,12 @@ struct PageModel {
 }
 
 impl PageModel {
+    fn detector(&self) -> MutexGuard<'_, Perception> {
+        self.detector.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     fn find(&self, image: &RgbImage, with_places: bool) -> Result<Vec<FoundGrasp>, TeacherError> {
-        let detector = self.detector.lock().unwrap_or_else(PoisonError::into_inner);
+        let detector = self.detector();
         let found = detector.detect(image, Verification::ByShape)?;
         let wording =
             Wording { detector: &detector, picture_size: image.dimensions().into(), min_score: DEFAULT_MIN_SCORE };
@@ -159,6 +180,14 @@ impl TaughtModel for PageModel {
 
     fn to_bytes(&self) -> Result<Vec<u8>, TeacherError> {
         Ok(self.bytes.clone())
+    }
+
+    fn region(&self) -> Option<Region> {
+        self.detector().region().map(page_region)
+    }
+
+    fn look_in(&self, region: Option<Region>) -> Result<(), TeacherError> {
+        Ok(self.detector().look_in(region.as_ref().map(search_region))?)
     }
 
     fn detect(&self, image: &RgbImage) -> Result<Vec<FoundGrasp>, TeacherError> {

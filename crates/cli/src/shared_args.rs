@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args as ClapArgs;
-use sdg_grasp::ComputeBackend;
+use sdg_grasp::{ComputeBackend, SearchRegion};
 use sdg_robot::height::ToldHeight;
 
 /// Where a network computes.
@@ -93,6 +93,38 @@ impl SizeTolerance {
     }
 }
 
+/// The part of pictures that is searched.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RegionArg {
+    /// All of them.
+    All,
+    Part(SearchRegion),
+}
+
+/// What a region looks like.
+const REGION: &str =
+    "expected X,Y,W,H in whole pixels of the picture (left edge, upper edge, width, height), such as 100,50,200,200";
+
+/// Four numbers: a region of at least a pixel.
+pub fn region(text: &str) -> Result<SearchRegion, String> {
+    let numbers: Option<Vec<u32>> = text.split(',').map(|number| number.trim().parse().ok()).collect();
+    match numbers.as_deref() {
+        Some(&[_, _, width, height]) if width == 0 || height == 0 => {
+            Err(format!("expected a width and a height of at least 1 pixel, found {width} and {height}"))
+        }
+        Some(&[x, y, width, height]) => Ok(SearchRegion::new([x, y, width, height])),
+        _ => Err(REGION.to_owned()),
+    }
+}
+
+/// The same, or `all`.
+pub fn region_or_all(text: &str) -> Result<RegionArg, String> {
+    match text {
+        "all" => Ok(RegionArg::All),
+        _ => region(text).map(RegionArg::Part).map_err(|error| format!("{error}; or all, for all of the picture")),
+    }
+}
+
 /// A device's name.
 pub fn backend(text: &str) -> Result<ComputeBackend, String> {
     text.parse().map_err(|error: sdg_grasp::GraspError| error.to_string())
@@ -172,6 +204,22 @@ mod tests {
         for text in ["-1", "501", "nan", "4 cm"] {
             assert!(height_mm(text).unwrap_err().ends_with(&format!("millimetres, found {text}")), "{text}");
         }
+    }
+
+    #[test]
+    fn a_region_is_four_whole_numbers_or_all() {
+        let expected = SearchRegion::new([100, 50, 200, 180]);
+        assert_eq!(region("100,50,200,180"), Ok(expected));
+        assert_eq!(region_or_all("100, 50, 200, 180"), Ok(RegionArg::Part(expected)));
+        assert_eq!(region_or_all("all"), Ok(RegionArg::All));
+        for text in ["", "all", "100,50,200", "1,2,3,4,5", "1.5,2,30,40", "-1,2,30,40", "1;2;3;4", "4294967296,0,1,1"] {
+            assert_eq!(region(text).unwrap_err(), REGION, "{text}");
+        }
+        assert_eq!(
+            region("10,10,0,5").unwrap_err(),
+            "expected a width and a height of at least 1 pixel, found 0 and 5"
+        );
+        assert!(region_or_all("everything").unwrap_err().ends_with("or all, for all of the picture"));
     }
 
     #[test]

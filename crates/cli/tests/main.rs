@@ -20,6 +20,7 @@ mod own_part;
 mod picture_kinds;
 mod place;
 mod plan;
+mod region;
 #[path = "../../calibration/tests/rendering/mod.rs"]
 mod rendering;
 mod robot;

@@ -44,11 +44,19 @@ impl ImageTransform {
     /// # Errors
     /// [`DetectionError::EmptyImage`] for an image without pixels.
     pub fn apply(&self, image: &RgbImage) -> Result<TransformedImage> {
+        self.apply_part(image, image.dimensions().into())
+    }
+
+    /// The same for a part of an image of width and height `whole`, resized as the whole would be.
+    ///
+    /// # Errors
+    /// As [`Self::apply`].
+    pub fn apply_part(&self, image: &RgbImage, whole: [u32; 2]) -> Result<TransformedImage> {
         let (original_width, original_height) = image.dimensions();
         if original_width == 0 || original_height == 0 {
             return Err(DetectionError::EmptyImage { width: original_width, height: original_height });
         }
-        let (width, height) = resized_size(self.config.resize, original_width, original_height);
+        let (width, height) = part_size(self.config.resize, [original_width, original_height], whole);
         let resized: Vec<f32> = match self.config.filter {
             ResizeFilter::AntialiasedBytes => {
                 resample::antialiased_bytes(image, width, height).into_iter().map(f32::from).collect()
@@ -100,6 +108,16 @@ pub fn resized_size(rule: ResizeRule, width: u32, height: u32) -> (usize, usize)
         whole.max(1.0) as usize
     };
     (round(w * scale), round(h * scale))
+}
+
+/// Width and height of a part of an image after the whole was resized.
+fn part_size(rule: ResizeRule, part: [u32; 2], whole: [u32; 2]) -> (usize, usize) {
+    let (width, height) = resized_size(rule, whole[0], whole[1]);
+    let side = |part: u32, whole: u32, resized: usize| {
+        let exact = f64::from(part) * resized as f64 / f64::from(whole.max(1));
+        (exact.round() as usize).max(1)
+    };
+    (side(part[0], whole[0], width), side(part[1], whole[1], height))
 }
 
 impl TransformedImage {
@@ -158,6 +176,15 @@ mod tests {
     use super::*;
     use crate::presets;
     use image::Rgb;
+
+    #[test]
+    fn a_part_is_resized_as_the_whole() {
+        let rule = ResizeRule::FitWithin { width_px: 320, height_px: 320 };
+        // 640 × 480 becomes 320 × 240: half of each side.
+        assert_eq!(part_size(rule, [200, 100], [640, 480]), (100, 50));
+        assert_eq!(part_size(rule, [640, 480], [640, 480]), resized_size(rule, 640, 480));
+        assert_eq!(part_size(rule, [1, 1], [640, 480]), (1, 1));
+    }
 
     #[test]
     fn short_side_rule_by_hand() {

@@ -95,6 +95,8 @@ impl HeldBackFigures {
     /// # Errors
     /// Samples that cannot be made, and errors of detection.
     pub fn of(model: &GraspModel, demonstrations: &[Demonstration], seed: u64) -> Result<Self> {
+        // The samples show the part anywhere.
+        let model = &model.clone().with_region(None)?;
         let facts = model.facts();
         let sizes = if facts.lengths.is_some() { KNOWN_SIZES } else { model.size_tolerance() };
         let (alone, others_in_photo) = without_others(model, demonstrations)?;

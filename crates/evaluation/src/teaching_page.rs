@@ -94,7 +94,8 @@ impl TeachingPage<'_> {
     }
 
     fn tried(&self) -> Result<Section> {
-        let model = &self.taught.model;
+        // The samples show the part anywhere.
+        let model = self.taught.model.clone().with_region(None)?;
         // Frames as large as the photo: the part then has a size at which the model looks for it.
         let augmenter = Augmenter::new(self.demonstrations, AugmentationConfig::default(), self.seed)?;
         let mut figures = Vec::new();

@@ -20,6 +20,8 @@ pub struct CheckConfig {
     pub search: SearchConfig,
     /// What the evidence is worth.
     pub score: ScoreConfig,
+    /// Most detections listed for a picture.
+    pub max_detections: usize,
 }
 
 impl CheckConfig {
@@ -46,6 +48,7 @@ impl CheckConfig {
             search
         },
         score: ScoreConfig::DEFAULT,
+        max_detections: Self::DEFAULT_MAX_DETECTIONS,
     };
 
     /// # Errors

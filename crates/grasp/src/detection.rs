@@ -9,6 +9,7 @@ use sdg_shape::CloseLook;
 use crate::colors::Colors;
 use crate::evidence_kind::{Advice, EvidenceKind};
 use crate::facts::TurnSource;
+use crate::region::SearchRegion;
 use crate::sighting::Sighting;
 use crate::verdict::Contributions;
 use crate::verification::PlacedDemonstration;
@@ -42,6 +43,12 @@ impl GraspDetection {
     /// Whether the part is there.
     pub fn is_accepted(&self) -> bool {
         self.score >= 0.5
+    }
+
+    /// Whether the part lies in a region of the picture: its grasp point, and at least half of its outline's area.
+    pub fn lies_in(&self, region: &SearchRegion) -> bool {
+        let bounds = || Polygon::from_box(&self.bbox);
+        region.has(&self.grasp.center(), &self.outline.clone().unwrap_or_else(bounds))
     }
 
     /// Why it is not accepted, in words: the strongest objection. `None` for what is accepted.

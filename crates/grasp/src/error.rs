@@ -52,6 +52,9 @@ pub enum GraspError {
     /// An image that holds nothing to look at.
     #[error("expected an image of at least {least} × {least} pixels, found {width} × {height}")]
     ImageTooSmall { least: u32, width: u32, height: u32 },
+    /// A region that cannot be searched.
+    #[error(transparent)]
+    Region(#[from] crate::region::RegionError),
     /// A grasp whose ray misses the grasp plane.
     #[error("the ray through pixel ({x:.1}, {y:.1}) does not meet the plane at a height of {height_m} m")]
     OffPlane {

@@ -6,6 +6,8 @@ use sdg_shape::Differences;
 
 use crate::detection::GraspDetection;
 use crate::model::GraspModel;
+use crate::region::SearchRegion;
+use crate::search_window::SearchWindow;
 use crate::sizes::SizeRange;
 use crate::verification::{SearchedImage, differences};
 
@@ -30,8 +32,23 @@ impl GraspModel {
         if poses.iter().all(Option::is_none) {
             return vec![None; detections.len()];
         }
-        let searched = SearchedImage::new(image, &self.demonstrations);
-        poses.into_iter().map(|pose| pose.and_then(|(idx, pose)| differences(&searched, idx, &pose))).collect()
+        let size = [image.width(), image.height()];
+        let about = |region: &SearchRegion| {
+            region.check(size).ok()?;
+            SearchWindow::about(&region.bounds(), region, size, &self.demonstrations).ok()
+        };
+        let window = self.region().and_then(about).unwrap_or_else(|| SearchWindow::whole(size));
+        let cut = window.cut(image);
+        let searched = SearchedImage::of(&cut, &window.shot(), &self.demonstrations);
+        let whole_from_window = window.whole_from_window();
+        let at = |(idx, pose): (usize, PlanarSimilarity)| {
+            let mut found = differences(&searched, idx, &whole_from_window.inverse().compose(&pose))?;
+            let corners = found.features.iter_mut().flat_map(|square| &mut square.vertices);
+            let points = found.edges.iter_mut().chain(&mut found.surface).chain(corners);
+            points.for_each(|point| *point = whole_from_window.apply(point));
+            Some(found)
+        };
+        poses.into_iter().map(|pose| pose.and_then(at)).collect()
     }
 
     /// Which demonstration's outline the detection has, and where its cut-out lies in the image.

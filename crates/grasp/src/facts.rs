@@ -5,6 +5,7 @@ use sdg_geometry::RotationalSymmetry;
 use serde::{Deserialize, Serialize};
 
 use crate::lengths::Lengths;
+use crate::region::SearchRegion;
 
 /// What a part's turn was first read from, before the demonstration was laid over it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -50,6 +51,9 @@ pub struct TeachingFacts {
     /// What it knows of lengths; `None` for a model taught without a camera.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lengths: Option<Lengths>,
+    /// The part of pictures that is searched; all of them where `None`. Teaching itself does not go by it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub region: Option<SearchRegion>,
     /// Samples that the network saw.
     pub samples: usize,
     /// Optimiser steps.
@@ -123,8 +127,10 @@ mod tests {
         assert_eq!(facts.validation, Some(ValidationFacts { hit_rate: 0.9, error_px: 0.8, error_degrees: 0.7 }));
         let written = serde_json::to_value(&facts).unwrap();
         assert_eq!(written, serde_json::from_str::<serde_json::Value>(file).unwrap());
-        assert_eq!(facts.symmetry, RotationalSymmetry::None);
-        let without_network = TeachingFacts { validation: None, symmetry: RotationalSymmetry::Fold(2), ..facts };
+        assert_eq!((facts.symmetry, facts.region), (RotationalSymmetry::None, None));
+        let region = Some(SearchRegion::new([10, 20, 200, 100]).of_picture([640, 480]));
+        let without_network =
+            TeachingFacts { validation: None, symmetry: RotationalSymmetry::Fold(2), region, ..facts };
         let written = serde_json::to_string(&without_network).unwrap();
         assert_eq!(serde_json::from_str::<TeachingFacts>(&written).unwrap(), without_network);
     }

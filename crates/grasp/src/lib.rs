@@ -61,6 +61,8 @@ mod colors;
 mod decimal;
 mod detection;
 mod device;
+#[cfg(all(test, feature = "teach"))]
+mod drawn_part;
 mod error;
 mod evidence_kind;
 mod explanation;
@@ -78,9 +80,13 @@ mod plan;
 mod pose;
 mod prepared;
 mod record;
+mod region;
+#[cfg(all(test, feature = "teach"))]
+mod region_tests;
 mod round_top;
 mod safetensors_file;
 mod same_part;
+mod search_window;
 mod sighting;
 mod sizes;
 mod slanted;
@@ -109,10 +115,11 @@ pub use model::{GraspModel, Verification};
 pub use model_file::{FORMAT_VERSION, ModelSummary, summarize};
 pub use plan::{
     CameraOverTable, Circumstances, ErrorLength, PlanDetection, PlanDetector, PlanarPose, Uncertainty,
-    pictures_from_above, seen_from_above,
+    check_region_from_above, pictures_from_above, seen_from_above,
 };
 pub use pose::{GraspPlane, GraspPose};
 pub use record::{DetectionRecord, GraspRecord};
+pub use region::{RegionError, SearchRegion};
 pub use sdg_demonstration::{ImageLimits, NUM_KEYPOINTS, decode_image};
 pub use sdg_detection::keep_freed_memory;
 pub use sdg_shape::Differences;

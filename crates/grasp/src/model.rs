@@ -18,7 +18,9 @@ use crate::detection::{Found, GraspDetection, Placement};
 use crate::error::{GraspError, Result};
 use crate::facts::{ModelKind, TeachingFacts};
 use crate::models::{Network, PoseCandidate, Proposals};
+use crate::region::SearchRegion;
 use crate::same_part::{SAME_PART_IOU, are_outlines_of_same_part};
+use crate::search_window::{SearchWindow, check_region};
 use crate::sighting::{Sighting, sightings};
 use crate::slanted::{LevelImage, explains_more, suggested_slant};
 use crate::taught::TaughtDemonstration;
@@ -116,7 +118,40 @@ impl GraspModel {
         if max_detections == 0 {
             return Err(GraspError::InvalidConfig { name: "most detections", expected: "at least 1", found: 0.0 });
         }
-        self.with_check(|check| check.search.max_matches = max_detections)
+        let is_cut = self.facts.region.is_some();
+        self.with_check(|check| {
+            check.max_detections = max_detections;
+            check.search.max_matches = max_matches(max_detections, is_cut);
+        })
+    }
+
+    /// The same model that searches this part of pictures alone; all of them with `None`. A model file keeps it.
+    ///
+    /// # Errors
+    /// A region without pixels; where it says what pictures it is for, one that reaches out of them, and one that the part does not fit in.
+    /// Other regions are checked with each picture.
+    pub fn with_region(self, region: Option<SearchRegion>) -> Result<Self> {
+        if self.facts.region == region {
+            return Ok(self);
+        }
+        if let Some(region) = &region {
+            // Of a model that knows lengths the demonstrations are plan views, whose pixels are not the picture's.
+            check_region(region, self.facts.lengths.is_none().then_some(&self.demonstrations))?;
+        }
+        let CheckConfig { search, max_detections, .. } = self.demonstrations[0].check();
+        let wanted = max_matches(*max_detections, region.is_some());
+        // Another configuration makes the search ready again, which takes milliseconds.
+        let mut model = match search.max_matches == wanted {
+            true => self,
+            false => self.with_check(|check| check.search.max_matches = wanted)?,
+        };
+        model.facts.region = region;
+        Ok(model)
+    }
+
+    /// The part of pictures that is searched; all of them where `None`.
+    pub fn region(&self) -> Option<&SearchRegion> {
+        self.facts.region.as_ref()
     }
 
     /// The same model for plan views as fine as its demonstrations.
@@ -165,32 +200,50 @@ impl GraspModel {
 
     /// [`Self::detect_async`], each detection with what tracking goes on from.
     pub(crate) async fn find_async(&self, image: &RgbImage, verification: Verification) -> Result<Vec<Found>> {
+        let size = [image.width(), image.height()];
+        let Some(region) = self.region() else {
+            return self.find_in(image, &SearchWindow::whole(size), verification, |_| true).await;
+        };
+        region.check(size)?;
+        let window = SearchWindow::about(&region.bounds(), region, size, &self.demonstrations)?;
+        self.find_in(&window.cut(image), &window, verification, |detection| detection.lies_in(region)).await
+    }
+
+    /// What is found in the image that a window was cut out as, in pixels of the whole, of which that counts for which `counts` holds.
+    pub(crate) async fn find_in(
+        &self,
+        image: &RgbImage,
+        window: &SearchWindow,
+        verification: Verification,
+        counts: impl Fn(&GraspDetection) -> bool,
+    ) -> Result<Vec<Found>> {
         let (width, height) = image.dimensions();
+        let shot = window.shot();
         if width.min(height) < MIN_SIDE_PX {
             return Err(GraspError::ImageTooSmall { least: MIN_SIDE_PX, width, height });
         }
         let mut found: Vec<Found> = match (&self.network, verification) {
             (Some(network), Verification::Off) => network
-                .proposals_async(image, &self.demonstrations)
+                .proposals_async(image, shot.size, &self.demonstrations)
                 .await?
                 .candidates
                 .iter()
                 .map(|c| Found { detection: self.unverified(c), placement: None })
                 .collect(),
-            _ => self.find_at_any_slant(image).await?,
+            _ => self.find_at_any_slant(image, &shot).await?,
         };
-        let (width, height) = (f64::from(width), f64::from(height));
-        found.iter_mut().for_each(|found| found.detection.bbox = found.detection.bbox.clip(width, height));
+        found.iter_mut().for_each(|found| window.in_whole(found));
+        found.retain(|found| counts(&found.detection));
         found.sort_by(|a, b| b.detection.score.total_cmp(&a.detection.score));
         drop_repeated(&mut found);
-        found.truncate(self.demonstrations[0].check().search.max_matches);
+        found.truncate(self.demonstrations[0].check().max_detections);
         Ok(found)
     }
 
     /// As a level camera sees it, or a slanted one where that explains the picture better.
-    async fn find_at_any_slant(&self, image: &RgbImage) -> Result<Vec<Found>> {
-        let (level, slant) = self.find_at_slant(image, &Shot::level(image), true).await?;
-        let Some(made_level) = slant.and_then(|slant| LevelImage::new(image, &slant)) else { return Ok(level) };
+    async fn find_at_any_slant(&self, image: &RgbImage, shot: &Shot) -> Result<Vec<Found>> {
+        let (level, slant) = self.find_at_slant(image, shot, true).await?;
+        let Some(made_level) = slant.and_then(|slant| LevelImage::new(image, shot, &slant)) else { return Ok(level) };
         let (found, _) = self.find_at_slant(&made_level.image, &made_level.shot(), false).await?;
         if explains_more(&found, &level) {
             return Ok(found.into_iter().filter_map(|found| made_level.seen(found)).collect());
@@ -202,12 +255,12 @@ impl GraspModel {
     async fn find_at_slant(&self, image: &RgbImage, shot: &Shot, suggest: bool) -> Result<(Vec<Found>, Option<Slant>)> {
         let searched = SearchedImage::of(image, shot, &self.demonstrations);
         let proposals = match &self.network {
-            Some(network) => network.proposals_async(image, &self.demonstrations).await?,
+            Some(network) => network.proposals_async(image, shot.size, &self.demonstrations).await?,
             None => Proposals::default(),
         };
         let sightings = sightings(&proposals, &searched);
         let is_asked = suggest && !self.demonstrations[0].check().score.is_size_known;
-        let slant = if is_asked { suggested_slant(image, &sightings, &searched) } else { None };
+        let slant = if is_asked { suggested_slant(image, shot, &sightings, &searched) } else { None };
         Ok((self.judged(sightings), slant))
     }
 
@@ -261,6 +314,12 @@ impl GraspModel {
     pub(crate) fn num_keypoints(&self) -> usize {
         if self.kind().has_keypoints() { crate::NUM_KEYPOINTS } else { 0 }
     }
+}
+
+/// Most matches of a search after which so many detections are listed. Where a part of the picture is searched, of better matches outside
+/// none may take the place of one that counts.
+fn max_matches(max_detections: usize, is_cut: bool) -> usize {
+    if is_cut { max_detections.max(CheckConfig::DEFAULT_MAX_DETECTIONS) } else { max_detections }
 }
 
 /// Of detections of the same part the best one stays: by the overlap of their outlines, or of their boxes where there are no

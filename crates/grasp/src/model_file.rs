@@ -135,7 +135,8 @@ impl GraspModel {
                 found: marks.len().to_string(),
             });
         }
-        let facts: TeachingFacts = metadata.json("teaching")?;
+        let mut facts: TeachingFacts = metadata.json("teaching")?;
+        let region = facts.region.take();
         if let Some(lengths) = facts.lengths {
             lengths.check()?;
         }
@@ -157,13 +158,14 @@ impl GraspModel {
             })
             .collect::<Result<Vec<_>>>()?;
 
-        Ok(Self {
+        let model = Self {
             preset: metadata.text("preset")?.to_owned(),
             calibrations: metadata.json("calibration")?,
             facts,
             network: read_network(kind, &metadata, &file, &demonstrations, device)?,
             demonstrations,
-        })
+        };
+        model.with_region(region)
     }
 }
 
@@ -329,6 +331,7 @@ mod tests {
     use super::*;
     use crate::calibration::Calibration;
     use crate::calibrations::Calibrations;
+    use crate::region::SearchRegion;
     use image::{Rgb, RgbImage};
     use nalgebra::Point2;
     use sdg_detection::presets::edge_of;
@@ -373,6 +376,7 @@ mod tests {
                 symmetry: RotationalSymmetry::None,
                 size_tolerance: Some([0.75, 1.35]),
                 lengths: None,
+                region: None,
                 samples: 0,
                 steps: 0,
                 seconds: 0.5,
@@ -404,6 +408,19 @@ mod tests {
             let summary = summarize(&bytes).unwrap();
             assert_eq!((summary.model, summary.object.as_str()), (kind, "bar"));
         }
+    }
+
+    #[test]
+    fn a_file_keeps_the_region_and_one_without_has_none() {
+        let whole = untaught(ModelKind::S);
+        assert!(!String::from_utf8_lossy(&whole.to_bytes().unwrap()).contains("region"));
+        let region = SearchRegion::new([10, 20, 200, 110]).of_picture([640, 480]);
+        let bytes = whole.with_region(Some(region)).unwrap().to_bytes().unwrap();
+        assert_eq!(GraspModel::from_bytes(&bytes, &Device::flex()).unwrap().region(), Some(&region));
+        assert_eq!(summarize(&bytes).unwrap().teaching.region, Some(region));
+        let forged = with_metadata(&bytes, r#"\"height\":110"#, r#"\"height\":999"#);
+        let refused = GraspModel::from_bytes(&forged, &Device::flex()).unwrap_err().to_string();
+        assert!(refused.contains("within the picture of 640 × 480"), "{refused}");
     }
 
     #[test]

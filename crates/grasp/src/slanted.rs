@@ -63,26 +63,27 @@ fn shortening_vector(log_ratio: f64, direction: Angle) -> Vector2<f64> {
     log_ratio * Vector2::new(cos, sin)
 }
 
-/// The slant under which the best places would look as in the photo; `None` where the camera may as well be level.
+/// The slant under which the best places would look as in the photo; `None` where the camera may as well be level. `shot` is that of a
+/// level camera.
 pub(crate) fn suggested_slant(
     picture: &RgbImage,
+    shot: &Shot,
     sightings: &[Sighting<'_>],
     searched: &SearchedImage<'_>,
 ) -> Option<Slant> {
     let mut best: Vec<_> = sightings.iter().filter(|sighting| sighting.placed.agreement >= MIN_AGREEMENT).collect();
     best.sort_by(|a, b| b.placed.agreement.total_cmp(&a.placed.agreement));
     best.truncate(NUM_ASKED);
-    let size = [picture.width(), picture.height()];
     let shortened = parallel::map(&best, |sighting| {
         let fit = foreshortening(searched, &sighting.placed)?;
         Some(Shortened {
-            at: sighting.placed.outline().bounds().center().coords - half(size),
+            at: sighting.placed.outline().bounds().center() - shot.below_camera,
             shortening: shortening_vector(fit.log_ratio, fit.direction),
             weight: (fit.consensus - MIN_CONSENSUS).max(0.0),
         })
     });
     let shortened: Vec<Shortened> = shortened.into_iter().flatten().collect();
-    let focal_px = usual_focal_px(size);
+    let focal_px = usual_focal_px(shot.size);
     let costs: Vec<(f64, Slant)> =
         slants(focal_px).filter_map(|slant| Some((cost(&slant, &shortened)?, slant))).collect();
     let least = |all: &mut dyn Iterator<Item = &(f64, Slant)>| all.min_by(|a, b| a.0.total_cmp(&b.0)).copied();
@@ -98,7 +99,7 @@ pub(crate) fn suggested_slant(
     let gain = |slant: &Slant| {
         let gains = best.iter().filter_map(|sighting| {
             let placed = &sighting.placed;
-            let window = LevelImage::about(picture, slant, &placed.outline().vertices)?;
+            let window = LevelImage::about(picture, shot, slant, &placed.outline().vertices)?;
             let seen = agreement_in(searched, placed, &window.image, |point| window.level_point(point))?;
             Some(seen - placed.agreement)
         });
@@ -136,51 +137,53 @@ fn cost(slant: &Slant, shortened: &[Shortened]) -> Option<f64> {
 pub(crate) struct LevelImage {
     pub(crate) image: RgbImage,
     slant: Slant,
-    /// Width and height of the picture.
+    /// Width and height of the picture, which may be a part of a larger one.
     size: [u32; 2],
-    /// Where the picture's middle is, in pixels of the level one.
+    /// How the picture was taken, were the camera level.
+    taken: Shot,
+    /// Where the middle of what the camera took is, in pixels of the level one.
     middle: Vector2<f64>,
 }
 
 impl LevelImage {
     /// `None` where the picture shows the horizon.
-    pub(crate) fn new(picture: &RgbImage, slant: &Slant) -> Option<Self> {
+    pub(crate) fn new(picture: &RgbImage, taken: &Shot, slant: &Slant) -> Option<Self> {
         let (width, height) = picture.dimensions();
         let (width, height) = (f64::from(width), f64::from(height));
         let corners = [[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]].map(Point2::from);
-        let bounds = level_bounds(picture, slant, &corners)?;
-        let reach = MAX_REACH * Vector2::new(width, height);
-        Some(Self::of(picture, slant, [bounds[0].sup(&-reach), bounds[1].inf(&reach)]))
+        let bounds = level_bounds(taken, slant, &corners)?;
+        let reach = MAX_REACH * Vector2::from(taken.size.map(f64::from));
+        Some(Self::of(picture, taken, slant, [bounds[0].sup(&-reach), bounds[1].inf(&reach)]))
     }
 
     /// The surroundings of some points of the picture.
-    pub(crate) fn about(picture: &RgbImage, slant: &Slant, points: &[Point2<f64>]) -> Option<Self> {
-        let [least, largest] = level_bounds(picture, slant, points)?;
+    pub(crate) fn about(picture: &RgbImage, taken: &Shot, slant: &Slant, points: &[Point2<f64>]) -> Option<Self> {
+        let [least, largest] = level_bounds(taken, slant, points)?;
         let margin = Vector2::repeat(MARGIN * (largest - least).amax());
-        Some(Self::of(picture, slant, [least - margin, largest + margin]))
+        Some(Self::of(picture, taken, slant, [least - margin, largest + margin]))
     }
 
-    fn of(picture: &RgbImage, slant: &Slant, [least, largest]: [Vector2<f64>; 2]) -> Self {
+    fn of(picture: &RgbImage, taken: &Shot, slant: &Slant, [least, largest]: [Vector2<f64>; 2]) -> Self {
         let size = [picture.width(), picture.height()];
         let level_size = [largest.x - least.x, largest.y - least.y].map(|side| side.ceil().max(1.0) as u32);
-        let made = Self { image: RgbImage::default(), slant: *slant, size, middle: -least };
+        let made = Self { image: RgbImage::default(), slant: *slant, size, taken: *taken, middle: -least };
         let image = PlanMap::of(level_size, |level| made.point(&level)).resample(picture);
         Self { image, ..made }
     }
 
     /// Where the level image shows a point of the picture.
     pub(crate) fn level_point(&self, seen: &Point2<f64>) -> Option<Point2<f64>> {
-        let level = self.slant.level_from_picture(seen.coords - half(self.size))?;
+        let level = self.slant.level_from_picture(seen - self.taken.below_camera)?;
         Some(Point2::from(level + self.middle))
     }
 
     pub(crate) fn shot(&self) -> Shot {
-        Shot { size: self.size, below_camera: self.slant.below_camera() + self.middle }
+        Shot { size: self.taken.size, below_camera: self.slant.below_camera() + self.middle }
     }
 
     fn point(&self, level: &Point2<f64>) -> Option<Point2<f64>> {
         let seen = self.slant.picture_from_level(level.coords - self.middle)?;
-        Some(Point2::from(half(self.size) + seen))
+        Some(self.taken.below_camera + seen)
     }
 
     /// A detection of the level picture, in the slanted one; `None` where it lies outside.
@@ -222,16 +225,11 @@ impl LevelImage {
     }
 }
 
-fn half(size: [u32; 2]) -> Vector2<f64> {
-    Vector2::from(size.map(|side| 0.5 * f64::from(side)))
-}
-
 /// Least and largest coordinates of the level points that are seen at some points of the picture, from its middle.
-fn level_bounds(picture: &RgbImage, slant: &Slant, points: &[Point2<f64>]) -> Option<[Vector2<f64>; 2]> {
-    let middle = half([picture.width(), picture.height()]);
+fn level_bounds(taken: &Shot, slant: &Slant, points: &[Point2<f64>]) -> Option<[Vector2<f64>; 2]> {
     let mut bounds = [Vector2::repeat(f64::INFINITY), Vector2::repeat(f64::NEG_INFINITY)];
     for point in points {
-        let level = slant.level_from_picture(point.coords - middle)?;
+        let level = slant.level_from_picture(point - taken.below_camera)?;
         bounds = [bounds[0].inf(&level), bounds[1].sup(&level)];
     }
     Some(bounds)
@@ -246,6 +244,10 @@ mod tests {
     use image::Rgb;
 
     const SIZE: [u32; 2] = [480, 360];
+
+    fn half(size: [u32; 2]) -> Vector2<f64> {
+        Vector2::from(size.map(|side| 0.5 * f64::from(side)))
+    }
 
     /// A dark plate of 110 × 60 pixels with two holes and a printed stripe, in the middle of the table and turned, at a point of the
     /// table from its middle.
@@ -278,7 +280,8 @@ mod tests {
     #[test]
     fn a_slanted_picture_made_level_is_the_level_picture() {
         let slant = slant(30.0);
-        let made = LevelImage::new(&picture(|seen| slant.level_from_picture(seen)), &slant).unwrap();
+        let seen = picture(|seen| slant.level_from_picture(seen));
+        let made = LevelImage::new(&seen, &Shot::level(&seen), &slant).unwrap();
         let level = picture(Some);
         // The plate and what lies about it; the level picture's middle lies elsewhere in the one made of the slanted.
         let mut sum = 0.0;

@@ -122,14 +122,19 @@ impl TaughtDemonstration {
         range: &SizeRange,
         colors: Colors,
     ) -> Result<(WorkingSize, Arc<Prepared>), GraspError> {
-        let bounds = self.marks.region().bounds();
-        let working = WorkingSize::new(bounds.width().max(bounds.height()), range.middle());
+        let working = self.working(range);
         let (cutout, prepared) = match colors {
             Colors::There => (&self.cutout, &self.prepared),
             Colors::None => (self.gray.get_or_init(|| gray(&self.cutout)), &self.prepared_gray),
         };
         let prepared = prepared.get(cutout, &self.marks, &working, range, &self.check.search)?;
         Ok((working, prepared))
+    }
+
+    /// How pictures are resized in which the part is as large as `range` says.
+    pub(crate) fn working(&self, range: &SizeRange) -> WorkingSize {
+        let bounds = self.marks.region().bounds();
+        WorkingSize::new(bounds.width().max(bounds.height()), range.middle())
     }
 
     /// What the model's comparison network compares pictures with.

@@ -47,6 +47,7 @@ pub(crate) fn usual_focal_px(size: [u32; 2]) -> f64 {
 
 impl Shot {
     /// Of a camera that looks straight down.
+    #[cfg(any(feature = "teach", test))]
     pub(crate) fn level(image: &RgbImage) -> Self {
         let (width, height) = image.dimensions();
         Self { size: [width, height], below_camera: Point2::new(0.5 * f64::from(width), 0.5 * f64::from(height)) }
@@ -83,6 +84,7 @@ struct SizedDemonstration<'a> {
 impl<'a> SearchedImage<'a> {
     /// Makes every demonstration ready for the image's size. One that shows nothing to compare at some size is not looked
     /// for at that size.
+    #[cfg(feature = "teach")]
     pub(crate) fn new(image: &'a RgbImage, demonstrations: &'a [TaughtDemonstration]) -> Self {
         Self::of(image, &Shot::level(image), demonstrations)
     }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use sdg_demonstration::{Demonstration, PixelFrame};
-use sdg_grasp::TeachOptions;
+use sdg_grasp::{GraspError, TeachOptions, check_region_from_above};
 
 use crate::camera_files::CameraFile;
 use crate::demonstrations::read_pair;
@@ -23,11 +23,11 @@ pub struct TeachingFiles<'a> {
 
 impl TeachingFiles<'_> {
     /// The demonstrations, in the plan view of the marks' plane where there is a camera; pictures without the part and the lengths
-    /// go into the options.
+    /// go into the options. A region there becomes one of pictures as large as the first photo.
     ///
     /// # Errors
     /// Files that cannot be read; with a camera, photos that an Exif orientation turns, that are of another size, or whose marks
-    /// the camera does not see.
+    /// the camera does not see; a region that does not lie in the first photo.
     pub fn read(&self, options: &mut TeachOptions) -> Result<Vec<Demonstration>> {
         let mut pixel_frame = PixelFrame::Upright;
         if self.camera.is_some() {
@@ -38,6 +38,12 @@ impl TeachingFiles<'_> {
         let demonstrations = read.collect::<Result<Vec<_>>>()?;
         options.negatives =
             self.negatives.iter().map(|path| read_image_in(path, pixel_frame)).collect::<Result<_>>()?;
+        if let (Some(region), Some(first)) = (options.region, demonstrations.first()) {
+            let size = first.image.dimensions().into();
+            let region = region.of_picture(size);
+            region.check(size).map_err(GraspError::from)?;
+            options.region = Some(region);
+        }
         let Some((path, [mark_height_m, grasp_height_m])) = self.camera else { return Ok(demonstrations) };
         let camera = CameraFile::read(path)?;
         for (demonstration, (photo, _)) in demonstrations.iter().zip(self.demonstrations) {
@@ -45,6 +51,9 @@ impl TeachingFiles<'_> {
         }
         let (seen, lengths) = camera.seen_from_above(&demonstrations, mark_height_m, grasp_height_m)?;
         options.negatives = camera.pictures_from_above(&options.negatives, &lengths)?;
+        if let Some(region) = &options.region {
+            check_region_from_above(region, &seen, &camera.over_table, &lengths)?;
+        }
         options.lengths = Some(lengths);
         Ok(seen)
     }

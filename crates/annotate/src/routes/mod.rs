@@ -14,6 +14,7 @@
 //! | `POST /api/others/{id}/photo`, `/api/others/{id}/try` | makes it a photo of the part, or a picture to try |
 //! | `POST /api/images?name=` | takes a photo of the part |
 //! | `PUT /api/label` | renames the object |
+//! | `PUT /api/region` | the part of pictures that is searched from now on; null for all of them |
 //! | `GET /api/images/{id}/picture` | a marked picture |
 //! | `PUT /api/images/{id}/marks` | takes marks, writes them, says what they suffice for |
 //! | `DELETE /api/images/{id}`, `/api/trial-pictures/{id}` | takes the picture out of the session; its file stays |
@@ -98,6 +99,9 @@ fn no_such_address() -> Response {
 fn of_session(session: &Session, request: &Request, path: &[&str]) -> Response {
     match (request.head.method.as_str(), path) {
         ("PUT", ["api", "label"]) => json_of(rename(session, &request.body)),
+        ("PUT", ["api", "region"]) => json_of(
+            read("region", &request.body).and_then(|region| session.set_region(region)).map(|()| session.view()),
+        ),
         ("GET", ["api", "teaching"]) => json_of(Ok(session.teaching_news())),
         ("POST", ["api", "teaching"]) => {
             json_of(read("teaching", &request.body).and_then(|asked| session.start_teaching(asked)))

@@ -68,12 +68,16 @@ impl Session {
             current: project.current_model,
         };
         let teaching = Arc::new(Teaching::default());
+        let mut region = None;
         if let Some(id) = models.current {
             let opened = models
                 .read(id)
                 .and_then(|bytes| teacher.open(&bytes, &models.versions[id].summary).map_err(Error::Teacher));
             match opened {
-                Ok(model) => teaching.set_model(Arc::from(model)),
+                Ok(model) => {
+                    region = model.region();
+                    teaching.set_model(Arc::from(model));
+                }
                 Err(error) => notes.push(format!("The model cannot be read: {error}")),
             }
         }
@@ -89,6 +93,7 @@ impl Session {
             removed_earlier: project.removed,
             offered: Vec::new(),
             max_opening_px: options.max_opening_px,
+            region,
         };
         state.save_project()?;
         Ok(Self {

@@ -87,20 +87,23 @@ impl Session {
         state.save_project()
     }
 
-    /// What two versions of the model find in every picture to try.
+    /// What two versions of the model find in every picture to try, in the region that is searched now.
     ///
     /// # Errors
     /// No such version, files that cannot be read.
     pub fn compare_versions(&self, one: usize, other: usize) -> Result<Vec<ComparedPicture>> {
-        let (models, pictures) = {
+        let (models, pictures, region) = {
             let state = self.state();
             let read = |id: usize| Ok::<_, Error>((state.models.read(id)?, state.models.get(id)?.summary.clone()));
             let tried = |id: usize| (id, state.trial_pictures[id].clone(), state.became(id).is_some());
             let pictures: Vec<_> = state.trial_ids().map(tried).collect();
-            ([read(one)?, read(other)?], pictures)
+            ([read(one)?, read(other)?], pictures, state.region)
         };
         let [one, other] = models.map(|(bytes, summary)| self.teacher.open(&bytes, &summary).map_err(Error::Teacher));
         let models = [one?, other?];
+        for model in &models {
+            model.look_in(region).map_err(Error::Teacher)?;
+        }
         let compared = pictures.into_iter().map(|(id, trial, is_demonstration)| {
             let pixels = trial.picture.pixels()?;
             let found = |model: &dyn TaughtModel| {

@@ -4,15 +4,15 @@ use std::io::{Read, Write};
 use std::net::{Ipv4Addr, Shutdown, TcpStream};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
 use image::{Rgb, RgbImage};
 use sdg_annotate::{
-    FoundGrasp, GraspTeacher, LiveOptions, LivePictures, RecentProjects, Server, Session, SessionOptions, Start,
-    TaughtModel, TaughtSummary, TeachRequest, TeacherError, TeachingMaterial, TeachingStep,
+    FoundGrasp, GraspTeacher, LiveOptions, LivePictures, RecentProjects, Region, Server, Session, SessionOptions,
+    Start, TaughtModel, TaughtSummary, TeachRequest, TeacherError, TeachingMaterial, TeachingStep,
 };
 use sdg_demonstration::Demonstration;
 use sdg_geometry::{GraspLine, PlanarGrasp};
@@ -21,10 +21,10 @@ use serde_json::Value;
 /// A teacher whose model finds its demonstration where it was photographed; quick, for the page's own sake.
 struct InPlace;
 
-struct InPlaceModel(Demonstration, Vec<RgbImage>);
+struct InPlaceModel(Demonstration, Vec<RgbImage>, Mutex<Option<Region>>);
 
 /// What is read from the file of one, which keeps nothing of it: it finds nothing.
-struct ReadModel(TaughtSummary);
+struct ReadModel(TaughtSummary, Mutex<Option<Region>>);
 
 impl TaughtModel for ReadModel {
     fn summary(&self) -> TaughtSummary {
@@ -33,6 +33,15 @@ impl TaughtModel for ReadModel {
 
     fn to_bytes(&self) -> Result<Vec<u8>, TeacherError> {
         Ok(b"a model".to_vec())
+    }
+
+    fn region(&self) -> Option<Region> {
+        *self.1.lock().unwrap()
+    }
+
+    fn look_in(&self, region: Option<Region>) -> Result<(), TeacherError> {
+        *self.1.lock().unwrap() = region;
+        Ok(())
     }
 
     fn detect(&self, _: &RgbImage) -> Result<Vec<FoundGrasp>, TeacherError> {
@@ -57,11 +66,16 @@ impl GraspTeacher for InPlace {
             }
         }
         let _ = observe(TeachingStep::Validated { done: planned, hit_rate: 1.0 });
-        Ok(Box::new(InPlaceModel(material.demonstrations[0].clone(), material.negatives.clone())))
+        let (demonstration, negatives) = (material.demonstrations[0].clone(), material.negatives.clone());
+        Ok(Box::new(InPlaceModel(demonstration, negatives, Mutex::new(request.region))))
     }
 
     fn open(&self, bytes: &[u8], summary: &TaughtSummary) -> Result<Box<dyn TaughtModel>, TeacherError> {
-        if bytes == b"a model" { Ok(Box::new(ReadModel(summary.clone()))) } else { Err("no model".into()) }
+        if bytes == b"a model" {
+            Ok(Box::new(ReadModel(summary.clone(), Mutex::default())))
+        } else {
+            Err("no model".into())
+        }
     }
 }
 
@@ -80,8 +94,28 @@ impl TaughtModel for InPlaceModel {
         Ok(b"a model".to_vec())
     }
 
+    fn region(&self) -> Option<Region> {
+        *self.2.lock().unwrap()
+    }
+
+    fn look_in(&self, region: Option<Region>) -> Result<(), TeacherError> {
+        if region.is_some_and(|region| f64::from(region.width) < self.0.annotation.bbox.width()) {
+            return Err("the part does not fit in".into());
+        }
+        *self.2.lock().unwrap() = region;
+        Ok(())
+    }
+
     fn detect(&self, image: &RgbImage) -> Result<Vec<FoundGrasp>, TeacherError> {
         let bbox = self.0.annotation.bbox;
+        let middle = bbox.center();
+        let has_middle = |region: Region| {
+            (region.x..region.x + region.width).contains(&(middle.x as u32))
+                && (region.y..region.y + region.height).contains(&(middle.y as u32))
+        };
+        if !self.region().is_none_or(has_middle) {
+            return Ok(Vec::new());
+        }
         let place = bbox.center().map(|v| v as u32);
         let same =
             !self.1.contains(image) && image.get_pixel(place.x, place.y) == self.0.image.get_pixel(place.x, place.y);

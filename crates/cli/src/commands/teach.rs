@@ -13,7 +13,7 @@ use sdg_evaluation::held_back::HeldBackFigures;
 use sdg_evaluation::teaching_page::TeachingPage;
 use sdg_evaluation::{TaughtFile, taught_words};
 use sdg_geometry::RotationalSymmetry;
-use sdg_grasp::{CheckConfig, GraspError, NegativeFacts, Preset, Start, TeachOptions};
+use sdg_grasp::{CheckConfig, GraspError, NegativeFacts, Preset, SearchRegion, Start, TeachOptions};
 use sdg_inputs::{TeachingFiles, base_weights};
 use sdg_weights_conversion::Report;
 use serde_json::{Value, json};
@@ -23,7 +23,7 @@ use crate::demonstrations;
 use crate::exit::{Outcome, Usage};
 use crate::interrupt::Interrupt;
 use crate::json_line::json_line;
-use crate::shared_args::{ComputeArgs, SizeTolerance, TaughtCameraArgs, seconds, size_tolerance};
+use crate::shared_args::{ComputeArgs, SizeTolerance, TaughtCameraArgs, region, seconds, size_tolerance};
 use crate::teaching_progress::TeachingProgress;
 
 /// `sdg teach`
@@ -41,7 +41,7 @@ pub struct TeachArgs {
     /// Instead, many parts: a folder of photos with marks beside them, each of a part, and of folders with several photos of
     /// a part; --out is then a folder for models and a page that says which look alike and which need another photo. What is
     /// there already is not taught again. Lines "NAME 4" or "NAME full" of symmetries.txt in it are a part's --symmetry
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["demonstrations", "negatives", "camera"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["demonstrations", "negatives", "camera", "region"])]
     pub demos: Option<PathBuf>,
     /// Of --demos this part alone, without the page, so that machines can share the parts; repeat for several
     #[arg(long = "part", value_name = "NAME", requires = "demos", conflicts_with = "demonstrations")]
@@ -71,6 +71,10 @@ pub struct TeachArgs {
     /// cropped and resized
     #[arg(long, default_value = "0.75-1.35", value_name = "LOW-HIGH", value_parser = size_tolerance)]
     pub size_tolerance: SizeTolerance,
+    /// Search only this part of pictures for the part: left edge, upper edge, width and height in pixels of the photo. A part counts
+    /// whose grasp point lies in it and at least half of the part. Kept in the model's file, for pictures as large as the photo
+    #[arg(long, value_name = "X,Y,W,H", value_parser = region)]
+    pub region: Option<SearchRegion>,
     /// The calibrated camera that took the photos
     #[command(flatten)]
     pub camera: TaughtCameraArgs,
@@ -118,6 +122,7 @@ pub(super) fn options(args: &TeachArgs) -> Result<TeachOptions> {
     options.preset = parse("--preset", &args.preset)?;
     options.symmetry = args.symmetry;
     options.size_tolerance = args.size_tolerance.range();
+    options.region = args.region;
     options.time_budget = args.time_budget.map(Duration::from_secs_f64);
     options.steps = args.steps.map(|steps| steps as usize);
     options.device = devices::open(&args.compute)?;
@@ -152,7 +157,7 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
         negatives: &args.negatives,
         camera: args.camera.file.as_deref().map(|path| (path, args.camera.heights_m())),
     };
-    let demonstrations = files.read(&mut options)?;
+    let demonstrations = files.read(&mut options).map_err(of_region)?;
     sdg_files::check_writable(&args.out)?;
     sdg_inputs::check_replaces_a_model(&args.out)?;
     if let Some(folder) = &args.report {
@@ -166,6 +171,7 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
             Usage(format!("--base-weights: {error}; give {SHIPPED_FILE} of the sources, or none")).into()
         }
         Some(GraspError::NeedsBaseWeights { .. }) => Usage(format!("--base-weights: {error}")).into(),
+        Some(GraspError::Region(_)) => of_region(error),
         Some(_) => error.context(args.demonstrations.join(", ")),
         None => error,
     })?;
@@ -217,6 +223,9 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
         println!("{}", figures.in_words());
         let tolerance = taught.model.size_tolerance();
         println!("looks for it at {} to {} times its size in the photo", tolerance.start(), tolerance.end());
+        if let Some(region) = taught.model.region() {
+            println!("searches {region} of pictures as large as the photo");
+        }
         if let Some(NegativeFacts { pictures, refused, log_odds }) = facts.negatives {
             println!(
                 "refuses {refused} of {pictures} pictures without the part; every score has {:.1} log-odds less for them",
@@ -242,6 +251,14 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
     Ok(if failure.is_some() { Outcome::ModelFails } else { Outcome::Done })
 }
 
+/// Names the option where its region is the reason.
+fn of_region(error: anyhow::Error) -> anyhow::Error {
+    match error.downcast_ref() {
+        Some(GraspError::Region(_)) => error.context("--region"),
+        _ => error,
+    }
+}
+
 /// The command that makes the same model again.
 pub(super) fn command(args: &TeachArgs) -> String {
     let mut command = format!("sdg teach --model {} --preset {} --seed {}", args.model, args.preset, args.seed);
@@ -259,6 +276,9 @@ pub(super) fn command(args: &TeachArgs) -> String {
     }
     if args.size_tolerance.range() != CheckConfig::DEFAULT_SIZE_TOLERANCE {
         option("size-tolerance", format!("{}-{}", args.size_tolerance.low, args.size_tolerance.high));
+    }
+    if let Some(SearchRegion { x, y, width, height, .. }) = args.region {
+        option("region", format!("{x},{y},{width},{height}"));
     }
     if let Some(camera) = &args.camera.file {
         let [mark, grasp] = args.camera.heights_m().map(|height| (1e3 * height).to_string());

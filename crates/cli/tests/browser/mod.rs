@@ -11,4 +11,5 @@ pub(crate) mod page;
 mod photo_to_grasp;
 mod project;
 mod projects;
+mod region;
 mod small_screen;

@@ -12,7 +12,7 @@ pub struct Instance {
     pub bbox: BoundingBox,
     /// The marked grasp; an optional instance may lack it.
     pub grasp: Option<GraspLine>,
-    /// Neither missed nor wrong: flagged so, or what the model was taught from.
+    /// Neither missed nor wrong: flagged so, what the model was taught from, or not wholly in the region that it searches.
     pub optional: bool,
     /// Where the labels say it.
     pub extent: Option<Extent>,
@@ -42,6 +42,15 @@ pub struct LabelledPicture {
 }
 
 impl LabelledPicture {
+    /// Makes optional what does not lie wholly in the part of the picture that is searched.
+    pub fn mark_outside(&mut self, searched: &BoundingBox) {
+        for instance in &mut self.instances {
+            let BoundingBox { x1, y1, x2, y2 } = instance.bbox;
+            let is_inside = searched.x1 <= x1 && searched.y1 <= y1 && x2 <= searched.x2 && y2 <= searched.y2;
+            instance.optional |= !is_inside;
+        }
+    }
+
     /// The file's name.
     pub fn name(&self) -> String {
         file_name(&self.path)
@@ -59,4 +68,23 @@ pub struct LeftOut {
 /// The last part of a path.
 pub(super) fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_reaches_out_of_the_searched_part_may_be_missed() {
+        let instance = |x1: f64| {
+            let bbox = BoundingBox { x1, y1: 20.0, x2: x1 + 40.0, y2: 60.0 };
+            Instance { bbox, grasp: None, optional: false, extent: None }
+        };
+        let instances = [10.0, 60.0, 61.0, 150.0].map(instance).to_vec();
+        let mut picture =
+            LabelledPicture { path: "a.png".into(), labels: "a.json".into(), size: [200, 100], instances, kind: None };
+        picture.mark_outside(&BoundingBox { x1: 10.0, y1: 10.0, x2: 100.0, y2: 60.0 });
+        let optional: Vec<bool> = picture.instances.iter().map(|instance| instance.optional).collect();
+        assert_eq!(optional, [false, false, true, true]);
+    }
 }

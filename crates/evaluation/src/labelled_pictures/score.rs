@@ -102,7 +102,7 @@ impl Tested {
     ///
     /// # Errors
     /// A picture that cannot be read or detected in.
-    pub fn detect(picture: LabelledPicture, detector: &Perception, verification: Verification) -> Result<Self> {
+    pub fn detect(mut picture: LabelledPicture, detector: &Perception, verification: Verification) -> Result<Self> {
         if detector.pixel_frame() == PixelFrame::Sensor {
             sdg_inputs::check_is_not_turned(&picture.path)?;
         }
@@ -110,6 +110,9 @@ impl Tested {
         let start = Instant::now();
         let found = detector.detect(&image, verification).with_context(|| picture.path.display().to_string())?;
         let seconds = start.elapsed().as_secs_f64();
+        if let Some(region) = detector.region() {
+            picture.mark_outside(&region.bounds());
+        }
         let truths = picture.instances.iter().map(|instance| Truth::new(instance, detector)).collect();
         let detections = found.into_iter().map(|found| found.detection).collect();
         Ok(Self { picture, truths, detections, seconds })

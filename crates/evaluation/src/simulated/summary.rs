@@ -296,6 +296,7 @@ mod tests {
             symmetry: RotationalSymmetry::None,
             size_tolerance: None,
             lengths: None,
+            region: None,
             samples: 100,
             steps: 10,
             seconds: 60.0,

@@ -137,19 +137,20 @@ impl Network {
     /// An image that the network refuses.
     #[cfg(feature = "teach")]
     pub(crate) fn proposals(&self, image: &RgbImage, demonstrations: &[TaughtDemonstration]) -> Result<Proposals> {
-        read_sync(self.proposals_async(image, demonstrations))
+        read_sync(self.proposals_async(image, image.dimensions().into(), demonstrations))
     }
 
-    /// [`Self::proposals`], awaited.
+    /// [`Self::proposals`], awaited, in a part of a picture of size `whole`, whose pixels the network is shown as if it were shown the whole.
     ///
     /// # Errors
     /// As there.
     pub(crate) async fn proposals_async(
         &self,
         image: &RgbImage,
+        whole: [u32; 2],
         demonstrations: &[TaughtDemonstration],
     ) -> Result<Proposals> {
-        let transformed = self.detector.image_transform().apply(image)?;
+        let transformed = self.detector.image_transform().apply_part(image, whole)?;
         let detections = self.detector.detect_async(&[transformed]).await.pop().unwrap_or_default();
         let proposed = (0..detections.scores.len()).filter(|&i| detections.scores[i] >= MIN_NETWORK_SCORE);
         let mut read = Vec::new();

@@ -6,8 +6,12 @@ use sdg_demonstration::{Annotation, Demonstration};
 use sdg_geometry::{BoundingBox, GraspLine, PlanView, Polygon, PosedCamera};
 use sdg_shape::PlanMap;
 
+use super::region::RegionInPlan;
 use super::{CameraOverTable, Lengths, plan_view, slant};
+use crate::check_config::CheckConfig;
 use crate::error::{GraspError, Result};
+use crate::region::SearchRegion;
+use crate::taught::TaughtDemonstration;
 
 /// Photos and their marks in the plan view of the marks' plane, and how fine that is: as the first photo shows the part.
 ///
@@ -54,6 +58,28 @@ pub fn pictures_from_above(
 ) -> Result<Vec<RgbImage>> {
     let map = PlanMap::new(&over_table.camera, &plan_view(over_table, lengths)?);
     Ok(pictures.iter().map(|picture| map.resample(picture)).collect())
+}
+
+/// Whether a region of a camera's pictures can be searched for the part of demonstrations that [`super::seen_from_above`] made.
+///
+/// # Errors
+/// A region that reaches out of the pictures or is for others, that does not show the plane, or that the part does not fit in.
+pub fn check_region_from_above(
+    region: &SearchRegion,
+    demonstrations: &[Demonstration],
+    over_table: &CameraOverTable,
+    lengths: &Lengths,
+) -> Result<()> {
+    let view = plan_view(over_table, lengths)?;
+    let in_plan = |demonstration: &Demonstration| {
+        let mut taught = TaughtDemonstration::new(demonstration)?;
+        taught.marks.photo_size = None;
+        let mut check = taught.check().clone();
+        check.search.scales = CheckConfig::KNOWN_SIZE_TOLERANCE;
+        taught.with_check(check)
+    };
+    let taught = demonstrations.iter().map(in_plan).collect::<Result<Vec<_>>>()?;
+    RegionInPlan::new(region, &over_table.camera, &view)?.window([view.width, view.height], &taught).map(|_| ())
 }
 
 fn annotation(marked: &Annotation, camera: &PosedCamera, view: &PlanView) -> Result<Annotation> {

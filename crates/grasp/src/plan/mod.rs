@@ -9,21 +9,26 @@
 //! camera serves any other.
 
 mod demonstration;
+mod region;
 mod uncertainty;
 
 use std::ops::RangeInclusive;
 
+use burn::tensor::read_sync;
 use image::RgbImage;
 use nalgebra::{Isometry3, Point2, Point3, Rotation2, UnitQuaternion, Vector2, Vector3};
 use sdg_geometry::{Angle, BoundingBox, PlanView, PlanarGrasp, Polygon, PosedCamera, Workspace};
 use sdg_shape::{PixelRect, PlanMap};
 
-pub use self::demonstration::{pictures_from_above, seen_from_above};
+pub use self::demonstration::{check_region_from_above, pictures_from_above, seen_from_above};
+use self::region::RegionInPlan;
 pub use self::uncertainty::{Circumstances, ErrorLength, Uncertainty};
-use crate::detection::GraspDetection;
+use crate::detection::{Found, GraspDetection};
 use crate::error::{GraspError, Result};
 use crate::lengths::Lengths;
 use crate::model::{GraspModel, Verification};
+use crate::region::SearchRegion;
+use crate::search_window::SearchWindow;
 
 /// A table and a camera over it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -80,6 +85,7 @@ pub struct PlanDetector {
     lengths: Lengths,
     view: PlanView,
     map: PlanMap,
+    region: Option<RegionInPlan>,
     /// Sizes over the part's own at which it is looked for, where parts may lie at another height than the table's.
     sizes: Option<RangeInclusive<f64>>,
 }
@@ -93,7 +99,10 @@ impl PlanDetector {
         let lengths = model.facts().lengths.ok_or(GraspError::NoLengths)?;
         let view = plan_view(over_table, &lengths)?;
         let map = PlanMap::new(&over_table.camera, &view);
-        Ok(Self { model: model.of_known_size()?, over_table: *over_table, lengths, view, map, sizes: None })
+        let region = model.region().map(|region| RegionInPlan::new(region, &over_table.camera, &view)).transpose()?;
+        // The model is shown plan views, whose pixels are not those of the region.
+        let model = model.with_region(None)?.of_known_size()?;
+        Ok(Self { model, over_table: *over_table, lengths, view, map, region, sizes: None })
     }
 
     /// Looks for parts of these sizes in the plan view, over the part's own: what lies higher appears larger. No size within the range speaks
@@ -122,10 +131,31 @@ impl PlanDetector {
     /// # Errors
     /// A camera that does not see the plane; nothing is changed then.
     pub fn move_to(&mut self, over_table: &CameraOverTable) -> Result<()> {
-        self.view = plan_view(over_table, &self.lengths)?;
+        let view = plan_view(over_table, &self.lengths)?;
+        let region = self.region().map(|region| RegionInPlan::new(region, &over_table.camera, &view)).transpose()?;
+        (self.view, self.region) = (view, region);
         self.map = PlanMap::new(&over_table.camera, &self.view);
         self.over_table = *over_table;
         Ok(())
+    }
+
+    /// Searches this part of pictures alone, in their pixels; all of them with `None`.
+    ///
+    /// # Errors
+    /// A region that reaches out of the camera's pictures or is for others, that does not show the plane, or that the part does not fit in;
+    /// nothing is changed then.
+    pub fn look_in(&mut self, region: Option<&SearchRegion>) -> Result<()> {
+        let region = region.map(|region| RegionInPlan::new(region, &self.over_table.camera, &self.view)).transpose()?;
+        if let Some(region) = &region {
+            region.window([self.view.width, self.view.height], self.model.demonstrations())?;
+        }
+        self.region = region;
+        Ok(())
+    }
+
+    /// The part of pictures that is searched, in their pixels; all of them where `None`.
+    pub fn region(&self) -> Option<&SearchRegion> {
+        self.region.as_ref().map(|region| &region.region)
     }
 
     /// The model, for plan views of known size.
@@ -148,8 +178,28 @@ impl PlanDetector {
     /// # Errors
     /// As there.
     pub fn detect(&self, picture: &RgbImage, verification: Verification) -> Result<Vec<PlanDetection>> {
-        let found = self.model.detect(&self.plan_view_of(picture), verification)?;
-        Ok(found.into_iter().filter_map(|detection| self.placed(detection)).collect())
+        let found = self.find(picture, verification)?;
+        Ok(found.into_iter().filter_map(|found| self.placed(found.detection)).collect())
+    }
+
+    /// What a picture shows, in pixels of the plan view.
+    pub(crate) fn find(&self, picture: &RgbImage, verification: Verification) -> Result<Vec<Found>> {
+        let size = self.view_size();
+        let (window, counts): (_, &dyn Fn(&GraspDetection) -> bool) = match &self.region {
+            None => (SearchWindow::whole(size), &|_| true),
+            Some(region) => {
+                region.region.check(picture.dimensions().into())?;
+                (region.window(size, self.model.demonstrations())?, &|detection| self.is_in_region(detection))
+            }
+        };
+        read_sync(self.model.find_in(&self.window_of(picture, &window.rect), &window, verification, counts))
+    }
+
+    /// Whether a detection in the plan view lies in the region of the picture that is searched; any does where all of it is.
+    pub(crate) fn is_in_region(&self, detection: &GraspDetection) -> bool {
+        let has =
+            |region: &RegionInPlan| self.in_picture(detection.clone()).is_some_and(|seen| seen.lies_in(&region.region));
+        self.region.as_ref().is_none_or(has)
     }
 
     /// Width and height of the plan view.

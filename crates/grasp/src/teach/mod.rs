@@ -49,6 +49,7 @@ use crate::model::GraspModel;
 use crate::models::mask::MaskMatcher;
 use crate::models::{Network, Proposals, Reading};
 use crate::network_evidence::NetworkEvidence;
+use crate::search_window::check_region;
 use crate::taught::TaughtDemonstration;
 
 use absent::AbsentSamples;
@@ -85,6 +86,9 @@ pub fn teach(
 ) -> Result<Taught> {
     let start = Instant::now();
     check_marks(demonstrations, options.kind)?;
+    if let (Some(region), None) = (&options.region, &options.lengths) {
+        check_region(region, Some(&taught(demonstrations, options)?))?;
+    }
     let options = options.with_start_read()?;
     let mut taught = match Plan::new(&options) {
         Some(plan) => teach_network(demonstrations, &plan, &options, observe, start)?,
@@ -94,6 +98,7 @@ pub fn teach(
         taught.model = absent::calibrated(taught.model, demonstrations, &options)?;
         taught.model.facts.seconds = decimal(start.elapsed().as_secs_f64());
     }
+    taught.model = taught.model.with_region(options.region)?;
     Ok(taught)
 }
 
@@ -177,6 +182,7 @@ fn without_network(demonstrations: &[Demonstration], options: &TeachOptions, sta
             symmetry: options.symmetry,
             size_tolerance: Some([*options.size_tolerance.start(), *options.size_tolerance.end()]),
             lengths: options.lengths,
+            region: None,
             samples: 0,
             steps: 0,
             seconds: decimal(start.elapsed().as_secs_f64()),
@@ -300,6 +306,7 @@ pub(crate) fn teach_network(
         symmetry: options.symmetry,
         size_tolerance: Some([*options.size_tolerance.start(), *options.size_tolerance.end()]),
         lengths: options.lengths,
+        region: None,
         samples: history.steps.iter().map(|step| step.samples).sum(),
         steps: history.steps.len(),
         seconds: decimal(start.elapsed().as_secs_f64()),

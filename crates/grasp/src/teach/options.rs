@@ -15,6 +15,7 @@ use crate::check_config::CheckConfig;
 use crate::error::Result;
 use crate::facts::ModelKind;
 use crate::lengths::Lengths;
+use crate::region::SearchRegion;
 
 /// How to teach.
 #[derive(Debug, Clone)]
@@ -36,6 +37,8 @@ pub struct TeachOptions {
     pub symmetry: RotationalSymmetry,
     /// Sizes over the nominal one at which the part is looked for.
     pub size_tolerance: RangeInclusive<f64>,
+    /// The part of pictures that the model searches; teaching itself does not go by it.
+    pub region: Option<SearchRegion>,
     /// What [`crate::seen_from_above`] says where the demonstrations come from there.
     pub lengths: Option<Lengths>,
     /// The user's pictures without the part: some of the samples of a network, and what the score is calibrated on. Each counts
@@ -59,6 +62,7 @@ impl TeachOptions {
             fine_tuning: None,
             symmetry: RotationalSymmetry::None,
             size_tolerance: CheckConfig::DEFAULT_SIZE_TOLERANCE,
+            region: None,
             lengths: None,
             negatives: Vec::new(),
             start: Start::default(),

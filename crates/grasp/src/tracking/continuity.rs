@@ -3,36 +3,46 @@
 use image::RgbImage;
 use sdg_geometry::BoundingBox;
 
-/// Cells across and down, of which the mean colours are compared.
-const CELLS: [u32; 2] = [32, 24];
+use sdg_shape::PixelRect;
+
+/// Most cells across and down, of which the mean colours are compared, and the shortest side of a cell: the mean of fewer pixels would be
+/// noise. Chosen by hand.
+const MAX_CELLS: [u32; 2] = [32, 24];
+const MIN_CELL_PX: u32 = 8;
 /// Pixels across and down of which a cell's mean is made: more of a large picture would take longer than following a part.
 const MAX_SAMPLES: u32 = 20;
 /// A mean that changes by more, in grey values, shows other things. Chosen by hand: above what noise and lamps do, below what a
 /// part does that covers a tenth of a cell.
 const MAX_CHANGE: f32 = 6.0;
 
-/// The mean colours of a picture's cells.
+/// The mean colours of the cells of a picture, or of the part of it that is searched.
 #[derive(Debug, Clone)]
 pub(super) struct CoarseView {
-    size: [u32; 2],
+    window: PixelRect,
+    /// Cells across and down.
+    cells: [u32; 2],
     means: Vec<[f32; 3]>,
 }
 
 impl CoarseView {
-    pub(super) fn new(picture: &RgbImage) -> Self {
-        let size = [picture.width(), picture.height()];
-        let means = (0..CELLS[1]).flat_map(|row| (0..CELLS[0]).map(move |column| [column, row]));
-        Self { size, means: means.map(|cell| mean(picture, cell)).collect() }
+    pub(super) fn new(picture: &RgbImage, window: &PixelRect) -> Self {
+        let size = [window.width, window.height];
+        let cells = [0, 1].map(|axis| (size[axis] / MIN_CELL_PX).clamp(1, MAX_CELLS[axis]));
+        let places = (0..cells[1]).flat_map(|row| (0..cells[0]).map(move |column| [column, row]));
+        Self { window: *window, cells, means: places.map(|cell| mean(picture, window, cells, cell)).collect() }
     }
 
     /// Whether anything changed that does not lie in one of the boxes, or at their border.
     pub(super) fn has_changed_beside(&self, before: &Self, boxes: &[BoundingBox]) -> bool {
-        let [width, height] = [0, 1].map(|axis| f64::from(self.size[axis]) / f64::from(CELLS[axis]));
+        let PixelRect { left, top, width, height } = self.window;
+        let [left, top] = [left, top].map(f64::from);
+        let [columns, rows] = self.cells;
+        let (width, height) = (f64::from(width) / f64::from(columns), f64::from(height) / f64::from(rows));
         let is_beside = |idx: usize| {
-            let [column, row] = [idx % CELLS[0] as usize, idx / CELLS[0] as usize].map(|cell| cell as f64);
+            let [column, row] = [idx % columns as usize, idx / columns as usize].map(|cell| cell as f64);
             let touches = |part: &BoundingBox| {
-                (part.x1 - width..part.x2 + width).contains(&((column + 0.5) * width))
-                    && (part.y1 - height..part.y2 + height).contains(&((row + 0.5) * height))
+                (part.x1 - width..part.x2 + width).contains(&(left + (column + 0.5) * width))
+                    && (part.y1 - height..part.y2 + height).contains(&(top + (row + 0.5) * height))
             };
             !boxes.iter().any(touches)
         };
@@ -41,9 +51,9 @@ impl CoarseView {
     }
 }
 
-fn mean(picture: &RgbImage, cell: [u32; 2]) -> [f32; 3] {
-    let [from, to] = [0, 1]
-        .map(|end| [0, 1].map(|axis| (cell[axis] + end) * [picture.width(), picture.height()][axis] / CELLS[axis]));
+fn mean(picture: &RgbImage, window: &PixelRect, cells: [u32; 2], cell: [u32; 2]) -> [f32; 3] {
+    let (corner, size) = ([window.left, window.top], [window.width, window.height]);
+    let [from, to] = [0, 1].map(|end| [0, 1].map(|axis| corner[axis] + (cell[axis] + end) * size[axis] / cells[axis]));
     let steps = [0, 1].map(|axis| (to[axis] - from[axis]).div_ceil(MAX_SAMPLES).max(1) as usize);
     let (mut sum, mut count) = ([0_u32; 3], 0_u32);
     for y in (from[1]..to[1]).step_by(steps[1]) {
@@ -61,6 +71,10 @@ mod tests {
     use super::*;
     use image::Rgb;
 
+    fn whole(picture: &RgbImage) -> PixelRect {
+        PixelRect { left: 0, top: 0, width: picture.width(), height: picture.height() }
+    }
+
     #[test]
     fn noise_is_no_change_and_another_thing_is_one_unless_a_part_lies_there() {
         let noisy = |seed: u32| {
@@ -70,16 +84,26 @@ mod tests {
                 Rgb([90 + (noise >> 28) as u8; 3])
             })
         };
-        let before = CoarseView::new(&noisy(1));
-        assert!(!CoarseView::new(&noisy(2)).has_changed_beside(&before, &[]));
+        let view = |picture: &RgbImage| CoarseView::new(picture, &whole(picture));
+        let before = view(&noisy(1));
+        assert!(!view(&noisy(2)).has_changed_beside(&before, &[]));
         let mut other = noisy(2);
         (100..130).for_each(|y| (200..230).for_each(|x| other.put_pixel(x, y, Rgb([150; 3]))));
-        let after = CoarseView::new(&other);
+        let after = view(&other);
         assert!(after.has_changed_beside(&before, &[]));
         let on = |x1: f64| BoundingBox { x1, y1: 100.0, x2: x1 + 30.0, y2: 130.0 };
         assert!(!after.has_changed_beside(&before, &[on(200.0)]));
         assert!(after.has_changed_beside(&before, &[on(300.0)]));
         // Fewer pixels than cells.
-        assert!(!CoarseView::new(&RgbImage::new(5, 3)).has_changed_beside(&CoarseView::new(&RgbImage::new(5, 3)), &[]));
+        assert!(!view(&RgbImage::new(5, 3)).has_changed_beside(&view(&RgbImage::new(5, 3)), &[]));
+        // Only in the part that is looked at, whose places are those of the picture.
+        let seen = |left: u32| {
+            let window = PixelRect { left, top: 80, width: 64, height: 48 };
+            [noisy(1), other.clone()].map(|picture| CoarseView::new(&picture, &window))
+        };
+        let [before, after] = seen(400);
+        assert!(!after.has_changed_beside(&before, &[]));
+        let [before, after] = seen(190);
+        assert!(after.has_changed_beside(&before, &[]) && !after.has_changed_beside(&before, &[on(200.0)]));
     }
 }

@@ -11,6 +11,7 @@ use crate::detection::{Found, GraspDetection};
 use crate::error::Result;
 use crate::model::{GraspModel, Verification};
 use crate::plan::{PlanDetector, PlanarPose};
+use crate::region::SearchRegion;
 
 /// A model, and the plan view that it works in where the camera is calibrated.
 #[derive(Debug, Clone)]
@@ -62,15 +63,18 @@ impl PartDetector {
 
     /// What a whole picture shows; detections in the frame of reference.
     fn find(&self, picture: &RgbImage) -> Result<Vec<Found>> {
-        let view;
-        let shown = match self {
-            Self::Picture(_) => picture,
-            Self::Plan(detector) => {
-                view = detector.plan_view_of(picture);
-                &view
-            }
-        };
-        read_sync(self.model().find_async(shown, Verification::ByShape))
+        match self {
+            Self::Picture(model) => read_sync(model.find_async(picture, Verification::ByShape)),
+            Self::Plan(detector) => detector.find(picture, Verification::ByShape),
+        }
+    }
+
+    /// The part of the picture that is searched, in its pixels; all of it where `None`.
+    pub(super) fn region(&self) -> Option<&SearchRegion> {
+        match self {
+            Self::Picture(model) => model.region(),
+            Self::Plan(detector) => detector.region(),
+        }
     }
 
     /// A detection of the frame of reference in pixels of the picture, and in metres; `None` where the camera does not show it.

@@ -1,20 +1,16 @@
 //! A drawn part that moves, is taken away and comes back; searches end some frames after the one that they read.
 
-use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::Duration;
 
 use image::{Rgb, RgbImage};
-use nalgebra::Point2;
-use sdg_demonstration::{Annotation, Demonstration};
-use sdg_geometry::{Angle, GraspLine, PlanarSimilarity, Polygon};
+use sdg_geometry::PlanarSimilarity;
 
 use super::*;
-use crate::facts::ModelKind;
-use crate::teach::{TeachOptions, teach};
+use crate::drawn_part::{self, at, line};
+use crate::region::SearchRegion;
 
 const SIZE: [u32; 2] = [320, 240];
-const MIDDLE: Point2<f64> = Point2::new(90.0, 70.0);
 /// From one frame to the next.
 const PERIOD: Duration = Duration::from_millis(10);
 /// Frames that a search takes.
@@ -23,58 +19,12 @@ const SEARCH_FRAMES: u64 = 7;
 const MAX_ERROR_PX: f64 = 0.5;
 const MAX_ERROR_RAD: f64 = 0.01;
 
-/// An L with a bright foot and a hole.
-fn outline() -> Polygon {
-    let corners = [(60.0, 40.0), (80.0, 40.0), (80.0, 84.0), (124.0, 84.0), (124.0, 104.0), (60.0, 104.0)];
-    Polygon { vertices: corners.map(|(x, y)| Point2::new(x, y)).to_vec() }
-}
-
-/// The parts on a dim ramp, with smooth edges.
 fn picture(parts: &[PlanarSimilarity]) -> RgbImage {
-    let outline = outline();
-    let inverses: Vec<PlanarSimilarity> = parts.iter().map(PlanarSimilarity::inverse).collect();
-    RgbImage::from_fn(SIZE[0], SIZE[1], |x, y| {
-        let table = [50.0 + f64::from(x) / 8.0, 55.0 + f64::from(y) / 8.0, 70.0];
-        let color_at = |at: Point2<f64>| {
-            let on_part = inverses.iter().map(|inverse| inverse.apply(&at)).find(|own| outline.contains(own));
-            match on_part {
-                Some(own) if (own - Point2::new(70.0, 94.0)).norm() < 5.0 => [30.0, 30.0, 35.0],
-                Some(own) if own.x > 100.0 => [230.0, 200.0, 60.0],
-                Some(_) => [190.0, 40.0, 30.0],
-                None => table,
-            }
-        };
-        let mut sum = [0.0; 3];
-        for k in 0..9 {
-            let [right, down] = [k % 3, k / 3].map(|k| (f64::from(k) + 0.5) / 3.0);
-            let color = color_at(Point2::new(f64::from(x) + right, f64::from(y) + down));
-            (0..3).for_each(|c| sum[c] += color[c] / 9.0);
-        }
-        Rgb(sum.map(|value| value.round() as u8))
-    })
-}
-
-fn at(x: f64, y: f64, angle_deg: f64) -> PlanarSimilarity {
-    PlanarSimilarity::about(MIDDLE, Point2::new(x, y), Angle::from_degrees(angle_deg), 1.0)
-}
-
-fn line() -> GraspLine {
-    GraspLine::new(Point2::new(70.0, 50.0), Point2::new(70.0, 80.0))
+    drawn_part::picture(SIZE, parts)
 }
 
 fn tracker() -> Tracker {
-    let outline = outline();
-    let annotation = Annotation {
-        label: "L".into(),
-        bbox: outline.bounds(),
-        grasp: Some(line()),
-        jaw_width: None,
-        outline: Some(outline),
-    };
-    let demonstration = Demonstration { image: picture(&[PlanarSimilarity::IDENTITY]), annotation };
-    let options = TeachOptions { kind: ModelKind::S, ..TeachOptions::new(1) };
-    let model = teach(&[demonstration], &options, &mut |_| ControlFlow::Continue(())).unwrap().model;
-    Tracker::new(model.into(), TrackerConfig::default())
+    Tracker::new(drawn_part::model(SIZE).into(), TrackerConfig::default())
 }
 
 /// Feeds pictures of parts that lie where `poses` says in each frame; what is tracked in each.
@@ -241,4 +191,48 @@ fn the_same_frames_give_the_same_tracks() {
     let pose = |number: u64| vec![at(90.0 + 1.2 * number as f64, 100.0, 1.0 * number as f64)];
     let [one, again] = [0; 2].map(|_| run(&mut tracker(), 25, pose));
     assert_eq!(one, again);
+}
+
+/// A part that leaves the region is lost there, though it is still in the picture, and one that never lies in it is never found.
+#[test]
+fn with_a_region_parts_are_followed_in_it_alone() {
+    let region = SearchRegion::new([40, 30, 180, 180]);
+    let model = drawn_part::model(SIZE).with_region(Some(region)).unwrap();
+    let mut tracker = Tracker::new(model.into(), TrackerConfig::default());
+    // To the right, 2 px a frame, and beyond the region.
+    let pose = |number: u64| at(110.0 + 2.0 * number as f64, 120.0, 0.0);
+    let told = run(&mut tracker, 80, |number| vec![pose(number)]);
+    let mut num_followed = 0;
+    for (number, parts) in told.iter().enumerate() {
+        let grasp = line().transformed(&pose(number as u64)).center();
+        for part in parts.iter().filter(|part| part.is_followed()) {
+            assert_at(part, &pose(number as u64), &format!("frame {number}"));
+            assert!(grasp.x < 220.0 + MAX_ERROR_PX, "frame {number}: {grasp}");
+            num_followed += 1;
+        }
+    }
+    assert!(num_followed > 30, "{num_followed}");
+    assert_eq!(told[79][0].state, TrackState::Lost);
+    // What changes beside the region is not searched for before the frame is answered.
+    let config = TrackerConfig { moves_within: Duration::ZERO, ..TrackerConfig::default() };
+    let model = drawn_part::model(SIZE).with_region(Some(region)).unwrap();
+    let mut tracker = Tracker::new(model.into(), config);
+    let still = at(110.0, 120.0, 0.0);
+    let mut change = |number: u32, picture: RgbImage| {
+        tracker.frame(Arc::new(picture), PERIOD * number);
+        let search = tracker.search_before_answer();
+        let is_searched = search.is_some();
+        if let Some(search) = search {
+            assert_eq!(tracker.answer(search.run()).unwrap().len(), 1);
+        }
+        is_searched
+    };
+    let covered = |left: u32| {
+        let mut picture = picture(&[still]);
+        (60..90).for_each(|y| (left..left + 40).for_each(|x| picture.put_pixel(x, y, Rgb([250; 3]))));
+        picture
+    };
+    assert!(change(0, picture(&[still])));
+    assert!(!change(1, covered(270)));
+    assert!(change(2, covered(175)));
 }

@@ -19,6 +19,7 @@ use crate::error::Result;
 use crate::model::are_of_same_part;
 use crate::plan::PlanarPose;
 use crate::verdict::Clues;
+use sdg_shape::PixelRect;
 
 /// Scores from which a detection becomes a track, and a lost track is found again: where detections are accepted.
 const ACCEPTED: f64 = 0.5;
@@ -213,6 +214,18 @@ impl Tracker {
         followed.map(|tracked| tracked.part.detection.bbox).collect()
     }
 
+    /// The part of a frame in which changes count.
+    fn watched(&self, picture: &RgbImage) -> PixelRect {
+        let (width, height) = picture.dimensions();
+        let region = self.detector.region().filter(|region| region.check([width, height]).is_ok());
+        region.map_or(PixelRect { left: 0, top: 0, width, height }, |region| PixelRect {
+            left: region.x,
+            top: region.y,
+            width: region.width,
+            height: region.height,
+        })
+    }
+
     /// How the newest frame does not follow from the one before, in which parts had those boxes.
     fn gap_after(
         &mut self,
@@ -221,7 +234,7 @@ impl Tracker {
         picture: &RgbImage,
         captured: Duration,
     ) -> Option<Gap> {
-        let coarse = CoarseView::new(picture);
+        let coarse = CoarseView::new(picture, &self.watched(picture));
         let coarse_before = self.coarse.replace(coarse.clone());
         let Some((before, coarse_before)) = before.zip(coarse_before) else { return Some(Gap::Unrelated) };
         let passed = captured.checked_sub(before.time).filter(|passed| *passed <= self.config.search_every);
@@ -453,10 +466,12 @@ impl Tracker {
     }
 }
 
-/// A detection of the frame of reference as it is told; `None` where the camera does not show it.
+/// A detection of the frame of reference as it is told; `None` where the camera does not show it, and outside the part of the picture that
+/// is searched.
 fn shown_within(detector: &PartDetector, mut detection: GraspDetection, size: [u32; 2]) -> Option<Shown> {
     detection.bbox = detection.bbox.clip(f64::from(size[0]), f64::from(size[1]));
-    detector.output(detection)
+    let is_in_region = |shown: &Shown| detector.region().is_none_or(|region| shown.0.lies_in(region));
+    detector.output(detection).filter(is_in_region)
 }
 
 impl Tracked {

@@ -7,7 +7,7 @@ use sdg_camera::Address;
 use sdg_cell::DEFAULT_MIN_SCORE;
 
 use crate::live_pictures::RequestArgs;
-use crate::shared_args::{ComputeArgs, SizeTolerance, share, size_tolerance};
+use crate::shared_args::{ComputeArgs, RegionArg, SizeTolerance, region_or_all, share, size_tolerance};
 
 /// Where an angle is zero and which way it grows, drawn.
 const ANGLES_HELP: &str = "\
@@ -44,6 +44,10 @@ pub struct DetectArgs {
     /// with a camera, this or another one
     #[arg(long, value_name = "FILE", conflicts_with = "size_tolerance")]
     pub camera: Option<PathBuf>,
+    /// Search only this part of each picture: left edge, upper edge, width and height in its pixels, or all; without it, the part that the
+    /// model was taught with. A part counts whose grasp point lies in it and at least half of the part
+    #[arg(long, value_name = "X,Y,W,H|all", value_parser = region_or_all)]
+    pub region: Option<RegionArg>,
     /// Accept detections that score at least so much; more for fewer wrong ones, less for fewer missed ones
     #[arg(long, value_name = "SCORE", default_value_t = DEFAULT_MIN_SCORE, value_parser = share)]
     pub min_score: f64,

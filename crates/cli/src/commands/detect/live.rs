@@ -17,6 +17,7 @@ use sdg_grasp::{TrackState, TrackerConfig, Verification};
 use serde::Serialize;
 
 use super::args::DetectArgs;
+use super::region_record::RegionRecord;
 use crate::exit::{Outcome, Usage, one_line};
 use crate::found_text::Wording;
 use crate::interrupt::Interrupt;
@@ -77,6 +78,7 @@ pub fn run(args: &DetectArgs, address: &Address, detector: Perception) -> Result
         write_line(&mut stdout, args, finder.perception(), &frame, picture.dimensions(), seconds, &parts)?;
         if let Some(server) = &server {
             let mut drawn = RgbImage::clone(&picture);
+            drawing::draw_region(&mut drawn, finder.perception().region());
             drawing::draw_parts(&mut drawn, &parts, args.min_score);
             server.publish(drawn);
         }
@@ -128,6 +130,7 @@ fn write_line(
             width,
             height,
             seconds,
+            region: detector.region().map(RegionRecord::of),
             faults: frame.faults.iter().map(fault).collect(),
             detections: shown().map(record).collect(),
         };
@@ -174,6 +177,8 @@ struct FrameLine<'a> {
     width: u32,
     height: u32,
     seconds: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    region: Option<RegionRecord>,
     faults: Vec<FaultLine>,
     detections: Vec<PartLine>,
 }

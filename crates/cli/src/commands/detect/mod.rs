@@ -3,6 +3,7 @@
 mod args;
 mod inputs;
 mod live;
+mod region_record;
 
 use std::collections::BTreeSet;
 use std::io::Write;
@@ -16,11 +17,13 @@ use sdg_inputs::{PictureInput, PictureInputs, camera_files, pictures_of_argument
 use serde::Serialize;
 
 pub use args::DetectArgs;
+use region_record::RegionRecord;
 
 use crate::commands::devices;
 use crate::exit::{Outcome, Usage, one_line};
 use crate::found_text::{Wording, advice_in_words};
 use crate::json_line::json_line;
+use crate::shared_args::RegionArg;
 
 /// Every image gets its line; one that cannot be read gets its error, and the next one its turn.
 pub fn run(args: &DetectArgs) -> Result<Outcome> {
@@ -46,7 +49,12 @@ pub fn run(args: &DetectArgs) -> Result<Outcome> {
     if args.max as usize != CheckConfig::DEFAULT_MAX_DETECTIONS {
         model = model.with_max_detections(args.max as usize)?;
     }
-    let detector = camera_files::perception(model, &args.grasp_model, args.camera.as_deref())?;
+    let mut detector = camera_files::perception(model, &args.grasp_model, args.camera.as_deref())?;
+    match args.region {
+        None => {}
+        Some(RegionArg::All) => detector.look_in(None)?,
+        Some(RegionArg::Part(region)) => detector.look_in(Some(region)).context("--region")?,
+    }
     if let Some(address) = &args.from {
         return live::run(args, address, detector);
     }
@@ -172,6 +180,7 @@ fn drawn(mut image: RgbImage, found: &[Found], wording: &Wording<'_>) -> RgbImag
     let refused: Vec<_> = wording.explained(detections()).into_iter().map(|idx| &found[idx].detection).collect();
     let differences: Vec<_> = wording.detector.differences(&image, &refused).into_iter().flatten().collect();
     drawing::draw_differences(&mut image, &differences);
+    drawing::draw_region(&mut image, wording.detector.region());
     let reasons: Vec<_> = refused.iter().map(|detection| (*detection, wording.reasons(detection, 1))).collect();
     drawing::draw_detections(&mut image, detections(), wording.min_score, &reasons);
     image
@@ -210,6 +219,7 @@ impl Seen {
                 width: self.size[0],
                 height: self.size[1],
                 seconds: self.seconds,
+                region: detector.region().map(RegionRecord::of),
                 num_refused: refused.len(),
                 detections: listed.map(record).collect(),
             };
@@ -235,6 +245,8 @@ struct ImageLine<'a> {
     width: u32,
     height: u32,
     seconds: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    region: Option<RegionRecord>,
     num_refused: usize,
     detections: Vec<PictureRecord>,
 }

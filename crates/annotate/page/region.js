@@ -1,0 +1,136 @@
+// The part of the pictures that is searched: shown as a frame, set by dragging on the picture or by four numbers.
+
+import { api } from "./api.js";
+import { offBecause } from "./buttons.js";
+import { clamp } from "./geometry.js";
+import { changed, isLive, state, trialPicture } from "./store.js";
+import { toast } from "./toast.js";
+import { toPhoto, toScreen } from "./view.js";
+
+const by = (id) => document.getElementById(id);
+const SIDES = ["x", "y", "width", "height"];
+/** A region with a shorter side was drawn by mistake. */
+const MIN_SIDE_PX = 8;
+
+/** Whether the next drag on the picture draws the region; what is being drawn, as [x, y, width, height]. */
+let isDrawing = false;
+let drawn = null;
+
+export const isChoosingRegion = () => isDrawing && state.tab === "try";
+
+/** Width and height of the picture on the stage; null where there is none. */
+function pictureSize() {
+  if (isLive()) return state.live.size;
+  const shown = trialPicture();
+  return shown ? [shown.width, shown.height] : null;
+}
+
+/** Asks the server to search this part alone, or all with null, and looks at everything again. */
+async function setRegion(region) {
+  by("region-error").hidden = true;
+  try {
+    state.region = (await api.setRegion(region)).region;
+    for (const trial of [...state.trialPictures, state.live]) Object.assign(trial, { detections: null, failed: null });
+    toast(region ? "Only this part of the picture is searched now." : "All of the picture is searched now.");
+  } catch (error) {
+    by("region-error").hidden = false;
+    by("region-error").textContent = error.message;
+  }
+  changed();
+}
+
+const ofNumbers = ([x, y, width, height]) => setRegion({ x, y, width, height, picture: pictureSize() });
+
+/** What a drag on the picture does while a region is drawn. */
+export function drawingRegion(from) {
+  return {
+    move(at) {
+      const limits = pictureSize();
+      const ends = [from, toPhoto(at)].map((point) => point.map((v, axis) => Math.round(clamp(v, 0, limits[axis]))));
+      const [low, high] = [Math.min, Math.max].map((pick) => ends[0].map((v, axis) => pick(v, ends[1][axis])));
+      drawn = [...low, high[0] - low[0], high[1] - low[1]];
+      changed();
+    },
+    end(clicked) {
+      const region = drawn;
+      drawn = null;
+      if (!clicked && region && Math.min(region[2], region[3]) >= MIN_SIDE_PX) {
+        isDrawing = false;
+        ofNumbers(region);
+      }
+      changed();
+    },
+  };
+}
+
+/** Lets go of what is being drawn. */
+export function abandonRegion() {
+  if (!isDrawing) return;
+  [isDrawing, drawn] = [false, null];
+  changed();
+}
+
+by("region-draw").addEventListener("click", () => {
+  isDrawing = !isDrawing;
+  changed();
+});
+by("region-all").addEventListener("click", () => setRegion(null));
+by("region-form").addEventListener("submit", (event) => {
+  event.preventDefault();
+  ofNumbers(SIDES.map((side) => by(`region-${side}`).valueAsNumber));
+});
+
+/** The frame, and the rest of the picture darkened. It lies below all else that is drawn. */
+function renderFrame() {
+  const overlay = by("overlay");
+  let frame = by("region-frame");
+  const size = pictureSize();
+  const region = drawn ?? (state.region && SIDES.map((side) => state.region[side]));
+  if (state.tab !== "try" || !region || !size) return frame?.remove();
+  if (!frame) {
+    frame = document.createElementNS("http://www.w3.org/2000/svg", "g");
+    frame.id = "region-frame";
+    frame.innerHTML = '<path class="beside" fill-rule="evenodd"/><path class="rim"/><path class="line"/>';
+  }
+  if (overlay.firstChild !== frame) overlay.prepend(frame);
+  const box = ([x, y, width, height]) => {
+    const [[x1, y1], [x2, y2]] = [[x, y], [x + width, y + height]].map(toScreen);
+    return `M${x1} ${y1}H${x2}V${y2}H${x1}Z`;
+  };
+  const [beside, ...lines] = frame.children;
+  beside.setAttribute("d", box([0, 0, ...size]) + box(region));
+  for (const line of lines) line.setAttribute("d", box(region));
+}
+
+let shown = "";
+export function renderRegion() {
+  renderFrame();
+  by("stage").classList.toggle("choosing", isChoosingRegion());
+  if (state.tab !== "try") return;
+  const { region } = state;
+  const size = pictureSize();
+  by("region").hidden = !size;
+  if (!size) return;
+  by("region-draw").setAttribute("aria-pressed", String(isDrawing));
+  by("region-all").hidden = !region;
+  const isOther = region?.picture && String(region.picture) !== String(size);
+  by("region-text").textContent = isDrawing
+    ? "Drag over the part of the picture where parts are to be looked for."
+    : isOther
+      ? `It is for pictures of ${region.picture.join(" × ")} pixels; this one has ${size.join(" × ")}.`
+      : region
+        ? "Parts whose grasp and at least half of which lie in the frame are found. What is taught next searches there, too."
+        : "All of the picture is searched. A part of it is quicker, and nothing beside it is found.";
+  for (const id of ["region-draw", "region-all", "region-set"]) {
+    offBecause(by(id), ["running", "stopping"].includes(state.teaching.status) && "A model is being taught");
+  }
+  const now = JSON.stringify([region, size]);
+  if (now === shown) return;
+  shown = now;
+  const values = region ? SIDES.map((side) => region[side]) : [0, 0, ...size];
+  SIDES.forEach((side, i) => {
+    const input = by(`region-${side}`);
+    input.value = values[i];
+    input.max = size[i % 2];
+  });
+}

@@ -1,0 +1,170 @@
+//! `--region`: only a part of pictures is searched, by `sdg teach` and `sdg detect`.
+
+use std::fs;
+
+use serde_json::{Value, json};
+
+use crate::support::{Folder, sdg, shipped, stdout, taught_pendulum};
+
+const CAMERA: &str = include_str!("wrist.yaml");
+/// The pendulum lies about (325, 225) on its photo, which has 640 × 480 pixels.
+const ON_IT: &str = "220,140,200,200";
+const BESIDE_IT: &str = "10,10,200,200";
+
+fn photo() -> String {
+    shipped("pendulum", "image.png").display().to_string()
+}
+
+fn lines(arguments: &[&str]) -> Vec<Value> {
+    let output = sdg(arguments);
+    let text = String::from_utf8(output.stdout).unwrap();
+    text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+}
+
+fn detect(model: &str, further: &[&str]) -> Value {
+    lines(&[&["detect", "--grasp-model", model, "--json", "--all"], further].concat()).remove(0)
+}
+
+fn refusal(arguments: &[&str]) -> (Option<i32>, String) {
+    let output = sdg(arguments);
+    (output.status.code(), String::from_utf8(output.stderr).unwrap())
+}
+
+#[test]
+fn only_the_region_is_searched_and_places_are_those_of_the_picture() {
+    let folder = Folder::new();
+    let model = folder.path("model.sdg");
+    taught_pendulum(&model, None);
+    let whole = detect(&model, &[&photo()]);
+    assert!(whole.get("region").is_none());
+    let inside = detect(&model, &["--region", ON_IT, &photo()]);
+    assert_eq!(inside["region"], json!({"x": 220, "y": 140, "width": 200, "height": 200}));
+    let [whole_best, best] = [&whole, &inside].map(|line| &line["detections"][0]);
+    for (place, most) in [("x", 0.3), ("y", 0.3), ("angle_deg", 0.5), ("width_px", 0.5)] {
+        let apart = whole_best["grasp"][place].as_f64().unwrap() - best["grasp"][place].as_f64().unwrap();
+        assert!(apart.abs() < most, "{place}: {apart}");
+    }
+    let drawn = folder.path("drawn");
+    let beside = ["detect", "--grasp-model", &model, "--region", BESIDE_IT, "--draw", &drawn, &photo()];
+    let output = sdg(&beside);
+    let told = String::from_utf8(output.stdout).unwrap();
+    assert!(told.contains("nothing") && told.contains("in 200 × 200 pixels from (10, 10)"), "{told}");
+    assert_eq!(output.status.code(), Some(3));
+    // The frame is drawn.
+    let drawn = image::open(folder.path("drawn/image.png")).unwrap().into_rgb8();
+    let original = image::open(photo()).unwrap().into_rgb8();
+    let changed = |x: u32| (10..210).filter(|&y| drawn.get_pixel(x, y) != original.get_pixel(x, y)).count();
+    assert!(changed(10) > 100 && changed(110) < 20, "{} {}", changed(10), changed(110));
+}
+
+#[test]
+fn a_model_keeps_its_region_and_detect_overrides_it() {
+    let folder = Folder::new();
+    let (model, copy) = (folder.path("model.sdg"), folder.path("photo.png"));
+    fs::copy(photo(), &copy).unwrap();
+    let demo = format!("{copy}:{}", shipped("pendulum", "annotation.json").display());
+    let told = stdout(&["teach", "--model", "S", "--demo", &demo, "--region", BESIDE_IT, "--out", &model]);
+    assert!(told.contains("searches 200 × 200 pixels from (10, 10)"), "{told}");
+    let found = detect(&model, &[&copy]);
+    assert_eq!((&found["region"]["x"], found["detections"].as_array().unwrap().len()), (&json!(10), 0));
+    let all = detect(&model, &["--region", "all", &copy]);
+    let other = detect(&model, &["--region", ON_IT, &copy]);
+    for line in [&all, &other] {
+        assert!(line["detections"][0]["score"].as_f64().unwrap() > 0.5, "{line}");
+    }
+    assert!(all.get("region").is_none());
+    // Pictures of another size are not those that the region is for.
+    let smaller = folder.path("smaller.png");
+    let picture = image::open(&copy).unwrap();
+    picture.resize(600, 450, image::imageops::FilterType::Triangle).save(&smaller).unwrap();
+    let (code, error) = refusal(&["detect", "--grasp-model", &model, &smaller]);
+    assert_eq!(code, Some(1));
+    for part in ["expected a picture of 640 × 480 pixels", "found 600 × 450", "--region all"] {
+        assert!(error.contains(part), "{part} in {error}");
+    }
+    // Of two pictures that one has its turn all the same.
+    let both = lines(&["detect", "--grasp-model", &model, "--json", &smaller, &copy]);
+    assert!(both[0]["error"].is_string() && both[1]["detections"].is_array());
+}
+
+#[test]
+fn frames_that_are_followed_are_searched_in_the_region_alone() {
+    let folder = Folder::new();
+    let (model, table) = (folder.path("model.sdg"), folder.path("table"));
+    taught_pendulum(&model, None);
+    fs::create_dir(&table).unwrap();
+    for number in 0..3 {
+        fs::copy(photo(), format!("{table}/{number}.png")).unwrap();
+    }
+    let from = format!("dir:{table}");
+    for (region, num_parts) in [(ON_IT, 1), (BESIDE_IT, 0)] {
+        let frames = lines(&["detect", "--grasp-model", &model, "--json", "--from", &from, "--region", region]);
+        assert_eq!(frames.len(), 3);
+        for frame in frames {
+            assert_eq!(frame["region"]["width"], 200);
+            assert_eq!(frame["detections"].as_array().unwrap().len(), num_parts, "{region}: {frame}");
+        }
+    }
+}
+
+#[test]
+fn with_a_camera_the_region_is_one_of_its_pictures() {
+    let folder = Folder::new();
+    let (model, camera) = (folder.path("model.sdg"), folder.text("wrist.yaml", CAMERA));
+    taught_pendulum(&model, Some(camera.as_ref()));
+    let whole = detect(&model, &["--camera", &camera, &photo()]);
+    let inside = detect(&model, &["--camera", &camera, "--region", ON_IT, &photo()]);
+    let [whole, inside] = [&whole, &inside].map(|line| line["detections"][0]["pose"].clone());
+    for k in 0..3 {
+        let apart = whole["p_m"][k].as_f64().unwrap() - inside["p_m"][k].as_f64().unwrap();
+        assert!(apart.abs() < 3e-4, "{k}: {apart} m");
+    }
+    let beside = detect(&model, &["--camera", &camera, "--region", BESIDE_IT, &photo()]);
+    assert_eq!(beside["detections"], json!([]));
+    let outside =
+        refusal(&["detect", "--grasp-model", &model, "--camera", &camera, "--region", "600,0,100,100", &photo()]);
+    assert!(outside.1.contains("--region: expected a region within the picture of 640 × 480"), "{}", outside.1);
+    // Taught with the camera, too.
+    let again = folder.path("again.sdg");
+    let demo = format!("{}:{}", photo(), shipped("pendulum", "annotation.json").display());
+    let teach = |region: &str| {
+        let heights = ["--camera", &camera, "--mark-height-mm", "16"];
+        sdg(&[&["teach", "--model", "S", "--demo", &demo, "--region", region, "--out", &again], &heights[..]].concat())
+    };
+    assert!(teach(ON_IT).status.success());
+    assert_eq!(detect(&again, &["--camera", &camera, &photo()])["region"]["y"], 140);
+    let small = String::from_utf8(teach("300,200,30,30").stderr).unwrap();
+    assert!(small.contains("--region: expected a region that the part fits in"), "{small}");
+}
+
+#[test]
+fn wrong_regions_are_one_clear_error_each() {
+    let folder = Folder::new();
+    let model = folder.path("model.sdg");
+    taught_pendulum(&model, None);
+    let photo = photo();
+    let of = |region: &str| refusal(&["detect", "--grasp-model", &model, "--region", region, &photo]);
+    for (region, code, part) in [
+        ("10,10,0,50", 2, "a width and a height of at least 1 pixel, found 0 and 50"),
+        ("10,10,50", 2, "X,Y,W,H in whole pixels"),
+        ("1.5,2,30,40", 2, "X,Y,W,H in whole pixels"),
+        ("everything", 2, "or all, for all of the picture"),
+        ("600,10,100,100", 1, "within the picture of 640 × 480 pixels, found 100 × 100 pixels from (600, 10)"),
+        ("300,200,60,40", 1, "a region that the part fits in"),
+    ] {
+        let (found, error) = of(region);
+        assert!(found == Some(code) && error.contains(part), "{region}: {found:?} {error}");
+        assert_eq!(error.matches("expected").count(), 1, "one error: {error}");
+    }
+    let out = folder.path("new.sdg");
+    let demo = format!("{photo}:{}", shipped("pendulum", "annotation.json").display());
+    for (region, part) in [
+        ("600,10,100,100", "--region: expected a region within the picture of 640 × 480 pixels"),
+        ("300,200,60,40", "--region: expected a region that the part fits in"),
+        ("all", "X,Y,W,H in whole pixels"),
+    ] {
+        let (_, error) = refusal(&["teach", "--model", "C", "--demo", &demo, "--region", region, "--out", &out]);
+        assert!(error.contains(part), "{region}: {error}");
+        assert!(!fs::exists(&out).unwrap());
+    }
+}

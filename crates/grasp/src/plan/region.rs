@@ -1,0 +1,49 @@
+//! A region of the picture in the plan view.
+
+use nalgebra::Point2;
+use sdg_geometry::{BoundingBox, PlanView, PosedCamera};
+
+use crate::error::Result;
+use crate::region::{RegionError, SearchRegion};
+use crate::search_window::SearchWindow;
+use crate::taught::TaughtDemonstration;
+
+/// Points of each edge of the region that are looked up: a lens bends it.
+const POINTS_A_SIDE: u32 = 16;
+
+/// A region of the picture, and the box about it in the plan view.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct RegionInPlan {
+    /// In pixels of the picture.
+    pub(super) region: SearchRegion,
+    /// In pixels of the plan view.
+    bounds: BoundingBox,
+}
+
+impl RegionInPlan {
+    /// # Errors
+    /// A region that is not of the camera's pictures, or that shows nothing of the plan view.
+    pub(super) fn new(region: &SearchRegion, camera: &PosedCamera, view: &PlanView) -> Result<Self> {
+        region.check([camera.intrinsics.width, camera.intrinsics.height])?;
+        let edges = region.bounds();
+        let along = |low: f64, high: f64, k: u32| low + (high - low) * f64::from(k) / f64::from(POINTS_A_SIDE);
+        let points = (0..=POINTS_A_SIDE).flat_map(|k| {
+            let (x, y) = (along(edges.x1, edges.x2, k), along(edges.y1, edges.y2, k));
+            [[x, edges.y1], [x, edges.y2], [edges.x1, y], [edges.x2, y]].map(Point2::from)
+        });
+        let seen = points.filter_map(|point| view.from_picture(camera, &point));
+        let bounds = BoundingBox::around(seen).map(|bounds| bounds.clip(f64::from(view.width), f64::from(view.height)));
+        match bounds.filter(|bounds| bounds.area() > 0.0) {
+            Some(bounds) => Ok(Self { region: *region, bounds }),
+            None => Err(RegionError::OffTable { region: *region }.into()),
+        }
+    }
+
+    /// What is cut out of a plan view of that size.
+    ///
+    /// # Errors
+    /// A region that the part does not fit in.
+    pub(super) fn window(&self, view_size: [u32; 2], demonstrations: &[TaughtDemonstration]) -> Result<SearchWindow> {
+        SearchWindow::about(&self.bounds, &self.region, view_size, demonstrations)
+    }
+}

@@ -1,0 +1,163 @@
+//! What is cut out of an image to search a region of it.
+//!
+//! ```text
+//! picture ─ region ─ region and a margin, cut out ─ searched ─ detections in pixels of the picture ─ those that lie in the region
+//! ```
+//! The margin is half the part's length, so that parts that reach out of the region are seen whole. What lies further out is not read.
+
+use image::{RgbImage, imageops};
+use nalgebra::Point2;
+use sdg_geometry::{BoundingBox, PlanarSimilarity, Polygon, convex_hull};
+
+use crate::detection::Found;
+use crate::error::{GraspError, Result};
+use crate::region::{RegionError, SearchRegion};
+use crate::sizes::SizeRange;
+use crate::taught::TaughtDemonstration;
+use crate::verification::Shot;
+use sdg_shape::PixelRect;
+
+/// What is cut out about the region, in lengths of the part: how far a part reaches out of which half lies in the region.
+const MARGIN: f64 = 0.5;
+/// Pixels beyond that, for the gradients' smoothing. Chosen by hand.
+const BORDER_PX: f64 = 4.0;
+/// Corners of what is cut out lie at multiples of so many pixels of the halved picture, so that all levels of its pyramid have the pixels
+/// that the whole picture's have.
+const GRID_PX: u32 = 8;
+
+/// Whether a region can be searched, as far as that is known without a picture: for pixels, and where it says what pictures it is for,
+/// whether it lies in them and the part of demonstrations fits in.
+///
+/// # Errors
+/// As [`SearchRegion::check`], and a region that the part does not fit in.
+pub(crate) fn check_region(region: &SearchRegion, demonstrations: Option<&Vec<TaughtDemonstration>>) -> Result<()> {
+    let Some(picture) = region.picture else { return Ok(region.check_pixels()?) };
+    region.check(picture)?;
+    if let Some(demonstrations) = demonstrations {
+        SearchWindow::about(&region.bounds(), region, picture, demonstrations)?;
+    }
+    Ok(())
+}
+
+/// The part of an image that is cut out, and the size of the whole.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct SearchWindow {
+    pub(crate) rect: PixelRect,
+    whole: [u32; 2],
+}
+
+impl SearchWindow {
+    /// The image itself.
+    pub(crate) fn whole([width, height]: [u32; 2]) -> Self {
+        Self { rect: PixelRect { left: 0, top: 0, width, height }, whole: [width, height] }
+    }
+
+    /// What is to be seen of an image of size `whole` so that parts in `bounds`, in its pixels, are judged with all that is about them;
+    /// `region` is what the user gave.
+    ///
+    /// # Errors
+    /// [`RegionError::SmallerThanPart`].
+    pub(crate) fn about(
+        bounds: &BoundingBox,
+        region: &SearchRegion,
+        whole: [u32; 2],
+        demonstrations: &[TaughtDemonstration],
+    ) -> Result<Self> {
+        let (mut margin, mut shrink) = (0.0f64, 1.0f64);
+        let mut least = [f64::INFINITY; 2];
+        for demonstration in demonstrations {
+            let own = extents(&demonstration.marks.region());
+            for range in SizeRange::all(demonstration.marks.photo_size, whole, &demonstration.check().search.scales) {
+                margin = margin.max(MARGIN * own[0] * range.scales.end());
+                shrink = shrink.max(demonstration.working(&range).shrink());
+                (0..2).for_each(|k| least[k] = least[k].min(own[k] * range.scales.start()));
+            }
+        }
+        let (width, height) = (bounds.width(), bounds.height());
+        if width.hypot(height) < least[0] || width.min(height) < least[1] {
+            let [length, across] = least;
+            return Err(GraspError::Region(RegionError::SmallerThanPart { region: *region, length, across }));
+        }
+        let margin = margin + BORDER_PX * shrink;
+        let grid = GRID_PX * shrink as u32;
+        let span = |low: f64, high: f64, side: u32| {
+            let from = ((low - margin).max(0.0) as u32).min(side - 1) / grid * grid;
+            let to = ((high + margin).max(0.0).ceil() as u32).div_ceil(grid).saturating_mul(grid).min(side);
+            (from, to.max(from + 1) - from)
+        };
+        let (left, width) = span(bounds.x1, bounds.x2, whole[0]);
+        let (top, height) = span(bounds.y1, bounds.y2, whole[1]);
+        Ok(Self { rect: PixelRect { left, top, width, height }, whole })
+    }
+
+    /// These pixels of an image.
+    pub(crate) fn cut(&self, image: &RgbImage) -> RgbImage {
+        let PixelRect { left, top, width, height } = self.rect;
+        imageops::crop_imm(image, left, top, width, height).to_image()
+    }
+
+    /// How what is cut out was taken by a level camera.
+    pub(crate) fn shot(&self) -> Shot {
+        let middle = |whole: u32, from: u32| 0.5 * f64::from(whole) - f64::from(from);
+        let [width, height] = self.whole;
+        Shot {
+            size: self.whole,
+            below_camera: Point2::new(middle(width, self.rect.left), middle(height, self.rect.top)),
+        }
+    }
+
+    /// Moves from its pixels to those of the whole.
+    pub(crate) fn whole_from_window(&self) -> PlanarSimilarity {
+        let (tx, ty) = (f64::from(self.rect.left), f64::from(self.rect.top));
+        PlanarSimilarity { tx, ty, ..PlanarSimilarity::IDENTITY }
+    }
+
+    /// What was found in it, in pixels of the whole.
+    pub(crate) fn in_whole(&self, found: &mut Found) {
+        let shift = self.whole_from_window();
+        let PlanarSimilarity { tx, ty, .. } = shift;
+        let Found { detection, placement } = found;
+        if (tx, ty) != (0.0, 0.0) {
+            let BoundingBox { x1, y1, x2, y2 } = detection.bbox;
+            detection.bbox = BoundingBox { x1: x1 + tx, y1: y1 + ty, x2: x2 + tx, y2: y2 + ty };
+            detection.keypoints.iter_mut().for_each(|(point, _)| *point = shift.apply(point));
+            detection.outline = detection.outline.as_ref().map(|outline| outline.transformed(&shift));
+            detection.grasp.x += tx;
+            detection.grasp.y += ty;
+            if let Some(placement) = placement {
+                placement.image_from_cutout = shift.compose(&placement.image_from_cutout);
+                placement.image_from_marks = shift.compose(&placement.image_from_marks);
+            }
+        }
+        let [width, height] = self.whole.map(f64::from);
+        detection.bbox = detection.bbox.clip(width, height);
+    }
+}
+
+/// Length and width of a polygon: its longest distance, and that between the two parallel lines nearest to each other that it fits between.
+fn extents(polygon: &Polygon) -> [f64; 2] {
+    let hull = convex_hull(polygon.vertices.iter().copied());
+    let distances = hull.iter().flat_map(|a| hull.iter().map(move |b| (b - a).norm()));
+    let length = distances.fold(0.0, f64::max);
+    let between = (0..hull.len()).filter_map(|i| {
+        let (from, to) = (hull[i], hull[(i + 1) % hull.len()]);
+        let along = (to - from).try_normalize(f64::EPSILON)?;
+        Some(hull.iter().map(|point| along.perp(&(point - from)).abs()).fold(0.0, f64::max))
+    });
+    [length, between.fold(length, f64::min)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sdg_geometry::Angle;
+
+    #[test]
+    fn extents_by_hand() {
+        // 3 × 4 turned by 30°: the diagonal, and the shorter side.
+        let turn = PlanarSimilarity { angle: Angle::from_degrees(30.0), ..PlanarSimilarity::IDENTITY };
+        let rectangle = Polygon::from_box(&BoundingBox { x1: 0.0, y1: 0.0, x2: 3.0, y2: 4.0 }).transformed(&turn);
+        let [length, across] = extents(&rectangle);
+        assert!((length - 5.0).abs() < 1e-9 && (across - 3.0).abs() < 1e-9, "{length} {across}");
+    }
+}
