@@ -13,7 +13,7 @@ use image::RgbImage;
 use nalgebra::Point2;
 use sdg_geometry::{Angle, PlanarSimilarity, Polygon};
 use sdg_orientation::halved;
-use sdg_shape::{Differences, Evidence, Foreshortening, GradientField, Picture, TableColors};
+use sdg_shape::{Differences, Evidence, Foreshortening, GradientField, Picture, TableColors, parallel};
 
 use crate::colors::Colors;
 use crate::marks_shift::{MarksShift, Straightened};
@@ -129,8 +129,8 @@ impl<'a> SearchedImage<'a> {
         for _ in 0..halvings {
             view = Cow::Owned(halved(&view));
         }
-        let field = GradientField::with_config(&view, &demonstration.check().search.shape.gradient);
-        let table = TableColors::new(&view);
+        let config = &demonstration.check().search.shape.gradient;
+        let (field, table) = parallel::join(|| GradientField::with_config(&view, config), || TableColors::new(&view));
         let pixel_size = f64::from(1u32 << halvings);
         let (below_camera, focal_px) = (shot.below_camera / pixel_size, usual_focal_px(shot.size) / pixel_size);
         self.views.push(View { halvings, below_camera, focal_px, image: view, field, table });

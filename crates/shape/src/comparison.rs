@@ -24,6 +24,7 @@ use crate::config::{AgreementConfig, RefinementConfig};
 use crate::details::Details;
 use crate::gradient_field::GradientField;
 use crate::likeness::Likeness;
+use crate::parallel;
 use crate::profile::Profile;
 use crate::structure::Structure;
 use crate::surface::Surface;
@@ -168,15 +169,21 @@ impl Comparison<'_> {
     pub fn close_look(&self, image_from_demonstration: &PlanarSimilarity) -> CloseLook {
         let seen = self.close_up.seen(self.picture.image, image_from_demonstration);
         let look = self.close_up.look(&seen, self.picture.table);
-        let rival = |rival: &Rival| rival.against(self.close_up, &seen, self.picture.field, image_from_demonstration);
-        let likeness = self.likeness.log_odds(self.picture.image, image_from_demonstration);
-        let is_open = look.is_plausible() && likeness >= MIN_LIKENESS;
-        let details = is_open.then(|| self.details.log_odds(self.picture.image, image_from_demonstration)).flatten();
+        let networks = || {
+            let likeness = self.likeness.log_odds(self.picture.image, image_from_demonstration);
+            let is_open = look.is_plausible() && likeness >= MIN_LIKENESS;
+            (likeness, is_open.then(|| self.details.log_odds(self.picture.image, image_from_demonstration)).flatten())
+        };
+        let mirrored = || {
+            let rival = self.mirrored.filter(|_| look.is_plausible())?;
+            rival.against(self.close_up, &seen, self.picture.field, image_from_demonstration)
+        };
+        let ((likeness, details), mirrored) = parallel::join(networks, mirrored);
         CloseLook {
             likeness,
             // In another roll the part itself has its features elsewhere.
             details: if self.profile.is_some() { details.map(|details| details.max(0.0)) } else { details },
-            mirrored: self.mirrored.filter(|_| look.is_plausible()).and_then(rival),
+            mirrored,
             ..look
         }
     }
@@ -231,12 +238,11 @@ impl Comparison<'_> {
         if agreement >= sure_agreement || agreement.max(both(start)) < MIN_REFINED {
             return refined;
         }
-        let climbed = [refined, *start].map(|from| self.climbed(from, scales));
-        let [(from_refined, one), (from_start, other)] = climbed;
+        let ((from_refined, one), (from_start, other)) =
+            parallel::join(|| self.climbed(refined, scales), || self.climbed(*start, scales));
         let (mut best, mut agreement) = if other > one { (from_start, other) } else { (from_refined, one) };
         if (min_restart_agreement..sure_agreement).contains(&agreement) {
-            for around in self.all_around(&best) {
-                let (pose, seen) = self.climbed(around, scales);
+            for (pose, seen) in parallel::map(&self.all_around(&best), |around| self.climbed(*around, scales)) {
                 if seen > agreement {
                     (best, agreement) = (pose, seen);
                 }

@@ -10,6 +10,7 @@ use sdg_geometry::{Angle, PlanarSimilarity};
 use crate::consensus::{WIDTHS, consensus_at, fit_offsets};
 use crate::edge_points::EdgePoint;
 use crate::gradient_field::GradientField;
+use crate::parallel;
 use crate::pose::Pose;
 use crate::sightings::{EdgePlace, FIRST_REACH, LATER_REACH, Sightings};
 use crate::template::{MatchedLevel, ShapeTemplate, TemplateLevel};
@@ -56,8 +57,9 @@ impl ShapeTemplate {
         let upright = Affine { center: pose.center, linear };
         let level_consensus = consensus(level, &matched, &upright)?;
         let mut best: Option<(Affine, f64)> = None;
-        for start in starts() {
-            let followed = follow(level, &matched, Affine { linear: start * linear, ..upright });
+        let starts: Vec<Matrix2<f64>> = starts().collect();
+        let all = parallel::map(&starts, |start| follow(level, &matched, Affine { linear: start * linear, ..upright }));
+        for followed in all {
             if let Some((affine, found)) = followed
                 && best.is_none_or(|(_, before)| found > before)
             {

@@ -15,6 +15,7 @@ use image::RgbImage;
 use wide::f32x4;
 
 use crate::config::GradientConfig;
+use crate::parallel;
 
 /// Levels are added while both sides keep this many pixels. Chosen by hand, not measured.
 const SMALLEST_LEVEL_SIDE: usize = 24;
@@ -117,11 +118,13 @@ impl GradientLevel {
         let (width, height) = (planes.width, planes.height);
         let mut samples = structure_tensors(planes);
         let floor = config.min_gradient.powi(2) + config.noise_factor * quiet_energy(&samples);
-        for sample in &mut samples {
-            let [tr, vx, vy, _] = *sample;
-            let scale = 1.0 / (tr + floor);
-            *sample = [vx * scale, vy * scale, tr, 0.0];
-        }
+        parallel::for_each_stretch(&mut samples, BAND * width.max(1), |samples| {
+            for sample in samples {
+                let [tr, vx, vy, _] = *sample;
+                let scale = 1.0 / (tr + floor);
+                *sample = [vx * scale, vy * scale, tr, 0.0];
+            }
+        });
         Self { width, height, samples, floor, reading: Reading::new(width, height) }
     }
 
@@ -277,27 +280,40 @@ const PAD: usize = 2;
 /// The 5-tap binomial filter in both directions multiplies by this much. Derived: 16 × 16.
 const BLUR_GAIN: f32 = 256.0;
 
-/// `[tr, v.x, v.y, 0]` of every pixel, row by row through rings of three rows that stay in the cache.
+/// Rows that one thread takes at a time. Chosen for time; results do not depend on it.
+const BAND: usize = 64;
+
+/// `[tr, v.x, v.y, 0]` of every pixel, row by row.
 fn structure_tensors(planes: &Planes) -> Vec<[f32; 4]> {
-    let (width, height) = (planes.width, planes.height);
-    let mut samples = Vec::with_capacity(width * height);
-    if width == 0 || height == 0 {
-        return samples;
+    if planes.width == 0 {
+        return Vec::new();
     }
+    let bands: Vec<usize> = (0..planes.height).step_by(BAND).collect();
+    parallel::map(&bands, |&start| tensors_of_band(planes, start, (start + BAND).min(planes.height))).concat()
+}
+
+/// The same of the rows from `start` to before `end`, through rings of three rows that stay in the cache.
+fn tensors_of_band(planes: &Planes, start: usize, end: usize) -> Vec<[f32; 4]> {
+    let width = planes.width;
+    let mut samples = Vec::with_capacity(width * (end - start));
     let mut blurred = BlurredRows::new(width);
     let mut tensors = [(); 3].map(|()| TensorRow::new(width));
     let mut vertical = TensorRow::new(width);
-    let rows = height as isize;
-    blurred.compute(planes, 0);
-    for row in 0..rows {
+    let (rows, start, end) = (planes.height as isize, start as isize, end as isize);
+    let first = (start - 1).max(0);
+    for row in [first - 1, first] {
+        blurred.compute(planes, row.max(0));
+    }
+    for row in first..(end + 1).min(rows) {
         blurred.compute(planes, (row + 1).min(rows - 1));
         tensors[(row % 3) as usize].compute(&blurred, row, rows);
-        if row == 0 {
-            continue;
+        if row > start {
+            emit_smoothed(&tensors, row - 1, rows, &mut vertical, &mut samples);
         }
-        emit_smoothed(&tensors, row - 1, rows, &mut vertical, &mut samples);
     }
-    emit_smoothed(&tensors, rows - 1, rows, &mut vertical, &mut samples);
+    if end == rows {
+        emit_smoothed(&tensors, rows - 1, rows, &mut vertical, &mut samples);
+    }
     samples
 }
 

@@ -18,6 +18,7 @@ use crate::config::ShapeConfig;
 use crate::error::ShapeError;
 use crate::following::Reach;
 use crate::gradient_field::GradientField;
+use crate::parallel;
 use crate::template::ShapeTemplate;
 
 /// Turns at which the rival is laid over the photo, how many of them are followed to the full size, and how many of the best are tried in
@@ -151,6 +152,11 @@ impl Rival {
         best.map(|(turn, _)| self.template.captured(field, &turn, &REACH))
     }
 
+    /// Where it may lie about a pose of the photo, and how well it agrees there.
+    fn followed(&self, field: &GradientField, pose: &PlanarSimilarity) -> Vec<(PlanarSimilarity, f64)> {
+        parallel::map(&self.starts, |start| self.template.captured_roughly(field, &pose.compose(start), &REACH))
+    }
+
     /// Fits the rival about a pose of the photo, and compares the two there.
     pub(crate) fn against(
         &self,
@@ -159,9 +165,8 @@ impl Rival {
         field: &GradientField,
         image_from_cutout: &PlanarSimilarity,
     ) -> Option<RivalFit> {
-        let starts = self.starts.iter().map(|start| image_from_cutout.compose(start));
-        let fitted = starts.map(|start| self.template.captured_roughly(field, &start, &REACH));
-        let (pose, _) = fitted.max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let fitted = self.followed(field, image_from_cutout);
+        let (pose, _) = fitted.into_iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
         let rival_from_cutout = pose.inverse().compose(image_from_cutout);
         Some(self.close_up.duel(photo, seen, &rival_from_cutout))
     }
