@@ -1,4 +1,4 @@
-//! How long model S looks at pictures: `search_times MODEL [--repeat N] [--size-tolerance LOW-HIGH] PICTURE…`.
+//! How long model S looks at pictures: `search_times MODEL [--repeat N] [--size-tolerance LOW-HIGH] [--region X,Y,W,H] PICTURE…`.
 //!
 //! Prints, for each picture, the median of its repeats in milliseconds, decoded picture to verdict, and what was accepted; then the
 //! median over the pictures. Repeats go round all pictures in turn, so that a busy moment does not fall on one of them alone.
@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use burn::tensor::Device;
 use sdg_demonstration::{ImageLimits, decode_image};
-use sdg_grasp::{GraspModel, Verification};
+use sdg_grasp::{GraspModel, SearchRegion, Verification};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
@@ -22,6 +22,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 let range = arguments.next().ok_or("--size-tolerance needs LOW-HIGH")?;
                 let (low, high) = range.split_once('-').ok_or("--size-tolerance needs LOW-HIGH")?;
                 model = model.with_size_tolerance(low.parse()?..=high.parse()?)?;
+            }
+            "--region" => {
+                let text = arguments.next().ok_or("--region needs X,Y,W,H")?;
+                let numbers = text.split(',').map(str::parse).collect::<Result<Vec<u32>, _>>()?;
+                let numbers = <[u32; 4]>::try_from(numbers).map_err(|_| "--region needs four numbers")?;
+                model = model.with_region(Some(SearchRegion::new(numbers)))?;
             }
             _ => paths.push(argument),
         }
