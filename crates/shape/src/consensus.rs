@@ -92,7 +92,7 @@ fn gather(level: &TemplateLevel, matched: &MatchedLevel<'_>, pose: &Pose, reach:
         EdgePlace { at: [x, y], normal: [nx, ny], double: map.turn_double(point.double), row, weight: point.weight }
     };
     let places: Vec<EdgePlace<4>> = level.points.iter().map(place).collect();
-    Sightings::gather(matched, &places, reach)
+    Sightings::gather(matched.image_level, &places, reach)
 }
 
 /// The step of most consensus from any of the starts; those that have come to the same place go on as one.

@@ -142,7 +142,7 @@ fn gather(level: &TemplateLevel, matched: &MatchedLevel<'_>, pose: &Affine, reac
         })
     };
     let places = level.points.iter().map(place).collect::<Option<Vec<EdgePlace<6>>>>()?;
-    Some(Sightings::gather(matched, &places, reach))
+    Some(Sightings::gather(matched.image_level, &places, reach))
 }
 
 #[cfg(test)]

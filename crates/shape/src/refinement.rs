@@ -28,7 +28,7 @@ const GRID_STEP: f64 = 1.5;
 const DISTANCE_PENALTY: f64 = 0.03;
 /// The climb: steps in level pixels of edge movement, and a bound for climbs of many small steps. Chosen by hand, not measured.
 const CLIMB: CompassSearch =
-    CompassSearch { steps: (0.5, 0.2), min_gain: 1e-6, max_rounds: 24, max_evaluations: usize::MAX };
+    CompassSearch { steps: (0.5, 0.1), min_gain: 1e-6, max_rounds: 24, max_evaluations: usize::MAX };
 
 /// A pose after refinement.
 #[derive(Debug, Clone, Copy, PartialEq)]

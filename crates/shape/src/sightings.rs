@@ -8,7 +8,6 @@ use wide::f32x4;
 
 use crate::edge_points::parabola_peak;
 use crate::gradient_field::GradientLevel;
-use crate::template::MatchedLevel;
 
 /// Points that are taken at once.
 pub(crate) const LANES: usize = 8;
@@ -52,8 +51,8 @@ pub(crate) struct Sightings<const N: usize> {
 
 impl<const N: usize> Sightings<N> {
     /// Looks from every place along its normal, `reach` pixels to either side; beyond the border nothing is seen.
-    pub(crate) fn gather(matched: &MatchedLevel<'_>, places: &[EdgePlace<N>], reach: usize) -> Self {
-        Arch::new().dispatch(Gather { level: matched.image_level, places, reach })
+    pub(crate) fn gather(level: &GradientLevel, places: &[EdgePlace<N>], reach: usize) -> Self {
+        Arch::new().dispatch(Gather { level, places, reach })
     }
 }
 
