@@ -225,6 +225,9 @@ function begin(event, at) {
   return panning();
 }
 
+// A drag of a selection, or of a picture, would take the pointer away.
+stage.addEventListener("dragstart", (event) => event.preventDefault());
+
 overlay.addEventListener("pointerdown", (event) => {
   if (event.button > 1) return;
   const at = place(event);

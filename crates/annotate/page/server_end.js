@@ -117,7 +117,7 @@ export function renderUnsaved() {
   const line = document.getElementById("unsaved");
   line.hidden = !first;
   if (line.textContent === text) return;
-  if (!first) toast("All marks are saved now.");
+  if (!first && !isLost() && !state.images.some(isUnsaved)) toast("All marks are saved now.");
   line.textContent = text;
 }
 

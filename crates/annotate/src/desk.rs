@@ -6,9 +6,10 @@ use std::sync::{Arc, PoisonError, RwLock};
 use serde::Serialize;
 
 use crate::error::{Error, Result, TeacherError};
+use crate::model_versions::fingerprint;
 use crate::names::{file_name, safe_stem};
 use crate::picture::Picture;
-use crate::recent::RecentProjects;
+use crate::recent::{RecentProject, RecentProjects};
 use crate::session::{Session, check_label};
 use crate::views::SessionView;
 
@@ -48,7 +49,8 @@ pub struct StartView {
 
 #[derive(Serialize)]
 struct RecentView {
-    id: usize,
+    /// The same whatever else is listed.
+    id: String,
     name: String,
     /// The folder that it lies in.
     within: String,
@@ -99,11 +101,10 @@ impl Desk {
     ///
     /// # Errors
     /// No such project, one that cannot be opened, another that is open.
-    pub fn open(&self, id: usize) -> Result<FirstView> {
+    pub fn open(&self, id: &str) -> Result<FirstView> {
         self.take(|start| {
-            let recent = start.recent.list();
-            let count = recent.len();
-            let project = recent.get(id).ok_or(Error::NoSuchPicture { id, count })?;
+            let project = start.recent.list().into_iter().find(|project| id_of(project) == id);
+            let project = project.ok_or(Error::Busy("this project is not there any more: load the page again"))?;
             (start.open)(&project.path).map_err(Error::Teacher)
         })
     }
@@ -145,11 +146,15 @@ impl Desk {
     }
 }
 
+fn id_of(project: &RecentProject) -> String {
+    fingerprint(&project.path.to_string_lossy())
+}
+
 impl Start {
     fn view(&self) -> StartView {
         let shown = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned()).display().to_string();
-        let recent = self.recent.list().into_iter().enumerate().map(|(id, project)| RecentView {
-            id,
+        let recent = self.recent.list().into_iter().map(|project| RecentView {
+            id: id_of(&project),
             name: file_name(&project.path),
             within: project.path.parent().map(shown).unwrap_or_default(),
             opened_secs: project.opened_secs,

@@ -109,6 +109,19 @@ pub struct Tried {
     pub became: Option<String>,
 }
 
+/// What a project's file names and is not there: on a disk that is not mounted, perhaps.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Gone {
+    pub photos: Vec<String>,
+    pub tried: Vec<Tried>,
+}
+
+impl Gone {
+    pub fn names(&self) -> impl Iterator<Item = &String> {
+        self.photos.iter().chain(self.tried.iter().map(|tried| &tried.file))
+    }
+}
+
 impl Default for ProjectFile {
     fn default() -> Self {
         Self {
@@ -148,26 +161,21 @@ impl ProjectFile {
         }
     }
 
-    /// Reads a project's file and, of a folder, adds the pictures that have come there since. Pictures that are gone are left out;
-    /// their names come second.
+    /// Reads a project's file and, of a folder, adds the pictures that have come there since. Pictures that are gone are left out
+    /// and come second.
     ///
     /// # Errors
     /// A folder that cannot be read, a file that is no project's, marks that belong to another picture.
-    pub fn open(place: &ProjectPlace) -> Result<(Self, Vec<String>)> {
+    pub fn open(place: &ProjectPlace) -> Result<(Self, Gone)> {
         let read = Self::read(place)?;
         let is_new = read.is_none();
         let mut file = read.unwrap_or_default();
         let folder = &place.folder;
-        let mut gone = Vec::new();
-        let mut is_there = |name: &String| {
-            let there = folder.join(name).is_file();
-            if !there {
-                gone.push(name.clone());
-            }
-            there
-        };
-        file.photos.retain(&mut is_there);
-        file.tried.retain(|tried| is_there(&tried.file));
+        let is_there = |name: &String| folder.join(name).is_file();
+        let (photos, gone_photos) = file.photos.drain(..).partition(is_there);
+        let (tried, gone_tried) = file.tried.drain(..).partition(|tried: &Tried| is_there(&tried.file));
+        let gone = Gone { photos: gone_photos, tried: gone_tried };
+        (file.photos, file.tried) = (photos, tried);
         if file.current_model.is_some_and(|id| id >= file.models.len()) {
             file.current_model = None;
         }
@@ -175,6 +183,16 @@ impl ProjectFile {
             file.add_new(folder, is_new)?;
         }
         Ok((file, gone))
+    }
+
+    /// Names what is gone as before, behind what is there.
+    pub fn keep_gone(&mut self, gone: &Gone) {
+        let photos = gone.photos.iter().filter(|name| !self.photos.contains(name));
+        let photos: Vec<String> = photos.cloned().collect();
+        self.photos.extend(photos);
+        let is_new = |tried: &&Tried| self.tried.iter().all(|known| known.file != tried.file);
+        let tried: Vec<Tried> = gone.tried.iter().filter(is_new).cloned().collect();
+        self.tried.extend(tried);
     }
 
     fn add_new(&mut self, folder: &Path, is_new: bool) -> Result<()> {
@@ -244,7 +262,8 @@ mod tests {
     use image::RgbImage;
 
     fn open(folder: &Path) -> (ProjectFile, Vec<String>) {
-        ProjectFile::open(&ProjectPlace::of_folder(folder)).unwrap()
+        let (file, gone) = ProjectFile::open(&ProjectPlace::of_folder(folder)).unwrap();
+        (file, gone.names().cloned().collect())
     }
 
     const MARKED: &str = r#"{"imageWidth": 60, "imageHeight": 40, "shapes": [

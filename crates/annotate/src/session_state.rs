@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use sdg_demonstration::{Annotation, Demonstration, ImageFacts};
+use serde_json::Value;
 
 use crate::advice::advise;
 use crate::annotation_file;
@@ -12,7 +13,7 @@ use crate::marks::Marks;
 use crate::model_versions::{ModelVersions, Version, fingerprint};
 use crate::names::file_name;
 use crate::picture::Picture;
-use crate::project_file::{ProjectFile, ProjectPlace, Tried, relative};
+use crate::project_file::{Gone, ProjectFile, ProjectPlace, Tried, relative};
 use crate::region::Region;
 use crate::views::{ImageView, ModelView, Saved, TrialPictureView};
 
@@ -29,6 +30,8 @@ pub struct State {
     pub place: Option<ProjectPlace>,
     /// Names of pictures of its folder that were removed earlier.
     pub removed_earlier: BTreeSet<String>,
+    /// What its file names and is not there, which may come back.
+    pub gone: Gone,
     /// Pictures of its folder that were offered, in the order in which they were first seen: [`State::others`].
     pub offered: Vec<PathBuf>,
     /// How far the hand opens, where a camera tells.
@@ -132,7 +135,8 @@ impl State {
         self.trial_ids().map(|id| &self.trial_pictures[id]).filter(|trial| trial.is_absent).map(|trial| &trial.picture)
     }
 
-    /// [`fingerprint`] of what a teaching would start from now.
+    /// [`fingerprint`] of what a teaching would start from now. Coordinates count to a thousandth of a pixel: read back from a file they
+    /// differ in their last digits.
     pub fn material(&self) -> String {
         let marked = self.image_ids().map(|id| &self.images[id]).filter(|image| image.marks != Marks::default());
         let marked: Vec<_> = marked.map(|image| (&image.picture.path, &image.marks)).collect();
@@ -141,7 +145,9 @@ impl State {
         let text = |path: &PathBuf| path.to_string_lossy().into_owned();
         let marked: Vec<_> = marked.into_iter().map(|(path, marks)| (text(path), marks)).collect();
         let negatives: Vec<_> = negatives.into_iter().map(text).collect();
-        fingerprint(&serde_json::to_string(&(marked, negatives)).unwrap_or_default())
+        let mut material = serde_json::to_value((marked, negatives)).unwrap_or_default();
+        round(&mut material);
+        fingerprint(&material.to_string())
     }
 
     pub fn model_views(&self) -> Vec<ModelView> {
@@ -184,6 +190,7 @@ impl State {
                 became: self.became(id).map(|id| name(&self.images[id].picture)),
             });
         }
+        file.keep_gone(&self.gone);
         file.removed.extend(self.images.iter().filter(|i| i.is_removed).map(|i| name(&i.picture)));
         file.removed.extend(self.trial_pictures.iter().filter(|t| t.is_removed).map(|t| name(&t.picture)));
         // Taken out once and put in again under the same name.
@@ -191,6 +198,20 @@ impl State {
             file.removed.remove(there);
         }
         file.write(place)
+    }
+}
+
+/// Rounds all numbers to thousandths.
+fn round(value: &mut Value) {
+    match value {
+        Value::Number(number) => {
+            // Adding 0 makes −0 the same as 0.
+            let rounded = number.as_f64().map(|number| (1e3 * number).round() / 1e3 + 0.0);
+            *value = rounded.map_or(Value::Null, Value::from);
+        }
+        Value::Array(values) => values.iter_mut().for_each(round),
+        Value::Object(fields) => fields.values_mut().for_each(round),
+        Value::Null | Value::Bool(_) | Value::String(_) => {}
     }
 }
 

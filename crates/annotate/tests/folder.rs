@@ -59,6 +59,57 @@ fn a_photo_is_opened_again_with_its_models_corrections_and_tried_pictures() {
 }
 
 #[test]
+fn a_model_is_not_old_because_its_marks_were_read_from_the_file() {
+    let served = Served::of_photo(folder_of(&["rod.png"]), "rod.png");
+    // Left edge and width do not add up to the right edge's bits.
+    let marks = r#"{"box": [34.42, 34.09, 137.81, 75.91], "grasp": {"start": [80.18, 50.21], "end": [104.7, 46.3], "jaw_width": 24.04}}"#;
+    served.ask("PUT", "/api/images/0/marks", marks.as_bytes()).json();
+    teach(&served);
+    assert_eq!(session(&served)["models"][0]["is_stale"], false);
+    let served = Served::of_photo(served.end(), "rod.png");
+    assert_eq!(session(&served)["models"][0]["is_stale"], false);
+    served.ask("PUT", "/api/images/0/marks", MARKS.as_bytes()).json();
+    assert_eq!(session(&served)["models"][0]["is_stale"], true);
+}
+
+#[test]
+fn what_is_not_there_for_a_while_stays_in_the_project() {
+    let served = Served::of_photo(folder_of(&["rod.png"]), "rod.png");
+    served.ask("PUT", "/api/images/0/marks", MARKS.as_bytes()).json();
+    served.ask("POST", "/api/trial-pictures?name=found.png", &photo_png()).json();
+    served.ask("POST", "/api/trial-pictures?name=empty.png", &photo_png()).json();
+    served.ask("POST", "/api/trial-pictures/0/accept", MARKS.as_bytes()).json();
+    served.ask("PUT", "/api/trial-pictures/1/absent", b"{\"absent\": true}").json();
+    let left = session(&served);
+    let folder = served.end();
+    let [away, there] = ["away.png", "found.png"].map(|name| folder.path().join(name));
+    std::fs::rename(&there, &away).unwrap();
+    std::fs::rename(folder.path().join("tried"), folder.path().join("elsewhere")).unwrap();
+    let served = Served::of_photo(folder, "rod.png");
+    let without = session(&served);
+    assert_eq!((names(&without["images"]), &without["trial_pictures"]), (vec!["rod.png"], &json!([])));
+    assert!(without["notes"][0].as_str().unwrap().starts_with("found.png is not there now"), "{}", without["notes"]);
+    served.ask("PUT", "/api/label", b"{\"label\": \"rod\"}");
+    let folder = served.end();
+    std::fs::rename(&away, &there).unwrap();
+    std::fs::rename(folder.path().join("elsewhere"), folder.path().join("tried")).unwrap();
+    let again = session(&Served::of_photo(folder, "rod.png"));
+    for what in ["images", "trial_pictures"] {
+        assert_eq!(again[what], left[what], "{what}");
+    }
+}
+
+#[test]
+fn a_tried_picture_of_another_folder_is_learnt_from_without_writing_there() {
+    let others = folder_of(&["line.png"]);
+    let served = Served::of_photo_and_tried(folder_of(&["rod.png"]), "rod.png", others.path());
+    let learnt = served.ask("POST", "/api/trial-pictures/0/accept", MARKS.as_bytes()).json();
+    assert_eq!(learnt["name"], "line.png");
+    assert!(served.folder.path().join("line.png").is_file() && served.folder.path().join("line.json").is_file());
+    assert_eq!(std::fs::read_dir(others.path()).unwrap().count(), 1, "nothing is written into another's folder");
+}
+
+#[test]
 fn a_photo_of_a_folders_project_opens_that_without_what_has_come_since() {
     let served = Served::of_project(folder_of(&["a.png"]));
     assert_eq!(names(&session(&served)["images"]), ["a.png"], "where there is one picture, there is no choice");
@@ -119,8 +170,14 @@ fn without_a_project_one_is_made_of_a_photo_and_opened_again() {
     assert_eq!(names(&start["recent"]), ["wing_bolt"]);
     let taken = served.ask("POST", "/api/projects?name=wing%20bolt&photo=a.png", &photo_png());
     assert!(taken.status == 500 && taken.text().contains("wing_bolt"), "{}", taken.text());
-    assert_eq!(served.ask("POST", "/api/projects/7/open", b"").status, 404);
-    let again = served.ask("POST", "/api/projects/0/open", b"").json();
+    let id = start["recent"][0]["id"].as_str().unwrap();
+    // What is gone is not taken for another.
+    let away = served.folder.path().join("away");
+    std::fs::rename(served.folder.path().join("wing_bolt"), &away).unwrap();
+    let gone = served.ask("POST", &format!("/api/projects/{id}/open"), b"");
+    assert!(gone.status == 409 && gone.text().contains("not there any more"), "{}", gone.text());
+    std::fs::rename(&away, served.folder.path().join("wing_bolt")).unwrap();
+    let again = served.ask("POST", &format!("/api/projects/{id}/open"), b"").json();
     assert_eq!(
         (&again["label"], again["images"][0]["marks"]["box"].clone()),
         (&json!("wing bolt"), json!([40.0, 40.0, 140.0, 60.0]))

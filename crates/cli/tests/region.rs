@@ -138,6 +138,26 @@ fn with_a_camera_the_region_is_one_of_its_pictures() {
 }
 
 #[test]
+fn an_evaluation_leaves_pictures_of_another_size_out() {
+    let folder = Folder::new();
+    let (model, pictures) = (folder.path("region.sdg"), folder.path("pictures"));
+    let demo = format!("{}:{}", photo(), shipped("pendulum", "annotation.json").display());
+    assert!(sdg(&["teach", "--model", "S", "--demo", &demo, "--region", ON_IT, "--out", &model]).status.success());
+    std::fs::create_dir(&pictures).unwrap();
+    let image = image::open(photo()).unwrap();
+    // Not the photo itself, which would be left out as taught.
+    image.brighten(12).save(format!("{pictures}/same.png")).unwrap();
+    image.thumbnail(320, 240).save(format!("{pictures}/small.png")).unwrap();
+    for (name, side) in [("same", [640, 480]), ("small", [320, 240])] {
+        let none = json!({"imageWidth": side[0], "imageHeight": side[1], "shapes": []});
+        std::fs::write(format!("{pictures}/{name}.json"), none.to_string()).unwrap();
+    }
+    let output = sdg(&["evaluate", "--pictures", &pictures, "--grasp-model", &model, "--report", &folder.path("out")]);
+    let told = [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap()).concat();
+    assert!(output.status.success() && told.contains("small.png: expected a picture of 640 × 480 pixels"), "{told}");
+}
+
+#[test]
 fn wrong_regions_are_one_clear_error_each() {
     let folder = Folder::new();
     let model = folder.path("model.sdg");

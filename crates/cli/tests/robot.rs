@@ -64,7 +64,7 @@ fn the_simulated_arm_grasps_what_the_shipped_workcell_shows_it() {
     let num_part = drawn.pixels().filter(|pixel| is_part(pixel)).count();
     assert!(num_part >= 20, "{num_part} pixels");
 
-    let done = sdg(&[&base[..], &from, &["--speed", "0.6", "--json"]].concat());
+    let done = sdg(&[&base[..], &from, &["--speed", "0.6", "--json", "--out", text(&out)]].concat());
     let stderr = String::from_utf8(done.stderr).unwrap();
     assert!(done.status.success(), "{stderr}");
     let line: Value = serde_json::from_slice(&done.stdout).unwrap();

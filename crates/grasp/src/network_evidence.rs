@@ -15,6 +15,7 @@ use crate::calibration::{Calibration, log_odds};
 
 /// A score this far below the threshold, in log-odds, does not speak against the part: by so much pictures score lower than
 /// held-back samples (the housing's right places 3.7 in the median, and 5.5; docs/decisions/013-base-weights.md).
+#[cfg(any(feature = "teach", test))]
 const PICTURES_SCORE_LOWER_BY: f64 = 2.0;
 
 /// How often the network was silent, unsure and sure, on the part and on other things.

@@ -49,8 +49,9 @@ pub enum RegionError {
     OffTable { region: SearchRegion },
     /// The part does not fit in.
     #[error(
-        "expected a region that the part fits in, which is at least {length:.0} × {across:.0} pixels there, found {region}: \
-         make it larger"
+        "expected a region that the part fits in, which is {} pixels long and {} wide there, found {region}: make it larger",
+        length.ceil(),
+        across.ceil()
     )]
     SmallerThanPart { region: SearchRegion, length: f64, across: f64 },
 }

@@ -4,13 +4,13 @@
 //! twice, a point's share of the sum is `w s · R d = cos (w s · d) + sin (w s.y d.x − w s.x d.y)`; both products are added up over all
 //! points, and the turn is applied once.
 
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Simd, WithSimd};
 use wide::f32x4;
 
 use crate::edge_points::EdgePoint;
 use crate::gradient_field::GradientLevel;
+use crate::lanes::{LANES, in_lanes};
 use crate::pose::LevelMap;
-use crate::sightings::LANES;
 
 /// Edge points coordinate by coordinate, filled up to whole groups with points of no weight.
 #[derive(Debug, Clone)]
@@ -53,7 +53,7 @@ impl PointLanes {
 
     /// Weighted sum of cos 2(difference of directions) over the points inside the image, and of their weights.
     pub(crate) fn sums(&self, level: &GradientLevel, map: &LevelMap) -> (f32, f32) {
-        Arch::new().dispatch(Sums { points: self, level, map })
+        in_lanes(Sums { points: self, level, map })
     }
 }
 

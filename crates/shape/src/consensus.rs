@@ -10,12 +10,13 @@
 //! that move edges by about a level pixel; a crest at distance `d` asks for `row · step = d`.
 
 use nalgebra::{Const, DimMin, SMatrix, SVector, Vector4};
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Simd, WithSimd};
 
 use crate::capture_range::{CaptureRange, step_units};
 use crate::edge_points::EdgePoint;
+use crate::lanes::{LANES, in_lanes};
 use crate::pose::Pose;
-use crate::sightings::{EdgePlace, FIRST_REACH, Group, LANES, LATER_REACH, Sightings};
+use crate::sightings::{EdgePlace, FIRST_REACH, Group, LATER_REACH, Sightings};
 use crate::template::{MatchedLevel, TemplateLevel};
 
 /// Width of "on the edge" in level pixels, from the first look to the last. Chosen by hand, not measured.
@@ -153,8 +154,8 @@ fn best_crests<const N: usize>(group: &Group<N>, step: &[f32; N], width: f32) ->
             shares[lane] = if is_better { share } else { shares[lane] };
         }
     }
-    for lane in 0..LANES {
-        shares[lane] *= group.weights[lane];
+    for (share, weight) in shares.iter_mut().zip(&group.weights) {
+        *share *= weight;
     }
     (rests, shares)
 }
@@ -182,9 +183,9 @@ impl<const N: usize> WithSimd for NormalEquations<'_, N> {
                 for lane in 0..LANES {
                     right[i][lane] += weighted[lane] * rests[lane];
                 }
-                for j in 0..=i {
+                for (sums, row) in lower[i].iter_mut().zip(&group.rows).take(i + 1) {
                     for lane in 0..LANES {
-                        lower[i][j][lane] += weighted[lane] * group.rows[j][lane];
+                        sums[lane] += weighted[lane] * row[lane];
                     }
                 }
             }
@@ -228,7 +229,7 @@ fn in_single<const N: usize>(step: &SVector<f64, N>) -> [f32; N] {
 /// Weighted share of the sightings that have a crest at a step.
 pub(crate) fn consensus_at<const N: usize>(sightings: &Sightings<N>, step: &SVector<f64, N>) -> f64 {
     let width = WIDTHS[WIDTHS.len() - 1] as f32;
-    f64::from(Arch::new().dispatch(Consensus { sightings, step: in_single(step), width }))
+    f64::from(in_lanes(Consensus { sightings, step: in_single(step), width }))
 }
 
 /// Iteratively re-weighted least squares from `start`, narrowing.
@@ -245,7 +246,7 @@ where
     for &width in widths {
         for _ in 0..2 {
             let equations = NormalEquations { sightings, step: in_single(&step), width: width as f32 };
-            let (lower, right) = Arch::new().dispatch(equations);
+            let (lower, right) = in_lanes(equations);
             let mut normal_matrix = SMatrix::<f64, N, N>::from_fn(|i, j| f64::from(lower[i][j]));
             let right = SVector::<f64, N>::from_fn(|i, _| f64::from(right[i]));
             // Directions that no edge holds (the angle of a ring) stay where they are. The share was chosen by hand.

@@ -2,12 +2,12 @@
 
 use image::RgbImage;
 use nalgebra::{Point2, Vector2};
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Simd, WithSimd};
 use sdg_geometry::{BoundingBox, PlanarSimilarity};
 use wide::f32x4;
 
+use crate::lanes::{LANES, in_lanes};
 use crate::pixel_cell::PixelReader;
-use crate::sightings::LANES;
 
 /// The square, `side` pixels wide.
 #[derive(Debug, Clone)]
@@ -73,7 +73,7 @@ impl Frame {
         let origin = image_from_cutout.apply(&self.place(first));
         let across = image_from_cutout.apply(&self.place([first[0] + 1.0, first[1]])) - origin;
         let reader = PixelReader::new(image);
-        Arch::new().dispatch(SampleFrame { reader, side: self.side, num, origin, across })
+        in_lanes(SampleFrame { reader, side: self.side, num, origin, across })
     }
 }
 

@@ -85,6 +85,7 @@ mod following;
 mod foreshortening;
 mod frame;
 mod gradient_field;
+mod lanes;
 mod layers;
 mod likeness;
 pub mod parallel;

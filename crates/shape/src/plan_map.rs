@@ -2,10 +2,11 @@
 
 use image::RgbImage;
 use nalgebra::{Point2, Vector2};
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Simd, WithSimd};
 use sdg_geometry::{PlanView, PosedCamera};
 use wide::f32x4;
 
+use crate::lanes::in_lanes;
 use crate::parallel;
 use crate::pixel_cell::PixelReader;
 
@@ -71,7 +72,7 @@ impl PlanMap {
         let rows: Vec<u32> = (window.top..window.top + window.height).collect();
         let reader = PixelReader::new(picture);
         let rows = parallel::map(&rows, |&y| {
-            Arch::new().dispatch(ResampleRow { map: self, reader, y, left: window.left, width: window.width })
+            in_lanes(ResampleRow { map: self, reader, y, left: window.left, width: window.width })
         });
         RgbImage::from_raw(window.width, window.height, rows.concat()).unwrap_or_default()
     }

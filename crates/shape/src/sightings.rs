@@ -3,14 +3,13 @@
 //! Points stand in groups of [`LANES`], coordinate by coordinate, so that the fits ([`crate::consensus`]) take a group at a time. All
 //! sums are made in the same order whatever instructions the machine has.
 
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Simd, WithSimd};
 use wide::f32x4;
 
 use crate::edge_points::parabola_peak;
 use crate::gradient_field::GradientLevel;
+use crate::lanes::{LANES, in_lanes};
 
-/// Points that are taken at once.
-pub(crate) const LANES: usize = 8;
 /// How far along its normal an edge point looks for crests, in level pixels: first and later rounds. Chosen by hand,
 /// not measured.
 pub(crate) const FIRST_REACH: usize = 6;
@@ -52,7 +51,7 @@ pub(crate) struct Sightings<const N: usize> {
 impl<const N: usize> Sightings<N> {
     /// Looks from every place along its normal, `reach` pixels to either side; beyond the border nothing is seen.
     pub(crate) fn gather(level: &GradientLevel, places: &[EdgePlace<N>], reach: usize) -> Self {
-        Arch::new().dispatch(Gather { level, places, reach })
+        in_lanes(Gather { level, places, reach })
     }
 }
 

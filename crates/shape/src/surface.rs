@@ -19,13 +19,13 @@ use std::collections::BTreeMap;
 
 use image::RgbImage;
 use nalgebra::{Point2, Vector3};
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Simd, WithSimd};
 use sdg_geometry::{PlanarSimilarity, Polygon};
 use wide::f32x4;
 
 use crate::config::SurfaceConfig;
+use crate::lanes::{LANES, in_lanes};
 use crate::pixel_cell::PixelReader;
-use crate::sightings::LANES;
 
 /// Points that are compared; a few hundred are enough for correlations, and cost microseconds. Chosen by that reasoning; 700
 /// before there were cells.
@@ -127,7 +127,7 @@ impl Surface {
     /// Of every cell and what an image shows of it at a pose.
     fn correlations(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> Vec<Correlation> {
         let reader = PixelReader::new(image);
-        Arch::new().dispatch(Correlate { cells: &self.cells, reader, image_from_cutout: *image_from_cutout })
+        in_lanes(Correlate { cells: &self.cells, reader, image_from_cutout: *image_from_cutout })
     }
 
     /// The share of the points that lie in `outline` after `outline_from_cutout`, in `[0, 1]`.
@@ -320,8 +320,8 @@ impl WithSimd for Correlate<'_> {
                 let y: [f32; LANES] = std::array::from_fn(|k| b * group.x[k] + a * group.y[k] + ty);
                 let mut colors = [f32x4::ZERO; LANES];
                 let mut counts = reader.colors(&x, &y, &mut colors);
-                for k in 0..LANES {
-                    counts[k] *= group.counts[k];
+                for (counts, of_group) in counts.iter_mut().zip(&group.counts) {
+                    *counts *= of_group;
                 }
                 let first = counts.iter().position(|counts| *counts > 0.0);
                 let Some([of_photo, of_image]) = base.or(first.map(|k| [group.colors[k], colors[k]])) else { continue };

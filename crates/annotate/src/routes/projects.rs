@@ -13,7 +13,7 @@ pub fn answer(desk: &Desk, request: &Request, rest: &[&str]) -> Option<Response>
             json_of(desk.create(&value("name"), &value("photo"), &request.body))
         }
         ("DELETE", []) => json_of(desk.close()),
-        ("POST", [id, "open"]) => json_of(desk.open(id.parse().ok()?)),
+        ("POST", [id, "open"]) => json_of(desk.open(id)),
         _ => return None,
     })
 }

@@ -11,7 +11,7 @@ use crate::model_versions::ModelVersions;
 use crate::names::proposed_label;
 use crate::picture::{Picture, pictures_in};
 use crate::preview::Previews;
-use crate::project_file::{ProjectFile, ProjectPlace, TRIED_FOLDER, relative};
+use crate::project_file::{Gone, ProjectFile, ProjectPlace, TRIED_FOLDER, relative};
 use crate::session_state::{MarkedPicture, State, TrialPicture};
 use crate::teacher::GraspTeacher;
 use crate::teaching::Teaching;
@@ -27,11 +27,12 @@ impl Session {
             (None, Some((photo, _))) => Some(ProjectPlace::of_photo(photo)?),
             (None, None) => None,
         };
-        let (project, mut notes) = match &place {
+        let (project, gone) = match &place {
             Some(place) => ProjectFile::open(place)?,
-            None => (ProjectFile::default(), Vec::new()),
+            None => (ProjectFile::default(), Gone::default()),
         };
-        notes.iter_mut().for_each(|gone| *gone += " is not there any more.");
+        let mut notes: Vec<String> =
+            gone.names().map(|name| format!("{name} is not there now; the project goes on naming it.")).collect();
         let folder = place.as_ref().map_or(Path::new(""), |place| &place.folder).to_owned();
         let mut photos = options.images.clone();
         for name in &project.photos {
@@ -91,6 +92,7 @@ impl Session {
             models,
             place,
             removed_earlier: project.removed,
+            gone,
             offered: Vec::new(),
             max_opening_px: options.max_opening_px,
             region,

@@ -1,5 +1,7 @@
 //! Pictures to try: taken in, accepted as demonstrations, said to be without the part, compared.
 
+use std::path::Path;
+
 use super::{MAX_LABEL_CHARS, MAX_TRIAL_PICTURES, Session};
 use crate::error::{Error, Result};
 use crate::marks::Marks;
@@ -122,8 +124,8 @@ impl Session {
         compared.collect()
     }
 
-    /// Makes a tried picture a demonstration with these marks. One that came from the page gets a place beside the first
-    /// picture, under a name of its own.
+    /// Makes a tried picture a demonstration with these marks. One that came from the page, or that lies elsewhere, gets a place beside
+    /// the first picture, under a name of its own: marks are not written into another's folder.
     ///
     /// # Errors
     /// No such picture, one that is a demonstration already, a file that cannot be written.
@@ -134,7 +136,8 @@ impl Session {
             return Err(Error::Busy("this picture is a demonstration already"));
         }
         let mut picture = trial.picture;
-        if trial.uploaded || picture.path.parent() == Some(&self.uploads(&state)) {
+        let folder_of = |path: &Path| std::path::absolute(path).ok()?.parent().map(Path::to_owned);
+        if trial.uploaded || folder_of(&picture.path) != folder_of(&self.home) {
             let extension = picture.path.extension().unwrap_or_default().to_string_lossy();
             let target = free_name(&self.home, &picture.name, &extension);
             let bytes = std::fs::read(&picture.path).map_err(Error::file(&picture.path, "cannot read"))?;

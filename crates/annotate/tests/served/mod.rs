@@ -211,6 +211,13 @@ impl Served {
         Self::open(folder, SessionOptions { images, ..SessionOptions::default() }, PATIENCE)
     }
 
+    /// The same with pictures to try from elsewhere.
+    pub fn of_photo_and_tried(folder: tempfile::TempDir, name: &str, tried: &std::path::Path) -> Self {
+        let images = vec![(folder.path().join(name), None)];
+        let trial_pictures = vec![tried.to_owned()];
+        Self::open(folder, SessionOptions { images, trial_pictures, ..SessionOptions::default() }, PATIENCE)
+    }
+
     /// A server without a project, whose new ones are made in the folder.
     pub fn of_start(folder: tempfile::TempDir) -> Self {
         let recent = RecentProjects::at(folder.path().join("state/recent.json"));

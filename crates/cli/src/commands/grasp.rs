@@ -103,6 +103,10 @@ pub fn run(args: &GraspArgs) -> Result<Outcome> {
     let prepared = prepare(args)?;
     let choice = RobotChoice::named(args.robot.as_ref(), prepared.workcell.address.as_deref())?;
     let interrupt = Interrupt::watch();
+    // What is there and is no folder is told before anything moves; a folder is made when there is something to write.
+    if args.out.exists() {
+        sdg_files::prepare_folder(&args.out)?;
+    }
     match choice {
         RobotChoice::Sim => simulated(args, &prepared, &interrupt),
         RobotChoice::Network(address) => {

@@ -73,7 +73,7 @@ pub struct TeachArgs {
     pub size_tolerance: SizeTolerance,
     /// Search only this part of pictures for the part: left edge, upper edge, width and height in pixels of the photo. A part counts
     /// whose grasp point lies in it and at least half of the part. Kept in the model's file, for pictures as large as the photo
-    #[arg(long, value_name = "X,Y,W,H", value_parser = region)]
+    #[arg(long, value_name = "X,Y,W,H", allow_hyphen_values = true, value_parser = region)]
     pub region: Option<SearchRegion>,
     /// The calibrated camera that took the photos
     #[command(flatten)]

@@ -116,8 +116,7 @@ fn several_found_ones_have_numbers() {
     page.browser
         .run("[...document.querySelectorAll('#found button')].find((b) => b.innerText === 'Zoom to it').click()", &[])
         .unwrap();
-    page.settle_frames();
-    assert!(page.browser.run(scale, &[]).unwrap().as_f64().unwrap() > 1.5 * whole);
+    page.wait_for("the part to fill the stage", &format!("{scale} > {}", 1.5 * whole));
 
     // Another picture, with nothing in it, comes first when the row is sorted.
     try_picture(&page, "empty.png", &RgbImage::from_pixel(640, 480, Rgb([140, 140, 135])));

@@ -24,7 +24,7 @@ mod truth_file;
 pub use folder::LabelledFolder;
 pub use label_offset::{LabelOffset, label_offset};
 pub use page::{in_words, page};
-pub use picture::{Instance, LabelledPicture};
+pub use picture::{Instance, LabelledPicture, LeftOut};
 pub use records::{Evaluated, by_kind_json, by_min_score, to_json};
 pub use score::{HitError, Judged, Tested, Totals, Truth, by_kind, judge};
 pub use sdg_cell::DEFAULT_MIN_SCORE;

@@ -139,9 +139,9 @@ fn a_part_that_lies_still_stays_where_the_search_has_it() {
     for (was_searched, parts) in &answers[1..] {
         let mut followed = parts[0].detection.clone();
         // A window of the picture is read at other numbers, so that sums in single precision end in other bits.
-        let [seen, searched] = [followed.agreement, found.agreement].map(Option::unwrap);
-        assert!((seen - searched).abs() < 1e-6, "{seen} instead of {searched}");
-        followed.agreement = found.agreement;
+        let [seen, searched] = [&followed, found].map(|detection| [detection.agreement.unwrap(), detection.light]);
+        assert!((0..2).all(|k| (seen[k] - searched[k]).abs() < 1e-6), "{seen:?} instead of {searched:?}");
+        (followed.agreement, followed.light) = (found.agreement, found.light);
         assert_eq!((*was_searched, &followed), (false, found));
     }
     // What moves by a pixel is followed.

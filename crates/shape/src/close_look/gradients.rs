@@ -10,7 +10,9 @@
 
 use std::ops::Range;
 
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Simd, WithSimd};
+
+use crate::lanes::in_lanes;
 
 /// Windows stand so many pixels apart and are three times as wide.
 pub(super) const CELL: usize = 3;
@@ -139,7 +141,7 @@ impl Expected {
             }
             let offset = dy * self.side as isize + dx;
             let sums = ShiftedSums { expected: self, picture, offset, products: &mut products, seen: &mut seen };
-            Arch::new().dispatch(sums);
+            in_lanes(sums);
             let (products, seen) = (window_means(&products, self.side), window_means(&seen, self.side));
             for (cell, best) in best.iter_mut().enumerate() {
                 let of_both = ((self.energy[cell] + EMPTY) * (seen[cell] + EMPTY)).sqrt();
@@ -254,7 +256,7 @@ fn filled(colors: &[Option<[f32; 3]>], side: usize) -> Vec<f32> {
 
 /// Smoothed along rows, then along columns; beyond the border its pixels are repeated.
 fn smoothed(values: &[f32], side: usize) -> Vec<f32> {
-    Arch::new().dispatch(Smooth { values, side })
+    in_lanes(Smooth { values, side })
 }
 
 struct Smooth<'a> {

@@ -8,8 +8,9 @@
 //! same turned by half a turn keeps both for the finer levels to decide, and so does a part in clutter or noise, where the
 //! smallest scale agrees best almost everywhere, because its points lie closest together.
 
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Simd, WithSimd};
 
+use crate::lanes::in_lanes;
 use crate::parallel;
 use crate::search::bank::Bank;
 use crate::search::responses::{BLOCK, FULL, Responses};
@@ -45,9 +46,8 @@ pub(crate) fn sweep(responses: &Responses, bank: &Bank, count: usize, min_respon
     let shifts: Vec<Vec<(usize, isize)>> = bank.variants.iter().map(|v| v.shifts(responses.stride())).collect();
     let groups = Groups::of(bank);
     let stretches: Vec<usize> = (first..end).step_by(STRETCH).collect();
-    let arch = Arch::new();
     let swept = parallel::map(&stretches, |&at| {
-        arch.dispatch(SweepStretch { responses, shifts: &shifts, groups: &groups, at, len: STRETCH.min(end - at) })
+        in_lanes(SweepStretch { responses, shifts: &shifts, groups: &groups, at, len: STRETCH.min(end - at) })
     });
 
     let full = f64::from(FULL) * bank.num_points as f64;

@@ -46,7 +46,7 @@ pub struct DetectArgs {
     pub camera: Option<PathBuf>,
     /// Search only this part of each picture: left edge, upper edge, width and height in its pixels, or all; without it, the part that the
     /// model was taught with. A part counts whose grasp point lies in it and at least half of the part
-    #[arg(long, value_name = "X,Y,W,H|all", value_parser = region_or_all)]
+    #[arg(long, value_name = "X,Y,W,H|all", allow_hyphen_values = true, value_parser = region_or_all)]
     pub region: Option<RegionArg>,
     /// Accept detections that score at least so much; more for fewer wrong ones, less for fewer missed ones
     #[arg(long, value_name = "SCORE", default_value_t = DEFAULT_MIN_SCORE, value_parser = share)]

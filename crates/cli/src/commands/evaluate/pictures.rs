@@ -4,11 +4,12 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
+use sdg_cell::CellError;
 use sdg_evaluation::Progress;
 use sdg_evaluation::labelled_pictures::{
-    Evaluated, LabelledFolder, Tested, Totals, in_words, judge, page, summary, to_json,
+    Evaluated, LabelledFolder, LeftOut, Tested, Totals, in_words, judge, page, summary, to_json,
 };
-use sdg_grasp::Verification;
+use sdg_grasp::{GraspError, Verification};
 use sdg_inputs::camera_files;
 
 use super::args::EvaluateArgs;
@@ -31,7 +32,7 @@ pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
     let model = sdg_inputs::read_model(model_file, &devices::open(&ComputeArgs { device: args.device })?)?;
     let detector = camera_files::perception(model, model_file, args.camera.as_deref())?;
     let model = detector.model();
-    let labelled = LabelledFolder::read(folder, &detector, args.label.as_deref())?;
+    let mut labelled = LabelledFolder::read(folder, &detector, args.label.as_deref())?;
     let report_folder = args.report.clone().unwrap_or_else(|| PathBuf::from(DEFAULT_REPORT));
     sdg_files::prepare_folder(&report_folder)?;
 
@@ -40,7 +41,16 @@ pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
     progress.expect(labelled.pictures.len());
     let mut tested = Vec::with_capacity(labelled.pictures.len());
     for picture in labelled.pictures {
-        let of_picture = Tested::detect(picture, &detector, verification)?;
+        let name = picture.name();
+        let of_picture = match Tested::detect(picture, &detector, verification) {
+            Ok(of_picture) => of_picture,
+            // The model searches a region of pictures of another size.
+            Err(error) if matches!(error.downcast_ref(), Some(CellError::Grasp(GraspError::Region(_)))) => {
+                labelled.left_out.push(LeftOut { file: name, why: error.root_cause().to_string() });
+                continue;
+            }
+            Err(error) => return Err(error),
+        };
         let judged = judge(&of_picture, args.min_score);
         progress.unit_done(&format!("{}: {}", of_picture.picture.name(), in_words(&of_picture, &judged)));
         tested.push(of_picture);
