@@ -1,8 +1,8 @@
 //! Colours between the pixels of a picture, by bilinear interpolation, many at once.
 //!
 //! Loops of their own, each with its reason beside it: [`GradientField`](crate::GradientField) (directions, three floats),
-//! `sdg-grasp`'s plan view and `sdg-demonstration`'s raster (the border goes on), `sdg-orientation`'s crop (beyond the border a
-//! colour; weights belong to its bits), `sdg-detection`'s pasted masks (single numbers).
+//! `sdg-demonstration`'s raster (the border goes on), `sdg-orientation`'s crop (beyond the border a colour; weights belong to its
+//! bits), `sdg-detection`'s pasted masks (single numbers).
 
 use image::RgbImage;
 use wide::{f32x4, i32x4};

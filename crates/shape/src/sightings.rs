@@ -147,3 +147,26 @@ fn crests(samples: &Samples, floor: f32, double: [f32; 2], reach: usize) -> Opti
     }
     (count > 0).then_some(crests)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::GradientField;
+    use image::{Rgb, RgbImage};
+
+    #[test]
+    fn samples_read_in_lanes_have_the_bits_of_those_read_one_by_one() {
+        let image = RgbImage::from_fn(41, 37, |x, y| Rgb([(x * x + y) as u8, (3 * y * x) as u8, (x + 7 * y) as u8]));
+        let field = GradientField::new(&image);
+        let level = field.level(0);
+        // Inside, near each border, on it and beyond.
+        for (x, y) in (-4..=90).flat_map(|x| (-4..=82).map(move |y| (x as f32 * 0.4691, y as f32 * 0.4873))) {
+            let mut samples = [f32x4::ZERO; LANES];
+            let inside = level.bilinear_all(&[x; LANES], &[y; LANES], &mut samples);
+            let expected = level.bilinear(x, y);
+            assert_eq!(inside, [if expected.is_some() { 1.0 } else { 0.0 }; LANES], "{x}, {y}");
+            let [dx, dy, energy] = expected.unwrap_or_default();
+            assert!(samples.iter().all(|sample| sample.to_array()[..3] == [dx, dy, energy]), "{x}, {y}: {samples:?}");
+        }
+    }
+}
