@@ -22,6 +22,11 @@ impl PlanarSimilarity {
     /// Leaves every point where it is.
     pub const IDENTITY: Self = Self { scale: 1.0, angle: Angle::ZERO, tx: 0.0, ty: 0.0 };
 
+    /// A shift to the right and down, in pixels.
+    pub fn translation(tx: f64, ty: f64) -> Self {
+        Self { tx, ty, ..Self::IDENTITY }
+    }
+
     /// Turns by `angle` and scales about `center`, then moves `center` to `target`.
     pub fn about(center: Point2<f64>, target: Point2<f64>, angle: Angle, scale: f64) -> Self {
         let mut made = Self { scale, angle, tx: 0.0, ty: 0.0 };
@@ -67,6 +72,11 @@ impl PlanarSimilarity {
         )
     }
 
+    /// `self`, then a shift by so many pixels to the right and down.
+    pub fn shifted(&self, by: Vector2<f64>) -> Self {
+        Self { tx: self.tx + by.x, ty: self.ty + by.y, ..*self }
+    }
+
     /// `self` after `first`: c_from_a = c_from_b.compose(b_from_a).
     pub fn compose(&self, first: &Self) -> Self {
         let shift = self.apply(&Point2::new(first.tx, first.ty));
@@ -110,6 +120,13 @@ mod tests {
         fn composition_is_one_after_the_other(a in any(), b in any(), x in -50.0..50.0f64, y in -50.0..50.0f64) {
             let p = Point2::new(x, y);
             prop_assert!((a.compose(&b).apply(&p) - a.apply(&b.apply(&p))).norm() < 1e-8);
+        }
+
+        #[test]
+        fn shifts_come_last(t in any(), x in -50.0..50.0f64, y in -50.0..50.0f64) {
+            let shift = PlanarSimilarity::translation(x, y);
+            let p = Point2::new(3.0, -7.0);
+            prop_assert!((t.shifted(Vector2::new(x, y)).apply(&p) - shift.compose(&t).apply(&p)).norm() < 1e-8);
         }
 
         #[test]

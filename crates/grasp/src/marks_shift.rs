@@ -92,11 +92,7 @@ impl MarksShift {
             [(HEIGHT_SHARES.0 * away.norm()).min(-MAX_ASIDE), (HEIGHT_SHARES.1 * away.norm()).max(MAX_ASIDE)];
         let shifted = |[along, across]: [f64; 2]| {
             let shift = diagonal * (along * line + across * Vector2::new(-line.y, line.x));
-            PlanarSimilarity {
-                tx: image_from_cutout.tx + shift.x,
-                ty: image_from_cutout.ty + shift.y,
-                ..*image_from_cutout
-            }
+            image_from_cutout.shifted(shift)
         };
         let edges = |at: [f64; 2]| {
             let cost = COST_ALONG * at[0].abs() + COST_ACROSS * at[1].abs();

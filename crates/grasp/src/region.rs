@@ -107,7 +107,7 @@ impl SearchRegion {
         if !((x1..x2).contains(&grasp_point.x) && (y1..y2).contains(&grasp_point.y)) {
             return false;
         }
-        let from_region = PlanarSimilarity { tx: -x1, ty: -y1, ..PlanarSimilarity::IDENTITY };
+        let from_region = PlanarSimilarity::translation(-x1, -y1);
         let inside = outline.transformed(&from_region).clip(x2 - x1, y2 - y1);
         inside.area() >= MIN_SHARE * outline.area()
     }

@@ -38,11 +38,7 @@ impl RoundTop {
     ) -> PlanarSimilarity {
         let nearer = self.rise * image_from_cutout.scale / focal_px;
         let shift = nearer * (image_from_cutout.apply(&self.photo_middle) - below_camera);
-        PlanarSimilarity {
-            tx: image_from_cutout.tx + shift.x,
-            ty: image_from_cutout.ty + shift.y,
-            ..*image_from_cutout
-        }
+        image_from_cutout.shifted(shift)
     }
 }
 

@@ -108,8 +108,7 @@ impl SearchWindow {
 
     /// Moves from its pixels to those of the whole.
     pub(crate) fn whole_from_window(&self) -> PlanarSimilarity {
-        let (tx, ty) = (f64::from(self.rect.left), f64::from(self.rect.top));
-        PlanarSimilarity { tx, ty, ..PlanarSimilarity::IDENTITY }
+        PlanarSimilarity::translation(f64::from(self.rect.left), f64::from(self.rect.top))
     }
 
     /// What was found in it, in pixels of the whole.

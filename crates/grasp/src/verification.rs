@@ -10,7 +10,7 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use image::RgbImage;
-use nalgebra::Point2;
+use nalgebra::{Point2, Vector2};
 use sdg_geometry::{Angle, PlanarSimilarity, Polygon};
 use sdg_orientation::halved;
 use sdg_shape::{Differences, Evidence, Foreshortening, GradientField, Picture, TableColors, parallel};
@@ -250,8 +250,7 @@ impl SizedDemonstration<'_> {
             shift.straightened(&view.image, &outline, view_from_working, view_from_marks, coarsest_pixel);
         let field = GradientField::with_config(&image, &self.demonstration.check().search.shape.gradient);
         let comparison = search.comparison(&Picture { image: &image, field: &field, table: &view.table });
-        let PlanarSimilarity { tx, ty, .. } = *view_from_working;
-        let pose = PlanarSimilarity { tx: tx - f64::from(left), ty: ty - f64::from(top), ..*view_from_working };
+        let pose = view_from_working.shifted(-Vector2::new(f64::from(left), f64::from(top)));
         let agreement = comparison.agreement(&pose).both();
         if agreement > flat.0 { (agreement, comparison.evidence(&pose)) } else { flat }
     }

@@ -169,7 +169,7 @@ mod tests {
         let (left, top) = (step * 20, step * 24);
         let window = image::imageops::crop_imm(&image, left, top, 160, 120).to_image();
         let whole = template.snapped(&GradientField::new(&image), &PlanarSimilarity::IDENTITY, &REACH);
-        let shifted = PlanarSimilarity { tx: -f64::from(left), ty: -f64::from(top), ..PlanarSimilarity::IDENTITY };
+        let shifted = PlanarSimilarity::translation(-f64::from(left), -f64::from(top));
         let pose = template.snapped(&GradientField::new(&window), &shifted, &REACH);
         let apart =
             pose.apply(&MIDDLE) + nalgebra::Vector2::new(f64::from(left), f64::from(top)) - whole.apply(&MIDDLE);

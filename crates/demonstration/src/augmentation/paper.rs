@@ -1,7 +1,7 @@
 //! The paper's augmentation: the photo turned, tinted, shifted and scaled, black where nothing is known.
 
 use image::RgbImage;
-use nalgebra::Point2;
+use nalgebra::{Point2, Vector2};
 use rand::Rng;
 use sdg_geometry::{Angle, PlanarSimilarity};
 
@@ -39,7 +39,7 @@ impl PaperDraw {
         let angle = Angle::from_degrees(f64::from(self.rotation_deg));
         let rotated = PlanarSimilarity::about(center, center, angle, 1.0);
         let [dx, dy] = self.shift_px.map(f64::from);
-        let shifted = PlanarSimilarity { tx: rotated.tx + dx, ty: rotated.ty + dy, ..rotated };
+        let shifted = rotated.shifted(Vector2::new(dx, dy));
         let scaling = PlanarSimilarity::about(center, center, Angle::ZERO, f64::from(self.scale));
         [rotated, shifted, scaling.compose(&shifted)]
     }

@@ -4,6 +4,7 @@ use std::fmt;
 use std::sync::Arc;
 
 use image::RgbImage;
+use nalgebra::Vector2;
 use sdg_geometry::{BoundingBox, Mask, PlanarSimilarity, Polygon};
 use sdg_sift::{Plane, RotationConfig, RotationEstimator, RotationMethod, RotationTemplate, Sift, SiftConfig};
 
@@ -123,8 +124,7 @@ impl Window {
 
     /// A pose in the window as a pose in the image.
     fn in_image(&self, window_from_cutout: &PlanarSimilarity) -> PlanarSimilarity {
-        let (dx, dy) = (f64::from(self.left), f64::from(self.top));
-        PlanarSimilarity { tx: window_from_cutout.tx + dx, ty: window_from_cutout.ty + dy, ..*window_from_cutout }
+        window_from_cutout.shifted(Vector2::new(f64::from(self.left), f64::from(self.top)))
     }
 }
 

@@ -220,7 +220,7 @@ impl SizedPart {
         for _ in 0..self.working.halvings {
             image = halved(&image);
         }
-        let shift = PlanarSimilarity { tx: -f64::from(left), ty: -f64::from(top), ..PlanarSimilarity::IDENTITY };
+        let shift = PlanarSimilarity::translation(-f64::from(left), -f64::from(top));
         Some(View { image, view_from_frame: scaling(1.0 / f64::from(shrink)).compose(&shift) })
     }
 
