@@ -7,7 +7,7 @@ use nalgebra::Point2;
 use sdg_evaluation::shipped;
 use sdg_geometry::{PinholeCamera, PlumbBob, PosedCamera};
 use sdg_grasp::{
-    CameraOverTable, Device, GraspModel, ModelKind, PlanDetection, PlanDetector, TeachOptions, Verification,
+    CameraOverTable, Device, GraspModel, ModelKind, PlanViewDetection, PlanViewDetector, TeachOptions, Verification,
     seen_from_above, teach,
 };
 use sdg_simulation::objects::{LookAlikeKind, ObjectSpec};
@@ -41,15 +41,15 @@ fn taught(part: &ObjectSpec) -> GraspModel {
     GraspModel::from_bytes(&model.to_bytes().unwrap(), &Device::flex()).unwrap()
 }
 
-fn detect(model: &GraspModel, camera: &PosedCamera, picture: &RgbImage) -> Vec<PlanDetection> {
-    let detector = PlanDetector::new(model.clone(), &over_table(*camera)).unwrap();
+fn detect(model: &GraspModel, camera: &PosedCamera, picture: &RgbImage) -> Vec<PlanViewDetection> {
+    let detector = PlanViewDetector::new(model.clone(), &over_table(*camera)).unwrap();
     let mut found = detector.detect(picture, Verification::ByShape).unwrap();
     found.retain(|found| found.detection.is_accepted());
     found
 }
 
 /// Asserts that the best of what was found is the part where it truly is; its error in millimetres.
-fn assert_found(shown: &AxisView, camera: &PosedCamera, found: &[PlanDetection], about: &str) -> f64 {
+fn assert_found(shown: &AxisView, camera: &PosedCamera, found: &[PlanViewDetection], about: &str) -> f64 {
     let truth = &shown.truths[0].grasp;
     let best = found.first().unwrap_or_else(|| panic!("{about}: not found"));
     let error_mm = 1e3 * (best.pose.position_m - truth.tcp).norm();

@@ -8,8 +8,8 @@ use sdg_calibration::{CalibratedCamera, CameraFileError, Frame};
 use sdg_demonstration::PixelFrame;
 use sdg_geometry::PinholeCamera;
 use sdg_grasp::{
-    CameraOverTable, Differences, GraspDetection, GraspError, GraspModel, PartDetector, PlanDetection, PlanDetector,
-    PlanarPose, SearchRegion, TaughtDemonstration, Verification,
+    CameraOverTable, Differences, GraspDetection, GraspError, GraspModel, PartDetector, PlanViewDetection,
+    PlanViewDetector, PlanarPose, SearchRegion, TaughtDemonstration, Verification,
 };
 
 use crate::error::Result;
@@ -28,7 +28,7 @@ enum View {
     /// Pictures of any camera.
     AnyCamera(Box<GraspModel>),
     /// Those of a calibrated camera in its place; the model as it was given, for a camera without place.
-    OverTable(Box<PlanDetector>, CameraOverTable),
+    OverTable(Box<PlanViewDetector>, CameraOverTable),
 }
 
 /// A detection, in metres as well where the camera's place is known.
@@ -61,7 +61,7 @@ impl Perception {
     /// # Errors
     /// A model that was taught without a camera; a camera that does not see the plane of the marks.
     pub fn over_table(model: GraspModel, place: &CameraOverTable) -> Result<Self> {
-        Ok(Self { view: View::OverTable(Box::new(PlanDetector::new(model, place)?), *place), frame: None })
+        Ok(Self { view: View::OverTable(Box::new(PlanViewDetector::new(model, place)?), *place), frame: None })
     }
 
     /// The same with the place that the camera's file has.
@@ -88,7 +88,7 @@ impl Perception {
         Ok(())
     }
 
-    /// Looks for parts of these sizes in the plane of the marks, over the part's own, as [`PlanDetector::look_for_sizes`]; nothing changes
+    /// Looks for parts of these sizes in the plane of the marks, over the part's own, as [`PlanViewDetector::look_for_sizes`]; nothing changes
     /// for pictures of any camera.
     ///
     /// # Errors
@@ -133,7 +133,7 @@ impl Perception {
                 found.into_iter().map(|detection| Found { detection, pose: None }).collect()
             }
             View::OverTable(detector, _) => {
-                let metric = |PlanDetection { detection, pose }| Found { detection, pose: Some(pose) };
+                let metric = |PlanViewDetection { detection, pose }| Found { detection, pose: Some(pose) };
                 detector.detect(picture, verification)?.into_iter().map(metric).collect()
             }
         })
@@ -199,7 +199,7 @@ impl Perception {
     pub fn to_part_detector(&self) -> PartDetector {
         match &self.view {
             View::AnyCamera(model) => GraspModel::clone(model).into(),
-            View::OverTable(detector, _) => PlanDetector::clone(detector).into(),
+            View::OverTable(detector, _) => PlanViewDetector::clone(detector).into(),
         }
     }
 

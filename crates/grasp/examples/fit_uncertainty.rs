@@ -14,8 +14,8 @@ use rayon::prelude::*;
 use sdg_demonstration::Demonstration;
 use sdg_geometry::{GraspLine, RotationalSymmetry};
 use sdg_grasp::{
-    CameraOverTable, Circumstances, ErrorLength, ModelKind, PlanDetector, TeachOptions, Verification, seen_from_above,
-    teach,
+    CameraOverTable, Circumstances, ErrorLength, ModelKind, PlanViewDetector, TeachOptions, Verification,
+    seen_from_above, teach,
 };
 use sdg_part_generator::{Condition, DemonstrationPhoto, Part, PhotoConfig, SceneConfig, Scenes};
 
@@ -56,7 +56,7 @@ fn rows(part_seed: u64, is_held_out: bool, size: [u32; 2]) -> Result<Vec<Row>> {
     let [width, height] = size;
     let photo = PhotoConfig { width, height, ..PhotoConfig::default() };
     let mut rows = Vec::new();
-    let mut detector: Option<PlanDetector> = None;
+    let mut detector: Option<PlanViewDetector> = None;
     for (idx, condition) in Condition::ALL.into_iter().enumerate() {
         let config = SceneConfig {
             width,
@@ -79,7 +79,7 @@ fn rows(part_seed: u64, is_held_out: bool, size: [u32; 2]) -> Result<Vec<Row>> {
             options.symmetry = part.symmetry();
             options.lengths = Some(lengths);
             let model = teach(&seen, &options, &mut |_| ControlFlow::Continue(()))?.model;
-            detector = Some(PlanDetector::new(model, &over_table(shown.camera))?);
+            detector = Some(PlanViewDetector::new(model, &over_table(shown.camera))?);
         }
         let sample = scenes.sample(0);
         let Some(looking) = &mut detector else { continue };

@@ -17,7 +17,7 @@ pub struct Lengths {
     pub mark_height_m: f64,
     /// Height over the table at which the gripper closes, in metres.
     pub grasp_height_m: f64,
-    /// From where the first photo showed the part: see `slant` in plan/mod.rs. 0 in models of before.
+    /// From where the first photo showed the part: see `slant` in plan_view/mod.rs. 0 in models of before.
     #[serde(default)]
     pub slant: [f64; 2],
 }

@@ -54,8 +54,6 @@
 mod base_weights;
 #[cfg(feature = "teach")]
 mod base_weights_file;
-mod calibration;
-mod calibrations;
 mod check_config;
 mod colors;
 mod decimal;
@@ -74,9 +72,10 @@ mod marks_shift;
 mod model;
 mod model_file;
 mod models;
+mod network_calibration;
 mod network_evidence;
 mod photo_scale;
-mod plan;
+mod plan_view;
 mod pose;
 mod prepared;
 mod record;
@@ -86,6 +85,7 @@ mod region_tests;
 mod round_top;
 mod safetensors_file;
 mod same_part;
+mod score_calibration;
 mod search_window;
 mod sighting;
 mod sizes;
@@ -103,7 +103,6 @@ pub use base_weights::BaseWeights;
 #[cfg(feature = "teach")]
 pub use base_weights_file::BaseWeightsFile;
 pub use burn::tensor::Device;
-pub use calibration::Calibration;
 pub use check_config::{CheckConfig, ScoreConfig, Term};
 pub use detection::GraspDetection;
 pub use device::ComputeBackend;
@@ -113,8 +112,9 @@ pub use facts::{ModelKind, NegativeFacts, OrientationFacts, TeachingFacts, TurnS
 pub use lengths::Lengths;
 pub use model::{GraspModel, Verification};
 pub use model_file::{FORMAT_VERSION, ModelSummary, summarize};
-pub use plan::{
-    CameraOverTable, Circumstances, ErrorLength, PlanDetection, PlanDetector, PlanarPose, Uncertainty,
+pub use network_calibration::NetworkCalibration;
+pub use plan_view::{
+    CameraOverTable, Circumstances, ErrorLength, PlanViewDetection, PlanViewDetector, PlanarPose, Uncertainty,
     check_region_from_above, pictures_from_above, seen_from_above,
 };
 pub use pose::{GraspPlane, GraspPose};

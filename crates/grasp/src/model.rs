@@ -12,7 +12,6 @@ use burn::tensor::{Device, read_sync};
 use image::RgbImage;
 use sdg_geometry::Slant;
 
-use crate::calibrations::Calibrations;
 use crate::check_config::CheckConfig;
 use crate::detection::{Found, GraspDetection, Placement};
 use crate::error::{GraspError, Result};
@@ -20,6 +19,7 @@ use crate::facts::{ModelKind, TeachingFacts};
 use crate::models::{Network, PoseCandidate, Proposals};
 use crate::region::SearchRegion;
 use crate::same_part::{SAME_PART_IOU, are_outlines_of_same_part};
+use crate::score_calibration::ScoreCalibration;
 use crate::search_window::{SearchWindow, check_region};
 use crate::sighting::{Sighting, sightings};
 use crate::slanted::{LevelImage, explains_more, suggested_slant};
@@ -37,7 +37,7 @@ pub struct GraspModel {
     /// `None` for model S.
     pub(crate) network: Option<Network>,
     pub(crate) demonstrations: Vec<TaughtDemonstration>,
-    pub(crate) calibrations: Calibrations,
+    pub(crate) score_calibration: ScoreCalibration,
     pub(crate) facts: TeachingFacts,
 }
 
@@ -266,7 +266,7 @@ impl GraspModel {
 
     fn unverified(&self, candidate: &PoseCandidate) -> GraspDetection {
         GraspDetection {
-            score: self.calibrations.network.apply(candidate.network_score),
+            score: self.score_calibration.network.apply(candidate.network_score),
             network_score: candidate.network_score,
             agreement: None,
             evidence: None,
@@ -297,8 +297,8 @@ impl GraspModel {
     /// What the verdict is to know of a place.
     pub(crate) fn clues(&self, sighting: &Sighting<'_>) -> Clues {
         let PlacedDemonstration { evidence, log_size, .. } = sighting.placed;
-        let network = self.calibrations.log_likelihood_ratio(sighting.network_score);
-        Clues { evidence, log_size, network, resemblance: self.calibrations.resemblance }
+        let network = self.score_calibration.log_likelihood_ratio(sighting.network_score);
+        Clues { evidence, log_size, network, resemblance: self.score_calibration.resemblance }
     }
 
     /// The scores of all places in one picture of a sequence in which parts had that size before, as [`Clues::log_size`].

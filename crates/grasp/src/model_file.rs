@@ -111,7 +111,7 @@ impl GraspModel {
                 put("comparison", to_json(comparison.config()));
             }
         }
-        put("calibration", to_json(&self.calibrations));
+        put("calibration", to_json(&self.score_calibration));
         put("demonstrations", to_json(&marks));
         Ok(safetensors_file::write(&metadata, &tensors))
     }
@@ -160,7 +160,7 @@ impl GraspModel {
 
         let model = Self {
             preset: metadata.text("preset")?.to_owned(),
-            calibrations: metadata.json("calibration")?,
+            score_calibration: metadata.json("calibration")?,
             facts,
             network: read_network(kind, &metadata, &file, &demonstrations, device)?,
             demonstrations,
@@ -329,9 +329,9 @@ pub fn summarize(bytes: &[u8]) -> Result<ModelSummary> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calibration::Calibration;
-    use crate::calibrations::Calibrations;
+    use crate::network_calibration::NetworkCalibration;
     use crate::region::SearchRegion;
+    use crate::score_calibration::ScoreCalibration;
     use image::{Rgb, RgbImage};
     use nalgebra::Point2;
     use sdg_detection::presets::edge_of;
@@ -370,7 +370,11 @@ mod tests {
             preset: "edge".to_owned(),
             network,
             demonstrations,
-            calibrations: Calibrations { network: Calibration::NEUTRAL, evidence: None, resemblance: 0.3 },
+            score_calibration: ScoreCalibration {
+                network: NetworkCalibration::NEUTRAL,
+                evidence: None,
+                resemblance: 0.3,
+            },
             facts: TeachingFacts {
                 seed: 3,
                 symmetry: RotationalSymmetry::None,

@@ -11,7 +11,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::calibration::{Calibration, log_odds};
+use crate::network_calibration::{NetworkCalibration, log_odds};
 
 /// A score this far below the threshold, in log-odds, does not speak against the part: by so much pictures score lower than
 /// held-back samples (the housing's right places 3.7 in the median, and 5.5; docs/decisions/013-base-weights.md).
@@ -31,7 +31,7 @@ pub(crate) struct NetworkEvidence {
 impl NetworkEvidence {
     /// From the network's scores on the part and on other things, 0 where it proposes nothing.
     #[cfg(any(feature = "teach", test))]
-    pub(crate) fn new(on_part: &[f64], elsewhere: &[f64], calibration: &Calibration) -> Self {
+    pub(crate) fn new(on_part: &[f64], elsewhere: &[f64], calibration: &NetworkCalibration) -> Self {
         let mut evidence = Self { margin: PICTURES_SCORE_LOWER_BY, ..Self::default() };
         for &score in on_part {
             evidence.on_part[evidence.class(score, calibration)] += 1;
@@ -43,7 +43,7 @@ impl NetworkEvidence {
     }
 
     /// The network's output at a place: nothing, something, or something not far below its threshold at least.
-    fn class(&self, score: f64, calibration: &Calibration) -> usize {
+    fn class(&self, score: f64, calibration: &NetworkCalibration) -> usize {
         match score {
             0.0 => 0,
             score if log_odds(score) < log_odds(calibration.threshold) - self.margin => 1,
@@ -52,7 +52,7 @@ impl NetworkEvidence {
     }
 
     /// ln of how much likelier such a score is on the part than elsewhere. Every class counts as seen once more than it was.
-    pub(crate) fn log_likelihood_ratio(&self, score: f64, calibration: &Calibration) -> f64 {
+    pub(crate) fn log_likelihood_ratio(&self, score: f64, calibration: &NetworkCalibration) -> f64 {
         let class = self.class(score, calibration);
         let share = |counts: &[u32; 3]| f64::from(counts[class] + 1) / f64::from(counts.iter().sum::<u32>() + 3);
         (share(&self.on_part) / share(&self.elsewhere)).ln()
@@ -63,7 +63,7 @@ impl NetworkEvidence {
 mod tests {
     use super::*;
 
-    const CALIBRATION: Calibration = Calibration { threshold: 0.8, slope: 10.0 };
+    const CALIBRATION: NetworkCalibration = NetworkCalibration { threshold: 0.8, slope: 10.0 };
 
     #[test]
     fn a_network_that_tells_the_part_counts_and_one_that_does_not_says_nothing() {

@@ -6,10 +6,10 @@ use sdg_training::Outcome;
 
 use super::side_by_side::side_by_side;
 use super::symmetry::HiddenTurns;
-use crate::calibration::Calibration;
 use crate::error::Result;
 use crate::facts::TurnSource;
 use crate::models::{Network, Proposals};
+use crate::network_calibration::NetworkCalibration;
 use crate::sighting::{Sighting, best_agreement, sightings, sightings_to_first};
 use crate::taught::TaughtDemonstration;
 use crate::verification::SearchedImage;
@@ -23,7 +23,7 @@ pub(super) struct HeldBack<'a> {
 /// Where the network's score is cut, and the median errors after verification, in pixels of the demonstration and degrees:
 /// infinite where nothing was found.
 pub(super) struct Calibrated {
-    pub(super) network: Calibration,
+    pub(super) network: NetworkCalibration,
     /// Samples with the part, and of those the ones in which a proposal of the network led the demonstration to it.
     pub(super) positives: usize,
     pub(super) hits: usize,
@@ -92,8 +92,8 @@ impl HeldBack<'_> {
         Ok(Calibrated {
             positives: self.samples.iter().filter(|sample| !sample.objects.is_empty()).count(),
             hits: right_scores.len(),
-            network: Calibration::fit(&right_scores, &wrong_scores, NO_WRONG, usual_threshold)
-                .unwrap_or(Calibration::NEUTRAL),
+            network: NetworkCalibration::fit(&right_scores, &wrong_scores, NO_WRONG, usual_threshold)
+                .unwrap_or(NetworkCalibration::NEUTRAL),
             on_part,
             elsewhere,
             error_px: median(errors().map(|[px, _]| *px)).unwrap_or(f64::INFINITY),

@@ -40,15 +40,15 @@ use sdg_geometry::GraspLine;
 use sdg_layers::state_dict;
 use sdg_training::{History, SampleSource, Trained, TrainingError, ValidationRecord, first_windows, train};
 
-use crate::calibration::Calibration;
-use crate::calibrations::Calibrations;
 use crate::decimal::decimal;
 use crate::error::{GraspError, Result};
 use crate::facts::{ModelKind, TeachingFacts, ValidationFacts};
 use crate::model::GraspModel;
 use crate::models::mask::MaskMatcher;
 use crate::models::{Network, Proposals, Reading};
+use crate::network_calibration::NetworkCalibration;
 use crate::network_evidence::NetworkEvidence;
+use crate::score_calibration::ScoreCalibration;
 use crate::search_window::check_region;
 use crate::taught::TaughtDemonstration;
 
@@ -176,7 +176,7 @@ fn without_network(demonstrations: &[Demonstration], options: &TeachOptions, sta
         preset: options.preset.name().to_owned(),
         network: None,
         demonstrations,
-        calibrations: Calibrations { network: Calibration::NEUTRAL, evidence: None, resemblance },
+        score_calibration: ScoreCalibration { network: NetworkCalibration::NEUTRAL, evidence: None, resemblance },
         facts: TeachingFacts {
             seed: options.seed,
             symmetry: options.symmetry,
@@ -323,7 +323,7 @@ pub(crate) fn teach_network(
         preset: options.preset.name().to_owned(),
         network: Some(network),
         demonstrations: taught,
-        calibrations: Calibrations {
+        score_calibration: ScoreCalibration {
             network: calibrated.network,
             evidence: Some(evidence),
             resemblance: others.resemblance(),

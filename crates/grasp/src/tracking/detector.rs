@@ -10,7 +10,7 @@ use sdg_shape::PixelRect;
 use crate::detection::{Found, GraspDetection};
 use crate::error::Result;
 use crate::model::{GraspModel, Verification};
-use crate::plan::{PlanDetector, PlanarPose};
+use crate::plan_view::{PlanViewDetector, PlanarPose};
 use crate::region::SearchRegion;
 
 /// A model, and the plan view that it works in where the camera is calibrated.
@@ -19,7 +19,7 @@ pub enum PartDetector {
     /// Poses in pixels alone.
     Picture(Box<GraspModel>),
     /// Poses in metres, too.
-    Plan(Box<PlanDetector>),
+    PlanView(Box<PlanViewDetector>),
 }
 
 impl From<GraspModel> for PartDetector {
@@ -28,9 +28,9 @@ impl From<GraspModel> for PartDetector {
     }
 }
 
-impl From<PlanDetector> for PartDetector {
-    fn from(detector: PlanDetector) -> Self {
-        Self::Plan(Box::new(detector))
+impl From<PlanViewDetector> for PartDetector {
+    fn from(detector: PlanViewDetector) -> Self {
+        Self::PlanView(Box::new(detector))
     }
 }
 
@@ -38,7 +38,7 @@ impl PartDetector {
     pub(super) fn model(&self) -> &GraspModel {
         match self {
             Self::Picture(model) => model,
-            Self::Plan(detector) => detector.model(),
+            Self::PlanView(detector) => detector.model(),
         }
     }
 
@@ -46,7 +46,7 @@ impl PartDetector {
     pub(super) fn frame_size(&self, picture: &RgbImage) -> [u32; 2] {
         match self {
             Self::Picture(_) => [picture.width(), picture.height()],
-            Self::Plan(detector) => detector.view_size(),
+            Self::PlanView(detector) => detector.view_size(),
         }
     }
 
@@ -57,7 +57,7 @@ impl PartDetector {
                 let PixelRect { left, top, width, height } = *rect;
                 imageops::crop_imm(picture, left, top, width, height).to_image()
             }
-            Self::Plan(detector) => detector.window_of(picture, rect),
+            Self::PlanView(detector) => detector.window_of(picture, rect),
         }
     }
 
@@ -65,7 +65,7 @@ impl PartDetector {
     fn find(&self, picture: &RgbImage) -> Result<Vec<Found>> {
         match self {
             Self::Picture(model) => read_sync(model.find_async(picture, Verification::ByShape)),
-            Self::Plan(detector) => detector.find(picture, Verification::ByShape),
+            Self::PlanView(detector) => detector.find(picture, Verification::ByShape),
         }
     }
 
@@ -73,7 +73,7 @@ impl PartDetector {
     pub(super) fn region(&self) -> Option<&SearchRegion> {
         match self {
             Self::Picture(model) => model.region(),
-            Self::Plan(detector) => detector.region(),
+            Self::PlanView(detector) => detector.region(),
         }
     }
 
@@ -81,7 +81,7 @@ impl PartDetector {
     pub(super) fn output(&self, detection: GraspDetection) -> Option<(GraspDetection, Option<PlanarPose>)> {
         match self {
             Self::Picture(_) => Some((detection, None)),
-            Self::Plan(detector) => {
+            Self::PlanView(detector) => {
                 let placed = detector.placed(detection)?;
                 Some((placed.detection, Some(placed.pose)))
             }

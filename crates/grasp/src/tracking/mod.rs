@@ -33,7 +33,7 @@ use std::time::Duration;
 pub use self::detector::{PartDetector, PartSearch, SearchOutcome};
 pub use self::tracker::Tracker;
 use crate::detection::GraspDetection;
-use crate::plan::PlanarPose;
+use crate::plan_view::PlanarPose;
 
 /// Whether a part is where its track says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

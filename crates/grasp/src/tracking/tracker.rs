@@ -17,7 +17,7 @@ use super::{TrackState, TrackedPart, TrackerConfig};
 use crate::detection::{Found, GraspDetection};
 use crate::error::Result;
 use crate::model::are_of_same_part;
-use crate::plan::PlanarPose;
+use crate::plan_view::PlanarPose;
 use crate::verdict::Clues;
 use sdg_shape::PixelRect;
 

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! shipped photo and its camera ─ plan view ─ teach ┐
-//! three other cameras ┐                            ├─ PlanDetector ─ error in mm and degrees, and the error that it expects
+//! three other cameras ┐                            ├─ PlanViewDetector ─ error in mm and degrees, and the error that it expects
 //! the axes' pictures  ├─ picture and its camera ───┘
 //! parts of other sizes┘
 //! ```

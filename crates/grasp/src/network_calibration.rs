@@ -15,7 +15,7 @@ use crate::decimal::decimal;
 
 /// Maps a raw score to (0, 1) so that `threshold` becomes 0.5.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Calibration {
+pub struct NetworkCalibration {
     /// The raw score that becomes 0.5.
     pub threshold: f64,
     /// Steepness: the logistic's slope, per unit of the raw score's log-odds.
@@ -48,7 +48,7 @@ fn probability(log_odds: f64) -> f64 {
     1.0 / (1.0 + (-log_odds).exp())
 }
 
-impl Calibration {
+impl NetworkCalibration {
     /// Leaves a score where it is.
     pub const NEUTRAL: Self = Self { threshold: 0.5, slope: 1.0 };
 
@@ -96,9 +96,9 @@ mod tests {
     #[test]
     fn neutral_leaves_a_score_and_the_threshold_becomes_a_half() {
         for raw in [0.01, 0.3, 0.5, 0.97] {
-            assert!((Calibration::NEUTRAL.apply(raw) - raw).abs() < 1e-12);
+            assert!((NetworkCalibration::NEUTRAL.apply(raw) - raw).abs() < 1e-12);
         }
-        let calibration = Calibration { threshold: 0.83, slope: 2.0 };
+        let calibration = NetworkCalibration { threshold: 0.83, slope: 2.0 };
         assert!((calibration.apply(0.83) - 0.5).abs() < 1e-12);
         let scores: Vec<f64> = (0..=10).map(|i| calibration.apply(f64::from(i) / 10.0)).collect();
         assert!(scores.windows(2).all(|pair| pair[0] < pair[1]), "{scores:?}");
@@ -113,7 +113,7 @@ mod tests {
     fn the_threshold_lies_nearer_to_the_scores_that_are_spread_less() {
         let right = scores(&[2.4, 2.6, 2.8, 3.0, 3.2, 3.4, 3.6]);
         let wrong = scores(&[-9.0, -8.0, -3.0, -1.0, 0.0, 0.5, 1.0]);
-        let calibration = Calibration::fit(&right, &wrong, 0.0, None).unwrap();
+        let calibration = NetworkCalibration::fit(&right, &wrong, 0.0, None).unwrap();
         let threshold = log_odds(calibration.threshold);
         assert!((1.0..2.4).contains(&threshold), "{threshold}");
         assert!(3.0 - threshold < threshold + 1.0);
@@ -125,7 +125,7 @@ mod tests {
     fn one_odd_picture_of_many_moves_it_little() {
         let mut right: Vec<f64> = (0..30).map(|i| probability(2.0 + f64::from(i) / 30.0)).collect();
         let wrong: Vec<f64> = (0..30).map(|i| probability(-3.0 + f64::from(i) / 10.0)).collect();
-        let threshold = |right: &[f64]| log_odds(Calibration::fit(right, &wrong, 0.0, None).unwrap().threshold);
+        let threshold = |right: &[f64]| log_odds(NetworkCalibration::fit(right, &wrong, 0.0, None).unwrap().threshold);
         let before = threshold(&right);
         right[0] = probability(-5.0);
         assert!((threshold(&right) - before).abs() < 0.1);
@@ -134,16 +134,16 @@ mod tests {
     #[test]
     fn the_threshold_is_not_below_the_usual_one_and_half_way_to_it_from_above() {
         let (right, wrong) = (scores(&[4.0, 5.0, 6.0]), scores(&[0.0, 1.0, 2.0]));
-        let threshold = |usual| log_odds(Calibration::fit(&right, &wrong, 0.0, usual).unwrap().threshold);
+        let threshold = |usual| log_odds(NetworkCalibration::fit(&right, &wrong, 0.0, usual).unwrap().threshold);
         assert!((threshold(Some(1.0)) - 0.5 * (threshold(None) + 1.0)).abs() < 1e-3);
         assert!((threshold(Some(4.5)) - 4.5).abs() < 1e-3);
     }
 
     #[test]
     fn nothing_right_is_no_calibration_and_nothing_wrong_is_one() {
-        assert_eq!(Calibration::fit(&[], &[0.3], 0.1, None), None);
-        assert_eq!(Calibration::fit(&[f64::NAN], &[], 0.1, None), None);
-        let calibration = Calibration::fit(&[0.9, 0.92, 0.95], &[], 0.1, None).unwrap();
+        assert_eq!(NetworkCalibration::fit(&[], &[0.3], 0.1, None), None);
+        assert_eq!(NetworkCalibration::fit(&[f64::NAN], &[], 0.1, None), None);
+        let calibration = NetworkCalibration::fit(&[0.9, 0.92, 0.95], &[], 0.1, None).unwrap();
         assert!(calibration.apply(0.9) > 0.8 && calibration.apply(0.1) < 0.2, "{calibration:?}");
     }
 }

@@ -67,7 +67,7 @@ impl PlanarPose {
 
 /// A grasp in the picture's pixels and in metres.
 #[derive(Debug, Clone, PartialEq)]
-pub struct PlanDetection {
+pub struct PlanViewDetection {
     /// In pixels of the picture as given.
     pub detection: GraspDetection,
     /// In the camera's world.
@@ -79,7 +79,7 @@ const MAX_PLAN_PIXELS: u64 = 6_000_000;
 
 /// A model that looks through a camera.
 #[derive(Debug, Clone)]
-pub struct PlanDetector {
+pub struct PlanViewDetector {
     model: GraspModel,
     over_table: CameraOverTable,
     lengths: Lengths,
@@ -90,7 +90,7 @@ pub struct PlanDetector {
     sizes: Option<RangeInclusive<f64>>,
 }
 
-impl PlanDetector {
+impl PlanViewDetector {
     /// Makes everything ready that is the same in every picture of the camera.
     ///
     /// # Errors
@@ -177,7 +177,7 @@ impl PlanDetector {
     ///
     /// # Errors
     /// As there.
-    pub fn detect(&self, picture: &RgbImage, verification: Verification) -> Result<Vec<PlanDetection>> {
+    pub fn detect(&self, picture: &RgbImage, verification: Verification) -> Result<Vec<PlanViewDetection>> {
         let found = self.find(picture, verification)?;
         Ok(found.into_iter().filter_map(|found| self.placed(found.detection)).collect())
     }
@@ -213,7 +213,7 @@ impl PlanDetector {
     }
 
     /// `None` where the camera does not show it.
-    pub(crate) fn placed(&self, detection: GraspDetection) -> Option<PlanDetection> {
+    pub(crate) fn placed(&self, detection: GraspDetection) -> Option<PlanViewDetection> {
         let grasp = detection.grasp;
         let center = grasp.center();
         let seen = self.view.in_picture(&self.over_table.camera, &center)?;
@@ -228,7 +228,7 @@ impl PlanDetector {
             uncertainty: circumstances.uncertainty(),
             circumstances,
         };
-        Some(PlanDetection { detection: self.in_picture(detection)?, pose })
+        Some(PlanViewDetection { detection: self.in_picture(detection)?, pose })
     }
 
     /// What the errors of a detection in the plan view depend on, whose grasp is at `on_plane` in the world and at `seen` in the
