@@ -8,13 +8,13 @@ use sdg_grasp::{GraspError, GraspPlane, GraspPose};
 use sdg_report::DetectionError;
 use sdg_simulation::objects::{LARGEST_JAW_WIDTH_M, ObjectSpec};
 
-/// Where a grasp in a camera's picture leads the hand: through the camera onto the height of the part's marks, which no
-/// photo shows.
+/// Where a grasp in a camera's picture leads the hand: through the camera onto the surface that it shows at the marks, whose
+/// height no photo tells.
 ///
 /// # Errors
 /// A ray that misses that height, or a part wider than the hand opens.
 pub fn grasp_pose(object: &ObjectSpec, camera: &PosedCamera, grasp: &PlanarGrasp) -> Result<GraspPose, GraspError> {
-    let plane = GraspPlane { mark_height_m: object.mark_height_m, grasp_height_m: object.grasp_height_m };
+    let plane = GraspPlane { mark_height_m: object.seen_height_m, grasp_height_m: object.grasp_height_m };
     GraspPose::from_planar(camera, grasp, &plane, LARGEST_JAW_WIDTH_M)
 }
 

@@ -2,11 +2,12 @@
 //!
 //! The outline of a screw that lies on its side is seen at the height of its axis, its marks on its upper side: higher by the part's
 //! own radius there. How far a camera sees them shifted follows from that; what surrounds them looks different in every roll and tells
-//! nothing.
+//! nothing. Where the part lies in the same roll, edges on its upper side agree, too, and hold its pose higher than the outline; the
+//! outline alone tells how much.
 
-use nalgebra::Point2;
+use nalgebra::{Point2, Vector2};
 use sdg_geometry::PlanarSimilarity;
-use sdg_shape::Revolution;
+use sdg_shape::{GradientField, Revolution, ShapeSearch};
 
 use crate::taught_marks::TaughtMarks;
 
@@ -26,19 +27,29 @@ impl RoundTop {
         Self { rise, photo_middle: marks.photo_middle.map_or(marks.grasp.center(), Point2::from) }
     }
 
-    /// `image_from_cutout` shifted to where the camera sees the marks.
+    /// How far from the outline the camera sees the marks.
     ///
     /// # Units and frames
     /// Pixels of the picture, the focal length too; `below_camera` is the point of the table straight below the camera.
+    fn shift(&self, focal_px: f64, below_camera: Point2<f64>, image_from_cutout: &PlanarSimilarity) -> Vector2<f64> {
+        let nearer = self.rise * image_from_cutout.scale / focal_px;
+        nearer * (image_from_cutout.apply(&self.photo_middle) - below_camera)
+    }
+
+    /// `image_from_cutout`, which all edges agree on, shifted to where the camera sees the marks.
+    ///
+    /// # Units and frames
+    /// As for [`RoundTop::shift`]; `field` is of the picture.
     pub(crate) fn placed(
         &self,
-        focal_px: f64,
-        below_camera: Point2<f64>,
+        search: &ShapeSearch,
+        field: &GradientField,
+        (focal_px, below_camera): (f64, Point2<f64>),
         image_from_cutout: &PlanarSimilarity,
     ) -> PlanarSimilarity {
-        let nearer = self.rise * image_from_cutout.scale / focal_px;
-        let shift = nearer * (image_from_cutout.apply(&self.photo_middle) - below_camera);
-        image_from_cutout.shifted(shift)
+        let shift = self.shift(focal_px, below_camera, image_from_cutout);
+        let outline = search.outline_beside(field, image_from_cutout, -shift);
+        image_from_cutout.shifted((1.0 - outline) * shift)
     }
 }
 
@@ -52,8 +63,7 @@ mod tests {
         let top = RoundTop { rise: 12.0, photo_middle: Point2::new(40.0, 10.0) };
         let pose = PlanarSimilarity { tx: 460.0, ty: 90.0, scale: 1.25, ..PlanarSimilarity::IDENTITY };
         let at = pose.apply(&Point2::new(40.0, 10.0));
-        let marks = top.placed(600.0, Point2::new(320.0, 240.0), &pose);
-        let shift = marks.apply(&Point2::new(40.0, 10.0)) - at;
+        let shift = top.shift(600.0, Point2::new(320.0, 240.0), &pose);
         // 15 px of 600 px, of the distance from below the camera.
         let expected = 0.025 * (at - Point2::new(320.0, 240.0));
         assert!((shift - expected).norm() < 1e-9, "{shift}");

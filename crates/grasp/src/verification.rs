@@ -208,14 +208,13 @@ impl<'a> SizedDemonstration<'a> {
         let is_flat = self.demonstration.check().score.is_size_known || agreement < MIN_MARKED;
         let marks_shift = self.prepared.marks_shift.as_ref().filter(|_| !is_flat);
         let round_top = self.prepared.round_top.as_ref().filter(|_| !is_flat);
-        let marks = match (round_top, marks_shift) {
-            (Some(top), _) => top.placed(view.focal_px, view.below_camera, view_from_working),
-            (None, Some(shift)) => shift.placed(&view.picture(), view.below_camera, view_from_working),
-            (None, None) => *view_from_working,
-        };
-        let (agreement, evidence) = match marks_shift.filter(|_| marks != *view_from_working) {
-            Some(shift) => self.raised(view, shift, view_from_working, &marks, (agreement, evidence)),
-            None => (agreement, evidence),
+        let camera = (view.focal_px, view.below_camera);
+        let (marks, agreement, evidence) = if let Some(top) = round_top {
+            let marks = top.placed(&self.prepared.search, &view.field, camera, view_from_working);
+            (marks, agreement, evidence)
+        } else {
+            let raised = marks_shift.and_then(|shift| self.raised(view, shift, view_from_working, agreement));
+            raised.unwrap_or((*view_from_working, agreement, evidence))
         };
         PlacedDemonstration {
             demonstration: self.demonstration,
@@ -232,27 +231,30 @@ impl<'a> SizedDemonstration<'a> {
 }
 
 impl SizedDemonstration<'_> {
-    /// Agreement and evidence of a part whose marks stand higher or lower than its outline, were they not; those of the flat part
-    /// where they agree better.
+    /// The pose of marks that stand higher or lower than the outline, and the agreement and evidence of the part as if they did not;
+    /// `None` where they stand in its plane, or the part would then agree less: something else drew them away.
     fn raised(
         &self,
         view: &View<'_>,
         shift: &MarksShift,
         view_from_working: &PlanarSimilarity,
-        view_from_marks: &PlanarSimilarity,
-        flat: (f64, Evidence),
-    ) -> (f64, Evidence) {
+        flat_agreement: f64,
+    ) -> Option<(PlanarSimilarity, f64, Evidence)> {
+        let marks = shift.placed(&view.picture(), view.below_camera, view_from_working);
+        if marks == *view_from_working {
+            return None;
+        }
         let search = &self.prepared.search;
         let coarsest_pixel = search.template().coarsest_pixel(view_from_working.scale);
         let outline = self.demonstration.outline(&scaling(self.working.cutout_scale));
         let outline = outline.transformed(view_from_working);
         let Straightened { image, corner: [left, top] } =
-            shift.straightened(&view.image, &outline, view_from_working, view_from_marks, coarsest_pixel);
+            shift.straightened(&view.image, &outline, view_from_working, &marks, coarsest_pixel);
         let field = GradientField::with_config(&image, &self.demonstration.check().search.shape.gradient);
         let comparison = search.comparison(&Picture { image: &image, field: &field, table: &view.table });
         let pose = view_from_working.shifted(-Vector2::new(f64::from(left), f64::from(top)));
         let agreement = comparison.agreement(&pose).both();
-        if agreement > flat.0 { (agreement, comparison.evidence(&pose)) } else { flat }
+        (agreement >= flat_agreement).then(|| (marks, agreement, comparison.evidence(&pose)))
     }
 }
 

@@ -21,6 +21,8 @@ const SHIFT: f64 = 0.03;
 /// How far it then moves, and what it must gain in agreement.
 const REACH: Reach = Reach { shift_px: 4.0, turn_rad: 0.06, log_scale: 0.03 };
 const MIN_GAIN: f64 = 0.05;
+/// Into how many steps a shift is divided. Chosen by hand: the largest are of nine pixels.
+const SHARES: usize = 8;
 
 /// The edges along the outline of a part of revolution.
 #[derive(Debug, Clone)]
@@ -43,6 +45,22 @@ impl Profile {
     /// How well the edges along the outline agree at a pose, in `[0, 1]`.
     pub(crate) fn agreement(&self, field: &GradientField, pose: &PlanarSimilarity) -> f64 {
         self.template.agreement(field, pose)
+    }
+
+    /// The share of `shift`, in `[0, 1]`, by which the pose moves so that the profile agrees best.
+    pub(crate) fn share_of(&self, field: &GradientField, pose: &PlanarSimilarity, shift: Vector2<f64>) -> f64 {
+        let share = |k: usize| k as f64 / SHARES as f64;
+        let agreements: Vec<f64> =
+            (0..=SHARES).map(|k| self.agreement(field, &pose.shifted(share(k) * shift))).collect();
+        let best = (0..=SHARES).rev().max_by(|a, b| agreements[*a].total_cmp(&agreements[*b])).unwrap_or(0);
+        if best == 0 || best == SHARES {
+            return share(best);
+        }
+        // The top of the parabola through the best and those beside it.
+        let [before, top, after] = [best - 1, best, best + 1].map(|k| agreements[k]);
+        let curvature = before - 2.0 * top + after;
+        let offset = if curvature < 0.0 { 0.5 * (before - after) / curvature } else { 0.0 };
+        share(best) + offset / SHARES as f64
     }
 
     /// `pose`, or one along the axis or the other way round at which the profile agrees better. Scales stay in `scales`.
@@ -118,6 +136,21 @@ mod tests {
             let off = (placed.apply(&middle) - middle).norm();
             assert!(off < 1.5 && placed.angle.radians().abs() < 0.05, "{start:?} → {placed:?}");
         }
+    }
+
+    #[test]
+    fn the_share_of_a_shift_is_told_by_the_outline() {
+        let (photo, outline) = screw(0.0);
+        let profile = Profile::of(&photo, &outline, &ShapeConfig::DEFAULT).unwrap();
+        let field = GradientField::new(&photo);
+        let shift = Vector2::new(-2.0, 6.0);
+        for share in [0.0, 0.3, 0.6, 1.0] {
+            let pose = PlanarSimilarity::IDENTITY.shifted(-share * shift);
+            let found = profile.share_of(&field, &pose, shift);
+            assert!((found - share).abs() < 0.08, "{share}: {found}");
+        }
+        // Away from the outline and back again is no share.
+        assert_eq!(profile.share_of(&field, &PlanarSimilarity::IDENTITY.shifted(shift), shift), 0.0);
     }
 
     #[test]

@@ -45,6 +45,8 @@ fn try_picture(page: &Page, name: &str, picture: &RgbImage) {
     page.click("#tab-try");
     page.browser.find("#picture-input").unwrap().type_text(path.to_str().unwrap()).unwrap();
     page.wait_for(name, &format!("return document.getElementById('photo').alt === 'Photo {name}'"));
+    // The answer to the picture before stays until the next frame.
+    page.settle_frames();
     patiently(
         page,
         "an answer",

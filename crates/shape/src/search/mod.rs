@@ -19,7 +19,7 @@ mod sweep;
 use std::ops::RangeInclusive;
 
 use image::RgbImage;
-use nalgebra::Point2;
+use nalgebra::{Point2, Vector2};
 use sdg_geometry::{PlanarSimilarity, Polygon};
 
 use crate::capture_range::CaptureRange;
@@ -321,6 +321,15 @@ impl ShapeSearch {
     /// The axis of a part of revolution; `None` for any other part.
     pub fn revolution(&self) -> Option<&Revolution> {
         self.profile.as_ref().map(|profile| &profile.revolution)
+    }
+
+    /// By which share of `shift`, in `[0, 1]`, the outline of a part of revolution lies beside the pose that all edges agree on; 0 for
+    /// any other part. Edges on its upper side, higher than its outline, hold the pose there.
+    ///
+    /// # Units and frames
+    /// `shift` is in pixels of the picture that `field` is of.
+    pub fn outline_beside(&self, field: &GradientField, pose: &PlanarSimilarity, shift: Vector2<f64>) -> f64 {
+        self.profile.as_ref().map_or(0.0, |profile| profile.share_of(field, pose, shift))
     }
 
     /// The demonstration over an image.

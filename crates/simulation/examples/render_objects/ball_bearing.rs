@@ -105,6 +105,7 @@ pub fn ball_bearing() -> Part {
         jaw_width: 2.0 * OUTER_RADIUS,
         grasp_height: 0.008,
         mark_height: WIDTH,
+        seen_height: WIDTH,
         friction: 0.5,
         symmetry: RotationalSymmetry::Full,
     }

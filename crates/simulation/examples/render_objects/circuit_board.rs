@@ -150,6 +150,7 @@ pub fn circuit_board() -> Part {
         jaw_width: WIDTH,
         grasp_height: 0.0095,
         mark_height: TOP,
+        seen_height: TOP,
         friction: 0.6,
         symmetry: RotationalSymmetry::None,
     }

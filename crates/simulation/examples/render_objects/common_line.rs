@@ -141,6 +141,7 @@ pub fn common_line() -> Part {
         jaw_width: 2.0 * RADIUS,
         grasp_height: 0.0115,
         mark_height: AXIS,
+        seen_height: AXIS + RADIUS,
         friction: 0.5,
         symmetry: RotationalSymmetry::None,
     }

@@ -80,6 +80,7 @@ pub fn cranfield_face() -> Part {
         jaw_width: 2.0 * NECK,
         grasp_height: 0.008,
         mark_height: THICKNESS,
+        seen_height: THICKNESS,
         friction: 0.6,
         symmetry: RotationalSymmetry::None,
     }

@@ -114,6 +114,7 @@ pub fn fuel_line() -> Part {
         jaw_width: 2.0 * tube_radius,
         grasp_height: 0.0085,
         mark_height: height,
+        seen_height: height + tube_radius,
         friction: 0.6,
         symmetry: RotationalSymmetry::None,
     }

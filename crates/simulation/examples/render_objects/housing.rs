@@ -202,6 +202,7 @@ pub fn housing() -> Part {
         jaw_width: 2.0 * HALF_WIDTH,
         grasp_height: 0.015,
         mark_height: HEIGHT,
+        seen_height: HEIGHT,
         friction: 0.5,
         symmetry: RotationalSymmetry::None,
     }

@@ -101,6 +101,7 @@ pub fn key() -> Part {
         jaw_width: 2.0 * BOW_HALF_WIDTH,
         grasp_height: 0.0062,
         mark_height: BOW_HEIGHT - 0.0008,
+        seen_height: BOW_HEIGHT - 0.0008,
         friction: 0.6,
         symmetry: RotationalSymmetry::None,
     }

@@ -49,6 +49,8 @@ pub struct Part {
     pub jaw_width: f64,
     pub grasp_height: f64,
     pub mark_height: f64,
+    /// The highest at the marks, where it is above them.
+    pub seen_height: f64,
     pub friction: f64,
     pub symmetry: RotationalSymmetry,
 }
@@ -186,6 +188,7 @@ pub fn write_part(folder: &Path, part: &Part) -> std::io::Result<()> {
         "jaw_width_m": part.jaw_width,
         "grasp_height_m": part.grasp_height,
         "mark_height_m": part.mark_height,
+        "seen_height_m": round(part.seen_height),
         "rest_height_m": 0.0,
         "symmetry": part.symmetry,
         "footprint": footprint,

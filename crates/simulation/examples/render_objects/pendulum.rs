@@ -76,6 +76,7 @@ pub fn pendulum() -> Part {
         jaw_width: arm_width,
         grasp_height: 0.009,
         mark_height: 0.016,
+        seen_height: 0.016,
         friction: 0.6,
         symmetry: RotationalSymmetry::None,
     }

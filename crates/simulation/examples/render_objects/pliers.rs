@@ -119,6 +119,7 @@ pub fn pliers() -> Part {
         jaw_width: 2.0 * JOINT_HALF_WIDTH,
         grasp_height: 0.0065,
         mark_height: THICKNESS - 0.0005,
+        seen_height: THICKNESS - 0.0005,
         friction: 0.5,
         symmetry: RotationalSymmetry::None,
     }

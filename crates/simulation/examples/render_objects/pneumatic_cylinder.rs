@@ -155,6 +155,7 @@ pub fn pneumatic_cylinder() -> Part {
         jaw_width: 2.0 * (TIE + TIE_RADIUS),
         grasp_height: 0.014,
         mark_height: CAP + TIE,
+        seen_height: CAP + TUBE_RADIUS,
         friction: 0.5,
         symmetry: RotationalSymmetry::None,
     }

@@ -146,6 +146,7 @@ pub fn rod_end() -> Part {
         jaw_width: 2.0 * shank_radius,
         grasp_height: 0.012,
         mark_height: half_ball,
+        seen_height: half_ball + shank_radius,
         friction: 0.6,
         symmetry: RotationalSymmetry::None,
     }

@@ -126,6 +126,7 @@ pub fn spring_clip() -> Part {
         jaw_width: 2.0 * HALF_WIDTH,
         grasp_height: 0.0070,
         mark_height: leaf_height(0.0) + SHEET / 2.0,
+        seen_height: leaf_height(0.0) + SHEET / 2.0,
         friction: 0.6,
         symmetry: RotationalSymmetry::None,
     }

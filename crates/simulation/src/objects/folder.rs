@@ -28,6 +28,7 @@ impl ObjectSpec {
             "jaw_width_m": self.jaw_width_m,
             "grasp_height_m": self.grasp_height_m,
             "mark_height_m": self.mark_height_m,
+            "seen_height_m": self.seen_height_m,
             "rest_height_m": self.rest_height_m,
             "symmetry": self.symmetry,
             "footprint": footprint,

@@ -159,9 +159,13 @@ impl ObjectSpec {
         spec.mass_kg = rounded(spec.mass_kg * factor.powi(3));
         spec.grasp_start = spec.grasp_start.map(scaled);
         spec.grasp_end = spec.grasp_end.map(scaled);
-        for length in
-            [&mut spec.jaw_width_m, &mut spec.grasp_height_m, &mut spec.mark_height_m, &mut spec.rest_height_m]
-        {
+        for length in [
+            &mut spec.jaw_width_m,
+            &mut spec.grasp_height_m,
+            &mut spec.mark_height_m,
+            &mut spec.seen_height_m,
+            &mut spec.rest_height_m,
+        ] {
             *length = scaled(*length);
         }
         for corner in &mut spec.footprint {

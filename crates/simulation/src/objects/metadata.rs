@@ -26,6 +26,8 @@ pub(super) struct Metadata {
     pub(super) jaw_width_m: f64,
     pub(super) grasp_height_m: f64,
     pub(super) mark_height_m: f64,
+    /// As `mark_height_m` where it is missing.
+    pub(super) seen_height_m: Option<f64>,
     pub(super) rest_height_m: f64,
     pub(super) symmetry: RotationalSymmetry,
     pub(super) footprint: Vec<[f64; 2]>,
@@ -44,6 +46,7 @@ impl Metadata {
             ("jaw_width_m", self.jaw_width_m, 1e-3, LARGEST_JAW_WIDTH_M),
             ("grasp_height_m", self.grasp_height_m, 0.0, 0.5),
             ("mark_height_m", self.mark_height_m, 0.0, 0.5),
+            ("seen_height_m", self.seen_height_m.unwrap_or(self.mark_height_m), 0.0, 0.5),
             ("rest_height_m", self.rest_height_m, -0.5, 0.5),
         ];
         for (field, value, low, high) in ranges {

@@ -70,6 +70,8 @@ pub struct ObjectSpec {
     /// For a round bar this is the height of its axis, since its outline in a picture stays centred on the axis
     /// from wherever above it is seen.
     pub mark_height_m: f64,
+    /// Height over the table of the surface that a picture shows at the marks; above `mark_height_m` for a round bar.
+    pub seen_height_m: f64,
     /// Height of the object frame's origin over the table as the part rests.
     pub rest_height_m: f64,
     /// Which turns about z leave look and grasp of the part the same.
@@ -168,6 +170,7 @@ impl ObjectSpec {
             jaw_width_m: metadata.jaw_width_m,
             grasp_height_m: metadata.grasp_height_m,
             mark_height_m: metadata.mark_height_m,
+            seen_height_m: metadata.seen_height_m.unwrap_or(metadata.mark_height_m),
             rest_height_m: metadata.rest_height_m,
             symmetry: metadata.symmetry,
             footprint: metadata.footprint.into_iter().map(Point2::from).collect(),

@@ -146,6 +146,7 @@ impl ObjectSpec {
             jaw_width_m: extrusion.jaw_width_px * extrusion.metres_per_pixel,
             grasp_height_m: (0.5 * height_m).max(height_m - MAX_ABOVE_TCP_M).max(MIN_GRASP_HEIGHT_M),
             mark_height_m: height_m,
+            seen_height_m: height_m,
             rest_height_m: 0.0,
             symmetry,
             footprint: convex_hull(corners.iter().copied()),
