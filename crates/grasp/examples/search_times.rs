@@ -7,6 +7,7 @@ use std::time::Instant;
 
 use burn::tensor::Device;
 use sdg_demonstration::{ImageLimits, decode_image};
+use sdg_geometry::upper_median;
 use sdg_grasp::{GraspModel, SearchRegion, Verification};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -50,15 +51,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             found[k] = (detections.iter().filter(|d| d.is_accepted()).count(), detections.len());
         }
     }
-    let medians: Vec<f64> = times.into_iter().map(median).collect();
+    let middle = |times: Vec<f64>| upper_median(times).unwrap_or(f64::NAN);
+    let medians: Vec<f64> = times.into_iter().map(middle).collect();
     for ((path, image), (ms, (accepted, seen))) in paths.iter().zip(&images).zip(medians.iter().zip(&found)) {
         println!("{ms:8.1} ms  {}×{}  {accepted} accepted of {seen}  {path}", image.width(), image.height());
     }
-    println!("{:8.1} ms  median of {} pictures", median(medians.clone()), medians.len());
+    println!("{:8.1} ms  median of {} pictures", middle(medians.clone()), medians.len());
     Ok(())
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use nalgebra::{Point2, Vector2};
+use sdg_geometry::upper_median;
 
 use super::luminance::Luminance;
 use super::seen_corner::SeenCorner;
@@ -64,12 +65,7 @@ fn variation(picture: &Luminance, corners: &[SeenCorner]) -> Option<f64> {
         let beside = [[i + 1, j], [i, j + 1]].into_iter().filter_map(|other| rings.get(&other));
         beside.map(|(other, ..)| sign * (mean - other)).collect::<Vec<_>>()
     });
-    let contrast = median(differences.collect())?;
-    let within = median(rings.values().map(|(_, deviation, _)| *deviation).collect())?;
+    let contrast = upper_median(differences)?;
+    let within = upper_median(rings.values().map(|(_, deviation, _)| *deviation))?;
     (contrast > 0.0).then(|| within / contrast)
-}
-
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
 }
