@@ -51,7 +51,7 @@ pub use camera_file::{CalibratedCamera, Frame, TablePose};
 pub use detection::{MIN_CORNERS, SeenCorner, find_board};
 pub use error::{CalibrationError, CameraFileError};
 pub use guessed::{ASSUMED_VIEW_DEG, FocalSource, bent_px, guess_camera};
-pub use hand_eye::{HandEye, HandEyeView, MIN_POSES, Mount, RobotPose, calibrate_hand_eye, read_robot_poses};
+pub use hand_eye::{HandEye, HandEyeView, MIN_POSES, RobotPose, calibrate_hand_eye, read_robot_poses};
 pub use intrinsics::{Advice, Calibration, CalibrationConfig, MIN_PICTURES, PictureFit, calibrate};
 pub use pose::{BoardPose, board_pose};
 pub use table::{FocalCost, FocalEstimate, SheetPose, focal_cost, focal_from_sheet, homography_rms_px, locate_sheet};

@@ -7,8 +7,8 @@ use std::path::Path;
 
 use crate::rendering::{Random, camera_from_board, turn};
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector2, Vector3};
-use sdg_calibration::{Board, CalibrationError, HandEye, HandEyeView, Mount, SeenCorner, calibrate_hand_eye};
-use sdg_geometry::{PinholeCamera, PlumbBob};
+use sdg_calibration::{Board, CalibrationError, HandEye, HandEyeView, SeenCorner, calibrate_hand_eye};
+use sdg_geometry::{Mount, PinholeCamera, PlumbBob};
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 

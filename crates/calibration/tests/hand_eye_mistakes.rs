@@ -2,7 +2,8 @@
 
 use crate::hand_eye::{CAMERA, EXACT_ROBOT, NOISY_ROBOT, NUM_POSES, Noise, board, views};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
-use sdg_calibration::{Board, CalibrationError, HandEye, HandEyeView, Mount, calibrate_hand_eye};
+use sdg_calibration::{Board, CalibrationError, HandEye, HandEyeView, calibrate_hand_eye};
+use sdg_geometry::Mount;
 
 const MOUNTS: [Mount; 2] = [Mount::Hand, Mount::Base];
 /// How far the told scale may be from the truth with [`NOISY_ROBOT`], as a share; its standard error is 0.001.

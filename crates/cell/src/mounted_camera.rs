@@ -2,10 +2,9 @@
 
 use nalgebra::Isometry3;
 use sdg_calibration::{CalibratedCamera, Frame};
-use sdg_geometry::{PinholeCamera, PosedCamera};
+use sdg_geometry::{Mount, PinholeCamera, PosedCamera};
 use sdg_grasp::CameraOverTable;
 use sdg_robot::CameraPose;
-use sdg_robot::workcell::Mount;
 
 use crate::error::{CellError, Result};
 

@@ -1,9 +1,9 @@
 //! Reprojection over all pictures as a function of `X`, `Y` and the board's scale, and of what each robot pose is off by.
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, SVector, Vector6};
-use sdg_geometry::PinholeCamera;
+use sdg_geometry::{Mount, PinholeCamera};
 
-use super::view::{HandEyeView, Mount};
+use super::view::HandEyeView;
 use crate::board::Board;
 use crate::least_squares::{Block, Problem};
 use crate::projection::{by_twist, motion, off, project};

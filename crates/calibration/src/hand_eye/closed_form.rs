@@ -8,8 +8,8 @@
 //! proper where noise is large.
 
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Rotation3, UnitQuaternion, Vector3};
+use sdg_geometry::Mount;
 
-use super::view::Mount;
 use crate::error::CalibrationError;
 
 /// A turn by nearly half has an axis of either sign.

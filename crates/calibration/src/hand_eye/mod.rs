@@ -27,11 +27,11 @@ mod solve;
 mod view;
 
 use nalgebra::Isometry3;
-use sdg_geometry::PinholeCamera;
+use sdg_geometry::{Mount, PinholeCamera};
 
 pub use self::poses_file::{RobotPose, read_robot_poses};
 use self::solve::{Evidence, ROBOT_SIGMA};
-pub use self::view::{HandEyeView, MIN_POSES, Mount};
+pub use self::view::{HandEyeView, MIN_POSES};
 use crate::board::Board;
 use crate::camera_file::{CalibratedCamera, Frame, TablePose};
 use crate::error::CalibrationError;

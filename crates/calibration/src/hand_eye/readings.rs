@@ -1,10 +1,11 @@
 //! Robot poses read otherwise than they were given: mistakes that are often made.
 
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion};
+use sdg_geometry::Mount;
 
 use super::closed_form;
 use super::euler::Recomposition;
-use super::view::Mount;
+use super::view::motion;
 
 /// Robot poses as they may have been meant.
 pub(super) struct Reading {
@@ -52,7 +53,7 @@ const MAX_TINY_RAD: f64 = 0.1;
 /// All readings whose rotations fit those of the boards, the simplest first.
 pub(super) fn plausible(mount: Mount, robot: &[Isometry3<f64>], boards: &[Isometry3<f64>]) -> Vec<Reading> {
     let left = |robot: &[Isometry3<f64>]| {
-        let motions: Vec<_> = robot.iter().map(|pose| mount.motion(pose)).collect();
+        let motions: Vec<_> = robot.iter().map(|pose| motion(mount, pose)).collect();
         closed_form::turns_left(&motions, boards)
     };
     let given = left(robot);

@@ -1,11 +1,11 @@
 //! The minimum over all pictures, with the robot's errors where reprojection shows them.
 
 use nalgebra::Isometry3;
-use sdg_geometry::PinholeCamera;
+use sdg_geometry::{Mount, PinholeCamera};
 
 use super::bundle::{Bundle, NUM_SHARED, SCALE};
 use super::closed_form::{self, BoardSize};
-use super::view::{HandEyeView, Mount};
+use super::view::{HandEyeView, motion};
 use crate::board::Board;
 use crate::error::CalibrationError;
 use crate::least_squares::{Minimum, minimise};
@@ -66,7 +66,7 @@ impl<'a> Evidence<'a> {
 
     /// `A_i` of robot poses.
     pub(super) fn motions(&self, robot: &[Isometry3<f64>]) -> Vec<Isometry3<f64>> {
-        robot.iter().map(|pose| self.mount.motion(pose)).collect()
+        robot.iter().map(|pose| motion(self.mount, pose)).collect()
     }
 }
 

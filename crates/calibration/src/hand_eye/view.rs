@@ -1,28 +1,18 @@
-//! One picture of a hand-eye calibration, and how the camera is mounted.
+//! One picture of a hand-eye calibration.
 
 use nalgebra::Isometry3;
+use sdg_geometry::Mount;
 
 use crate::detection::SeenCorner;
 
 /// With three pictures nothing is left when one is taken away.
 pub const MIN_POSES: usize = 4;
 
-/// What the camera is fixed to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Mount {
-    /// To the flange: eye-in-hand. The board lies still.
-    Hand,
-    /// To the robot's base or the room: eye-to-hand. The flange holds the board.
-    Base,
-}
-
-impl Mount {
-    /// `A_i`.
-    pub(super) fn motion(self, base_from_flange: &Isometry3<f64>) -> Isometry3<f64> {
-        match self {
-            Self::Hand => base_from_flange.inverse(),
-            Self::Base => *base_from_flange,
-        }
+/// `A_i`. On the hand the board lies still; beside the robot the flange holds it.
+pub(super) fn motion(mount: Mount, base_from_flange: &Isometry3<f64>) -> Isometry3<f64> {
+    match mount {
+        Mount::Hand => base_from_flange.inverse(),
+        Mount::Base => *base_from_flange,
     }
 }
 

@@ -1,6 +1,7 @@
 //! The layout of the file, and the checks of its values.
 
 use nalgebra::Vector3;
+use sdg_geometry::Mount;
 use sdg_kinematics::{JointLimits, JointVector, NUM_JOINTS};
 use serde::Deserialize;
 use toml::Spanned;
@@ -9,7 +10,7 @@ use super::error::WorkcellError;
 use super::obstacle::{ObstacleSection, obstacles};
 use super::place_sections::{BinSection, PlaceSection, Room, TraySection, places};
 use super::source::{MAX_REACH_MM, Numbers, Source};
-use super::{Mount, RobotModel, Workcell};
+use super::{RobotModel, Workcell};
 use crate::robot_address::RobotAddress;
 use crate::safety::WorkspaceBox;
 use crate::sequence::LookOut;

@@ -64,6 +64,7 @@ mod obstacle;
 mod place_sections;
 mod source;
 
+use sdg_geometry::Mount;
 use sdg_kinematics::collision::{CollisionError, CollisionModel, Obstacle};
 use sdg_kinematics::{ArmGeometry, JointVector};
 
@@ -98,25 +99,6 @@ impl RobotModel {
         match self {
             Self::Panda => ArmGeometry::panda(),
             Self::Fr3 => ArmGeometry::fr3(),
-        }
-    }
-}
-
-/// Where the camera is mounted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Mount {
-    /// On the robot's hand: the camera's file has `hand_eye:`.
-    Hand,
-    /// Beside the robot: the camera's file has `table:` in the base frame.
-    Base,
-}
-
-impl Mount {
-    /// The name in the file.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Hand => "hand",
-            Self::Base => "base",
         }
     }
 }

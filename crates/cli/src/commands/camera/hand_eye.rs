@@ -7,11 +7,11 @@ use anyhow::{Context, Result, anyhow, bail};
 use clap::{Args, ValueEnum};
 use rayon::prelude::*;
 use sdg_calibration::{
-    Board, CalibratedCamera, CalibrationError, HandEye, HandEyeView, Mount, RobotPose, calibrate_hand_eye, find_board,
+    Board, CalibratedCamera, CalibrationError, HandEye, HandEyeView, RobotPose, calibrate_hand_eye, find_board,
     read_robot_poses,
 };
 use sdg_demonstration::PixelFrame;
-use sdg_geometry::upper_median;
+use sdg_geometry::{Mount, upper_median};
 use sdg_inputs::camera_files;
 use serde_json::{Value, json};
 
