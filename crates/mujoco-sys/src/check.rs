@@ -1,58 +1,38 @@
-//! Does the library that was loaded match the structs that were compiled in?
+//! Whether the library that is loaded matches the structs that were compiled in.
 
 use std::mem::{MaybeUninit, size_of};
 use std::ptr;
 
-use crate::bindings::*;
+use crate::bindings::mjVERSION_HEADER;
+use crate::error::LibraryError;
+use crate::library::{self, Functions};
 
-/// The loaded libmujoco is not the one that these bindings describe.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum LibraryMismatch {
-    /// The library reports another version.
-    #[error(
-        "libmujoco is version {found}, expected {expected}: install Debian's libmujoco-dev 2.2.2, or rebuild with \
-         feature `buildtime_bindgen`"
-    )]
-    Version {
-        /// Version of the headers, as `mjVERSION_HEADER` (222 means 2.2.2).
-        expected: i32,
-        /// Version that the library reports.
-        found: i32,
-    },
-    /// The library initialises more or fewer bytes of a struct than the bindings hold.
-    #[error("libmujoco's {name} takes {found} bytes, expected {expected}: bindings and library differ")]
-    StructSize {
-        /// Name of the C struct.
-        name: &'static str,
-        /// Size in the bindings, in bytes.
-        expected: usize,
-        /// Bytes that the library wrote.
-        found: usize,
-    },
+/// Loads libmujoco, once a process, and checks that it is the one of these bindings.
+///
+/// # Errors
+/// [`LibraryError`]: it could not be loaded, or is of another version; the same at every call.
+pub fn load() -> Result<(), LibraryError> {
+    library::load(check)
 }
 
 /// Checks the library's version and the size of every struct that MuJoCo initialises for us.
 ///
-/// It costs microseconds; `sdg-simulation` calls it before it touches anything else.
-///
-/// # Errors
-/// [`LibraryMismatch`] with what was expected and what was found.
-pub fn check_library() -> Result<(), LibraryMismatch> {
+/// It costs microseconds.
+fn check(functions: &Functions) -> Result<(), LibraryError> {
     // SAFETY: `mj_version` takes nothing and returns a constant.
-    let found = unsafe { mj_version() };
+    let found = unsafe { (functions.mj_version)() };
     let expected = mjVERSION_HEADER as i32;
     if found != expected {
-        return Err(LibraryMismatch::Version { expected, found });
+        return Err(LibraryError::Version { expected, found });
     }
 
-    check_size::<mjOption>("mjOption", mj_defaultOption)?;
-    check_size::<mjVisual>("mjVisual", mj_defaultVisual)?;
-    check_size::<mjvCamera>("mjvCamera", mjv_defaultCamera)?;
-    check_size::<mjvOption>("mjvOption", mjv_defaultOption)?;
-    check_size::<mjvPerturb>("mjvPerturb", mjv_defaultPerturb)?;
-    check_size::<mjvScene>("mjvScene", mjv_defaultScene)?;
-    check_size::<mjrContext>("mjrContext", mjr_defaultContext)?;
+    check_size("mjOption", functions.mj_defaultOption)?;
+    check_size("mjVisual", functions.mj_defaultVisual)?;
+    check_size("mjvCamera", functions.mjv_defaultCamera)?;
+    check_size("mjvOption", functions.mjv_defaultOption)?;
+    check_size("mjvPerturb", functions.mjv_defaultPerturb)?;
+    check_size("mjvScene", functions.mjv_defaultScene)?;
+    check_size("mjrContext", functions.mjr_defaultContext)?;
     Ok(())
 }
 
@@ -60,7 +40,7 @@ pub fn check_library() -> Result<(), LibraryMismatch> {
 /// and takes the last byte that came out equal both times for the end of the struct.
 ///
 /// Trailing padding need not be written, hence the tolerance of one alignment.
-fn check_size<T>(name: &'static str, initialise: unsafe extern "C-unwind" fn(*mut T)) -> Result<(), LibraryMismatch> {
+fn check_size<T>(name: &'static str, initialise: unsafe extern "C-unwind" fn(*mut T)) -> Result<(), LibraryError> {
     let written = [0x5a_u8, 0xa5].map(|filling| {
         let mut room: Box<[MaybeUninit<T>]> = (0..2).map(|_| MaybeUninit::uninit()).collect();
         let bytes = room.as_mut_ptr().cast::<u8>();
@@ -75,7 +55,7 @@ fn check_size<T>(name: &'static str, initialise: unsafe extern "C-unwind" fn(*mu
     let found = written[0].iter().zip(&written[1]).rposition(|(a, b)| a == b).map_or(0, |last| last + 1);
     let expected = size_of::<T>();
     if found > expected || found + align_of::<T>() <= expected {
-        return Err(LibraryMismatch::StructSize { name, expected, found });
+        return Err(LibraryError::StructSize { name, expected, found });
     }
     Ok(())
 }
@@ -86,7 +66,9 @@ mod tests {
 
     #[test]
     fn the_installed_library_is_the_one_described() {
-        assert_eq!(check_library(), Ok(()));
+        assert_eq!(load(), Ok(()));
+        // And again, as every constructor of the simulation does.
+        assert_eq!(load(), Ok(()));
     }
 
     #[test]
@@ -102,7 +84,7 @@ mod tests {
             (check_size::<[u64; 4]>("long", writes_24_bytes), 32),
         ] {
             match result {
-                Err(LibraryMismatch::StructSize { expected: e, found, .. }) => {
+                Err(LibraryError::StructSize { expected: e, found, .. }) => {
                     assert_eq!((e, found), (expected, 24));
                 }
                 other => panic!("{other:?}"),

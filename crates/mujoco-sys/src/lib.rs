@@ -2,20 +2,23 @@
 //!
 //! ```text
 //! /usr/include/mujoco/*.h ── bindgen (ahead of time) ──> src/bindings.rs ──┐
-//! libmujoco.so ── build.rs ───────────────────────────────────────────────┴─> sdg-simulation
+//! libmujoco.so.2.2.2 ── loaded when first asked for (library.rs) ─────────┴─> sdg-simulation
 //! ```
 //!
 //! The bindings were generated from the Debian headers and are committed, so that a build needs no
 //! libclang. Feature `buildtime_bindgen` generates them afresh from the headers that are installed,
 //! for another version of MuJoCo. Since a library of another version would read our structs at the
-//! wrong places, [`check_library`] compares the version and the struct sizes once at start; the
-//! tests compare every size and many offsets with what a C compiler says.
+//! wrong places, [`load`] compares the version and the struct sizes; the tests compare every size and many
+//! offsets with what a C compiler says.
+//!
+//! A build needs no libmujoco, and a program starts without it. The functions that `sdg-simulation` calls are in library.rs; those
+//! that the bindings declare besides are not linked.
 //!
 //! Left out: everything safe (that is `sdg-simulation`), MuJoCo's small vector library, its user
 //! interface and its printing functions.
 //!
 //! ```
-//! sdg_mujoco_sys::check_library().expect("libmujoco is 2.2.2");
+//! sdg_mujoco_sys::load().expect("libmujoco is 2.2.2");
 //! // SAFETY: `mj_version` reads a constant.
 //! assert_eq!(unsafe { sdg_mujoco_sys::mj_version() }, 222);
 //! ```
@@ -32,6 +35,20 @@ mod bindings {
 }
 
 mod check;
+mod error;
+// MuJoCo's names.
+#[allow(non_snake_case)]
+mod library;
 
 pub use bindings::*;
-pub use check::{LibraryMismatch, check_library};
+pub use check::load;
+pub use error::LibraryError;
+// The functions by name: these come before the declarations of the same names in the bindings.
+pub use library::{
+    Handler, mj_collision, mj_contactForce, mj_defaultOption, mj_defaultVFS, mj_defaultVisual, mj_deleteData,
+    mj_deleteModel, mj_deleteVFS, mj_forward, mj_fullM, mj_id2name, mj_kinematics, mj_loadXML, mj_makeData,
+    mj_makeEmptyFileVFS, mj_name2id, mj_resetData, mj_step, mj_step1, mj_step2, mj_version, mjr_defaultContext,
+    mjr_freeContext, mjr_makeContext, mjr_readPixels, mjr_render, mjr_setBuffer, mju_error, mjv_defaultCamera,
+    mjv_defaultOption, mjv_defaultPerturb, mjv_defaultScene, mjv_freeScene, mjv_makeScene, mjv_updateScene,
+    set_handlers,
+};

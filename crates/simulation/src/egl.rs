@@ -30,9 +30,18 @@ fn surfaceless() -> Result<&'static Surfaceless> {
     SURFACELESS.get_or_init(open).as_ref().map_err(|reason| SimulationError::Rendering { reason: reason.clone() })
 }
 
+/// Opens EGL and its display, once a process.
+pub(crate) fn load() -> Result<()> {
+    surfaceless().map(|_| ())
+}
+
 fn open() -> std::result::Result<Surfaceless, String> {
     // SAFETY: loading libEGL runs its initialisers only; Debian's has no precondition.
-    let egl = unsafe { Egl::load_required() }.map_err(|error| format!("libEGL.so.1 could not be loaded ({error})"))?;
+    let egl = unsafe { Egl::load_required() }.map_err(|error| {
+        format!(
+            "libEGL.so.1 could not be loaded ({error}); on Debian 12 the packages libegl1 and libgl1-mesa-dri have it"
+        )
+    })?;
     // SAFETY: the default display is what the surfaceless platform expects, with an empty list of
     // attributes.
     let display =

@@ -9,9 +9,9 @@ use sdg_robot::RobotError;
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum SimulationError {
-    /// libmujoco is not the version that the bindings describe.
+    /// There is no libmujoco, or not the version that the bindings describe.
     #[error(transparent)]
-    Library(#[from] sdg_mujoco_sys::LibraryMismatch),
+    Library(#[from] sdg_mujoco_sys::LibraryError),
 
     /// MuJoCo refused an MJCF model.
     #[error("MuJoCo could not load the model: {message}")]

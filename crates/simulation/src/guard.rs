@@ -24,22 +24,18 @@ thread_local! {
     static WARNINGS: RefCell<Vec<String>> = const { RefCell::new(Vec::new()) };
 }
 
-/// Checks the library and installs the handlers, once a process.
+/// Loads the library and installs the handlers, once a process.
 ///
 /// # Errors
-/// [`SimulationError::Library`] where libmujoco is not the version of the bindings.
+/// [`SimulationError::Library`] where there is no libmujoco, or of another version than the bindings.
 pub(crate) fn initialise() -> Result<()> {
-    static INITIALISED: OnceLock<std::result::Result<(), mj::LibraryMismatch>> = OnceLock::new();
+    static INITIALISED: OnceLock<std::result::Result<(), mj::LibraryError>> = OnceLock::new();
     INITIALISED
         .get_or_init(|| {
-            mj::check_library()?;
-            // SAFETY: the statics are written here only, inside `get_or_init`, and before any
-            // function of MuJoCo that could read them: every constructor of this crate comes
-            // through here first.
-            unsafe {
-                mj::mju_user_error = Some(on_error);
-                mj::mju_user_warning = Some(on_warning);
-            }
+            mj::load()?;
+            // SAFETY: inside `get_or_init`, and before any function of MuJoCo: every constructor of this crate comes through
+            // here first.
+            unsafe { mj::set_handlers(on_error, on_warning) };
             Ok(())
         })
         .clone()

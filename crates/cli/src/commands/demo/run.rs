@@ -26,6 +26,7 @@ const VIEWS_SEED: u64 = 7_000_000;
 pub fn run(args: &DemoArgs) -> Result<Outcome> {
     let object = part_named("--object", &args.object)?;
     let demonstration = shipped::demonstration(&args.object)?;
+    sdg_simulation::load()?;
     sdg_files::prepare_folder(&args.out)?;
 
     let interrupt = Interrupt::watch();

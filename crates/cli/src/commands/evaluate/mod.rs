@@ -36,6 +36,8 @@ pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
         return sharing::run(args);
     }
     #[cfg(feature = "simulation")]
+    sdg_simulation::load()?;
+    #[cfg(feature = "simulation")]
     return match (&args.axes, &args.cameras) {
         (Some(names), _) => axes::run(args, names),
         (None, Some(names)) => cameras::run(args, names),

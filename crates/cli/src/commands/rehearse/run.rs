@@ -24,6 +24,7 @@ use crate::shared_args::OwnPartArgs;
 /// Attempts, then the report; Ctrl-C reports the attempts so far.
 pub fn run(args: &RehearseArgs) -> Result<Outcome> {
     let shipped = args.object.as_deref().map(|name| part_named("--object", name)).transpose()?;
+    sdg_simulation::load()?;
     let model = sdg_inputs::read_model(&args.grasp_model, &devices::open(&args.compute)?)?;
     let mut camera = args.camera.as_deref().map(CameraFile::read_intrinsics).transpose()?;
     let model_file = args.grasp_model.display().to_string();
