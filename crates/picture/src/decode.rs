@@ -91,6 +91,11 @@ pub fn decode_image_in(bytes: &[u8], limits: &ImageLimits, frame: PixelFrame) ->
     let mut palette = None;
     let bytes = match format {
         ImageFormat::Jpeg => {
+            // Ahead of the checks, which decode it.
+            let header = ImageReader::with_format(Cursor::new(bytes), format).into_dimensions();
+            if let Ok((width, height)) = header {
+                check_size(width, height, limits)?;
+            }
             let jpeg = jpeg::complete_jpeg(bytes)?;
             jpeg_gap::check_has_no_gap(&jpeg)?;
             jpeg
@@ -125,6 +130,9 @@ pub fn decode_image_in(bytes: &[u8], limits: &ImageLimits, frame: PixelFrame) ->
 /// Whether the picture has an Exif orientation that turns or mirrors it; not for bytes that are no picture.
 pub fn is_turned_by_exif(bytes: &[u8]) -> bool {
     let Ok((format, _)) = format_of(bytes) else { return false };
+    if format == ImageFormat::Tiff && tiff::full_page(bytes).is_err() {
+        return false;
+    }
     let decoder = ImageReader::with_format(Cursor::new(bytes), format).into_decoder().ok();
     let orientation = decoder.and_then(|mut decoder| decoder.orientation().ok());
     orientation.is_some_and(|orientation| orientation != Orientation::NoTransforms)
@@ -289,6 +297,12 @@ mod tests {
         assert!(found.to_string().contains("60000×60000 = 3600 megapixels"), "{found}");
         let small = ImageLimits { max_pixels: 40 * 24 - 1 };
         assert!(decode_image(&encode(&gradient(), ImageFormat::Jpeg), &small).is_err());
+        // A JPEG without its end, of which the checks decode what there is.
+        let mut jpeg = encode(&gradient(), ImageFormat::Jpeg);
+        jpeg.truncate(jpeg.len() - 2);
+        let frame = jpeg.windows(2).position(|marker| marker == [0xff, 0xc0]).unwrap();
+        jpeg[frame + 5..frame + 9].copy_from_slice(&[0xea, 0x60, 0xea, 0x60]);
+        assert!(matches!(decode(&jpeg), Err(PictureError::EnormousImage { width: 60_000, height: 60_000, .. })));
     }
 
     #[test]

@@ -27,6 +27,8 @@ const PALETTE: u64 = 3;
 const COLOR_FILTER_ARRAY: u64 = 32803;
 const LINEAR_RAW: u64 = 34892;
 
+/// Tags from here on are private: the decoder reads none of them.
+const FIRST_PRIVATE_TAG: u16 = 32768;
 /// More pages than a picture has.
 const MAX_PAGES: usize = 256;
 /// More tags than a page has, values than a tag of these.
@@ -60,10 +62,16 @@ pub(crate) fn is_big_tiff(bytes: &[u8]) -> bool {
 /// Finds the one page in full size.
 ///
 /// # Errors
-/// Several of them; a raw photo; a palette of other than 8 bits. What cannot be walked over is left to the decoder.
+/// Several of them; a raw photo; a palette of other than 8 bits; a tag with more values than the file has bytes, for which the decoder
+/// would take memory before it reads them. What cannot be walked over is left to the decoder.
 pub(crate) fn full_page(bytes: &[u8]) -> Result<FullPage<'_>, PictureError> {
     let whole = FullPage { bytes: Cow::Borrowed(bytes), palette: None };
     let Some(file) = File::new(bytes) else { return Ok(whole) };
+    let first = file.first_page().and_then(|at| file.page(at));
+    if let Some(entry) = first.iter().flat_map(|page| &page.entries).find(|entry| !entry.can_fit(&file)) {
+        let reason = format!("tag {} has {} values, more than the file has bytes", entry.tag, entry.count);
+        return Err(PictureError::DamagedImage { format: "TIFF", reason });
+    }
     let Some(pages) = file.pages() else { return Ok(whole) };
     let unsupported = |found: String, remedy| PictureError::UnsupportedKind { format: "TIFF", found, remedy };
     let mut full = pages.iter().filter(|page| page.is_full(&file));
@@ -236,6 +244,11 @@ impl Page {
 }
 
 impl Entry {
+    fn can_fit(&self, file: &File<'_>) -> bool {
+        let size = self.count.checked_mul(self.width as u64);
+        self.tag >= FIRST_PRIVATE_TAG || size.is_some_and(|size| size <= file.bytes.len() as u64)
+    }
+
     fn values(&self, file: &File<'_>) -> Vec<u64> {
         (0..self.count.min(MAX_VALUES))
             .map_while(|idx| file.number(self.value_at + idx * self.width as u64, self.width))
@@ -316,6 +329,22 @@ mod tests {
 
     fn decoded(bytes: &[u8]) -> Result<RgbImage, PictureError> {
         decode_image(bytes, &ImageLimits::default())
+    }
+
+    #[test]
+    fn a_tag_with_more_values_than_the_file_has_bytes_is_refused_before_memory_is_taken() {
+        for is_big in [false, true] {
+            let mut bytes = file(&[rgb([4, 3], [10, 20, 30], 0)], is_big);
+            assert!(decoded(&bytes).is_ok());
+            let strips = if is_big { [1, 17, 0, 4] } else { [17, 1, 4, 0] };
+            let at = bytes.windows(4).position(|window| window == strips).unwrap() + 4;
+            let count = 50_000_000_u64;
+            let number = if is_big { count.to_be_bytes().to_vec() } else { count.to_le_bytes()[..4].to_vec() };
+            bytes.splice(at..at + number.len(), number);
+            let error = decoded(&bytes).unwrap_err().to_string();
+            assert!(error.contains("tag 273 has 50000000 values"), "{error}");
+            assert!(!crate::is_turned_by_exif(&bytes));
+        }
     }
 
     #[test]

@@ -1,0 +1,114 @@
+//! `hardening [--executions N] [--out DIR] [TARGET…]`: many executions of the targets, resumed where they ended; `hardening --input FILE TARGET`
+//! is one execution, whose panic is told whole.
+//!
+//! A target's figures stand in DIR/TARGET.json, and each input that broke a promise in DIR/TARGET-NUMBER.bin.
+
+use std::error::Error;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::Instant;
+
+use peak_alloc::PeakAlloc;
+use sdg_fuzz::{Outcome, TARGETS, Target, run};
+use serde_json::{Value, json};
+
+#[global_allocator]
+static ALLOCATOR: PeakAlloc = PeakAlloc;
+
+/// Executions after which the figures are written.
+const BATCH: u64 = 10_000;
+const USAGE: &str = "usage: hardening [--executions N] [--out DIR] [TARGET…], or hardening --input FILE TARGET";
+
+struct Asked {
+    executions: u64,
+    out: PathBuf,
+    input: Option<PathBuf>,
+    targets: Vec<&'static Target>,
+}
+
+fn asked() -> Result<Asked, Box<dyn Error>> {
+    let mut asked = Asked { executions: 100_000, out: "target/hardening".into(), input: None, targets: Vec::new() };
+    let mut arguments = std::env::args().skip(1);
+    while let Some(argument) = arguments.next() {
+        let mut value = || arguments.next().ok_or(USAGE);
+        match argument.as_str() {
+            "--executions" => asked.executions = value()?.parse()?,
+            "--out" => asked.out = value()?.into(),
+            "--input" => asked.input = Some(value()?.into()),
+            name => {
+                let names: Vec<&str> = TARGETS.iter().map(|target| target.name).collect();
+                let target = TARGETS.iter().find(|target| target.name == name);
+                asked.targets.push(target.ok_or(format!("{name}: expected one of {}; {USAGE}", names.join(", ")))?);
+            }
+        }
+    }
+    if asked.targets.is_empty() {
+        asked.targets = TARGETS.iter().collect();
+    }
+    Ok(asked)
+}
+
+/// What an earlier run reached, in `file`.
+fn reached(file: &Path) -> Value {
+    let text = fs::read_to_string(file).ok();
+    text.and_then(|text| serde_json::from_str(&text).ok()).unwrap_or_else(|| json!({}))
+}
+
+fn attack(target: &Target, executions: u64, out: &Path) -> Result<u64, Box<dyn Error>> {
+    let file = out.join(format!("{}.json", target.name));
+    let earlier = reached(&file);
+    let number = |key: &str| earlier[key].as_u64().unwrap_or(0);
+    let (mut total, mut failures) = (number("executions"), number("failures"));
+    let (mut accepted, mut most_bytes) = (number("accepted"), number("most_bytes"));
+    let mut slowest_secs = earlier["slowest_secs"].as_f64().unwrap_or(0.0);
+    let mut seconds = earlier["seconds"].as_f64().unwrap_or(0.0);
+    while total < executions {
+        let start = Instant::now();
+        let end = executions.min(total + BATCH);
+        let Outcome { count, accepted: more, slowest_secs: slowest, most_bytes: most, failures: found } =
+            run(target, total..end, &ALLOCATOR);
+        for failure in &found {
+            fs::write(out.join(format!("{}-{}.bin", target.name, failure.number)), &failure.input)?;
+            eprintln!("{}: number {}: {}", target.name, failure.number, failure.reason);
+        }
+        total += count;
+        accepted += more;
+        failures += found.len() as u64;
+        most_bytes = most_bytes.max(most as u64);
+        slowest_secs = slowest_secs.max(slowest);
+        seconds += start.elapsed().as_secs_f64();
+        let figures = json!({
+            "executions": total, "accepted": accepted, "failures": failures, "most_bytes": most_bytes,
+            "slowest_secs": slowest_secs, "seconds": seconds,
+        });
+        let unfinished = file.with_extension("json.tmp");
+        fs::write(&unfinished, format!("{figures:#}\n"))?;
+        fs::rename(&unfinished, &file)?;
+    }
+    println!(
+        "{:<16} {total:>9} executions in {seconds:6.0} s, {accepted} accepted, slowest {:.0} ms, most {:.1} MB, {failures} failures",
+        target.name,
+        1e3 * slowest_secs,
+        1e-6 * most_bytes as f64
+    );
+    Ok(failures)
+}
+
+fn main() -> Result<ExitCode, Box<dyn Error>> {
+    let asked = asked()?;
+    if let Some(input) = &asked.input {
+        let [target] = asked.targets[..] else { return Err(USAGE.into()) };
+        let accepted = (target.run)(&fs::read(input)?);
+        println!("{}: {}", target.name, if accepted { "accepted" } else { "refused" });
+        return Ok(ExitCode::SUCCESS);
+    }
+    fs::create_dir_all(&asked.out)?;
+    // Each panic is a line of the figures; its message is not printed twice.
+    std::panic::set_hook(Box::new(|_| {}));
+    let mut failures = 0;
+    for target in &asked.targets {
+        failures += attack(target, asked.executions, &asked.out)?;
+    }
+    Ok(if failures == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}

@@ -1,0 +1,90 @@
+//! Where cameras, robots and tables are.
+
+use sdg_calibration::{CalibratedCamera, read_robot_poses};
+use sdg_robot::workcell::Workcell;
+
+use super::file;
+use crate::target::Target;
+
+const MAX_EXTRA_BYTES: usize = 16 << 20;
+
+/// A camera's file.
+pub(super) const CAMERA_FILE: Target = Target {
+    name: "camera_file",
+    max_extra_bytes: MAX_EXTRA_BYTES,
+    quick_executions: 5_000,
+    dictionary: &[
+        b"camera_matrix:",
+        b"data: [",
+        b"plumb_bob",
+        b"rational_polynomial",
+        b"rotation_xyzw:",
+        b"&a ",
+        b"*a",
+        b"- ",
+        b".nan",
+        b"\n  ",
+    ],
+    seeds: || vec![file("datasets/workcell/camera.yaml")],
+    run: |bytes| {
+        let Some(camera) = std::str::from_utf8(bytes).ok().and_then(|text| CalibratedCamera::from_yaml(text).ok())
+        else {
+            return false;
+        };
+        // The lens is inverted wherever a picture is used.
+        for pixel in [[0.0, 0.0], [320.0, 240.0], [639.0, 1.0]] {
+            let _ = camera.intrinsics.unproject(&pixel.into());
+        }
+        true
+    },
+};
+
+/// A robot's poses, as CSV, JSON and YAML.
+pub(super) const ROBOT_POSES: Target = Target {
+    name: "robot_poses",
+    max_extra_bytes: MAX_EXTRA_BYTES,
+    quick_executions: 10_000,
+    dictionary: &[
+        b"image,",
+        b"x,y,z,",
+        b"qx,qy,qz,qw",
+        b";",
+        b"\"",
+        b"#",
+        b"1,5",
+        b"{\"image\":",
+        b"\"base_from_flange\"",
+    ],
+    seeds: || {
+        let csv = "picture,x,y,z,qx,qy,qz,qw\n1.png,0.4,0.1,0.5,0,1,0,0\n2.png,0.45,-0.1,0.52,0.6,0.8,0,0\n";
+        let pose = "{\"translation_m\":[0.4,0.1,0.5],\"rotation_xyzw\":[0,1,0,0]}";
+        let json = format!("{{\"poses\":[{{\"picture\":\"1.png\",\"base_from_flange\":{pose}}}]}}");
+        let yaml = format!("poses:\n- picture: 1.png\n  base_from_flange: {pose}\n");
+        [csv.to_owned(), json, yaml].map(String::into_bytes).to_vec()
+    },
+    run: |bytes| {
+        let text = String::from_utf8_lossy(bytes);
+        ["poses.csv", "poses.json", "poses.yaml"].into_iter().any(|name| read_robot_poses(name, &text).is_ok())
+    },
+};
+
+/// A workcell's file.
+pub(super) const WORKCELL: Target = Target {
+    name: "workcell",
+    max_extra_bytes: MAX_EXTRA_BYTES,
+    quick_executions: 10_000,
+    dictionary: &[
+        b"[[obstacle]]",
+        b"[[place]]",
+        b"[[tray]]",
+        b"box_mm = [",
+        b"plane_normal = [0, 0, 1]",
+        b"[[look_out]]",
+        b"inf",
+        b"nan",
+        b"\n",
+        b"\"\"\"",
+    ],
+    seeds: || vec![file("datasets/workcell/workcell.toml")],
+    run: |bytes| std::str::from_utf8(bytes).is_ok_and(|text| Workcell::from_toml(text).is_ok()),
+};
