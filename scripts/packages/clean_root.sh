@@ -1,0 +1,7 @@
+#!/usr/bin/env bash
+# A Debian system without anything of ours. Usage: clean_root.sh RELEASE FOLDER
+set -euo pipefail
+
+"$(dirname "$0")/../install.sh" mmdebstrap
+rm -rf "$2"
+mmdebstrap --quiet --variant=minbase --aptopt='APT::Install-Recommends "false"' "$1" "$2"

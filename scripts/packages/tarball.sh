@@ -1,0 +1,20 @@
+#!/usr/bin/env bash
+# One directory that runs from glibc 2.31 on, target/packages/tarball/single-demo-grasp-VERSION-x86_64-linux.tar.xz;
+# `make tarball`. With TRY=1 it is then used in Debian 11, the oldest root that has that library (root, mmdebstrap).
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+
+scripts/install.sh xz-utils
+scripts/packages/program.sh
+version=$(target/packages/program/sdg --version | cut -d ' ' -f 2)
+out=target/packages/tarball
+name=single-demo-grasp-$version-x86_64-linux
+rm -rf "${out:?}/$name"
+scripts/packages/lay_out.sh "$out/$name"
+tarball=$out/$name.tar.xz
+tar --create --xz --file "$tarball.new" --directory "$out" --sort=name --owner=0 --group=0 --numeric-owner \
+    --mtime "@$(git log -1 --format=%ct)" "$name"
+mv "$tarball.new" "$tarball"
+rm -rf "${out:?}/$name"
+echo "tarball: $tarball, $(stat -c %s "$tarball") bytes"
+[ -z "${TRY:-}" ] || scripts/packages/try_tarball.sh "$tarball"

@@ -1,0 +1,16 @@
+#!/usr/bin/env bash
+# Unpacks a tarball in the oldest Debian root that it promises to run in, and uses it without network. Prints seconds.
+# Usage: try_tarball.sh TARBALL
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+
+tarball=$1
+root=$(realpath -m target/packages/tarball-root)
+scripts/packages/clean_root.sh bullseye "$root"
+start=$(date +%s.%N)
+tar --extract --xz --file "$tarball" --directory "$root/opt"
+cp scripts/packages/first_grasp.sh "$root/first_grasp.sh"
+folder=/opt/$(basename "$tarball" .tar.xz)
+unshare --mount --net --pid --fork chroot "$root" sh /first_grasp.sh "$folder/bin/sdg" "$folder/share/single-demo-grasp" /tmp 2>&1 | tail -2
+echo "tarball: from unpacking to the grasp drawn on a photo, glibc $(chroot "$root" ldd --version | head -1 | grep -o '[0-9.]*$'): \
+$(echo "$(date +%s.%N) - $start" | bc | cut -c 1-5) s"
