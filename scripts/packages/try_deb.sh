@@ -34,6 +34,7 @@ echo "deb: removed without a trace"
 
 # With what it recommends, as apt installs it: the simulator, too.
 cp /etc/resolv.conf "$root/etc/resolv.conf"
-chroot "$root" apt-get install -y -qq --install-recommends /sdg.deb >/dev/null 2>&1
+chroot "$root" apt-get update -qq
+chroot "$root" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --install-recommends /sdg.deb >/dev/null
 mount --bind /dev "$root/dev" && trap 'umount "$root/dev"' EXIT
 inside sdg rehearse --object pendulum --grasp-model "/tmp/erste Größe/pendulum.sdg" --attempts 1 --out /tmp/report | tail -2
