@@ -58,11 +58,11 @@ export function showStart({ folder, recent }) {
     });
   }
   by("recent").hidden = !recent.length;
-  by("recent-list").replaceChildren(...recent.map(({ id, name, within, opened_secs: secs }) => {
+  by("recent-list").replaceChildren(...recent.map(({ id, name, path, opened_secs: secs }) => {
     const item = document.createElement("li");
     const open = button("", () => go(() => api.openProject(id)));
     const when = new Date(secs * 1000).toLocaleString();
-    for (const [tag, text] of [["b", name], ["small", within], ["small", when]]) open.append(Object.assign(document.createElement(tag), { textContent: text }));
+    for (const [tag, text] of [["b", name], ["small", path], ["small", when]]) open.append(Object.assign(document.createElement(tag), { textContent: text }));
     item.append(open);
     return item;
   }));

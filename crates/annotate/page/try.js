@@ -265,10 +265,12 @@ function renderJudge() {
   // What resembles the part hardly at all is no candidate.
   const places = looked.flatMap((trial) => trial.detections).filter((d) => d.score >= MIN_SHOWN);
   const inPictures = looked.filter((trial) => trial.detections.some(isFound)).length;
-  const beyond = state.minScore === 0.5 ? "" : ` For “sdg detect”: --min-score ${least}.`;
+  // Parts that are followed are judged by their track: there the option asks for each frame on its own.
+  const ofLive = state.camera ? `; with --from also --every-frame` : "";
+  const beyond = state.minScore === 0.5 ? "" : ` For “sdg detect”: --min-score ${least}${ofLive}.`;
   const words = looked.length
     ? `Found ${places.filter(isFound).length} of ${places.length} at ${least}, in ${inPictures} of ${looked.length} pictures${looked.length < state.trialPictures.length ? ` (${state.trialPictures.length - looked.length} are still looked at)` : ""}.${beyond}`
-    : "";
+    : beyond.trim();
   if (by("least-score-count").textContent !== words) by("least-score-count").textContent = words;
   const all = state.trialPictures.length;
   by("looked").hidden = looked.length === all || all < 2;

@@ -9,6 +9,7 @@ use crate::error::{Error, Result, TeacherError};
 use crate::model_versions::fingerprint;
 use crate::names::{file_name, safe_stem};
 use crate::picture::Picture;
+use crate::project_file::label_of;
 use crate::recent::{RecentProject, RecentProjects};
 use crate::session::{Session, check_label};
 use crate::views::SessionView;
@@ -51,9 +52,10 @@ pub struct StartView {
 struct RecentView {
     /// The same whatever else is listed.
     id: String,
+    /// The part's name or, where it has none, that of the folder or the photo.
     name: String,
-    /// The folder that it lies in.
-    within: String,
+    /// The folder, or the photo.
+    path: String,
     opened_secs: u64,
 }
 
@@ -155,8 +157,8 @@ impl Start {
         let shown = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned()).display().to_string();
         let recent = self.recent.list().into_iter().map(|project| RecentView {
             id: id_of(&project),
-            name: file_name(&project.path),
-            within: project.path.parent().map(shown).unwrap_or_default(),
+            name: label_of(&project.path).unwrap_or_else(|| file_name(&project.path)),
+            path: shown(&project.path),
             opened_secs: project.opened_secs,
         });
         StartView {

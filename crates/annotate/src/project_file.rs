@@ -24,6 +24,7 @@ use crate::annotation_file;
 use crate::error::{Error, Result};
 use crate::model_versions::Version;
 use crate::picture::{Picture, pictures_in};
+use crate::region::Region;
 
 const FILE: &str = "sdg-project.json";
 /// Where pictures that came from the page are kept.
@@ -74,6 +75,20 @@ pub fn project_of_photo(photo: &Path) -> Result<PathBuf> {
     Ok(ProjectPlace::of_photo(photo)?.file)
 }
 
+/// The name of the part whose project is opened with a folder or a photo, where one was given.
+pub fn label_of(opened: &Path) -> Option<String> {
+    let place = if opened.is_dir() { ProjectPlace::of_folder(opened) } else { ProjectPlace::of_photo(opened).ok()? };
+    let file = ProjectFile::read(&place).ok().flatten();
+    if let Some(label) = file.as_ref().and_then(|file| file.label.clone()) {
+        return Some(label);
+    }
+    // The marks of a photo that has no file yet name it, too.
+    let first = file.and_then(|file| file.photos.first().map(|name| place.folder.join(name)));
+    let photo = if place.is_folder { first? } else { opened.to_owned() };
+    let size = Picture::open(&photo).ok()?.size;
+    annotation_file::open(&photo, None, size).ok()?.label
+}
+
 /// What the file says.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -92,6 +107,18 @@ pub struct ProjectFile {
     pub models: Vec<Version>,
     /// Index of the one in use.
     pub current_model: Option<usize>,
+    /// The part of pictures that is searched; `None` in files that do not say it: what the model in use says.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub searched: Option<Searched>,
+}
+
+/// The part of pictures that is searched.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Searched {
+    /// All of them, whatever the model says.
+    All,
+    Part(Region),
 }
 
 /// A picture that a model was tried on, and what the person said of it.
@@ -132,6 +159,7 @@ impl Default for ProjectFile {
             removed: BTreeSet::new(),
             models: Vec::new(),
             current_model: None,
+            searched: None,
         }
     }
 }
@@ -227,8 +255,9 @@ impl ProjectFile {
 
     /// Whether it says no more than that there is a photo, which needs no file.
     fn is_bare(&self) -> bool {
-        let Self { label, tried, removed, models, photos, .. } = self;
-        label.is_none() && tried.is_empty() && removed.is_empty() && models.is_empty() && photos.len() < 2
+        let Self { label, tried, removed, models, photos, searched, .. } = self;
+        let is_set = matches!(searched, Some(Searched::Part(_)));
+        label.is_none() && tried.is_empty() && removed.is_empty() && models.is_empty() && photos.len() < 2 && !is_set
     }
 
     /// Writes the file. A photo that is only looked at gets none.

@@ -227,6 +227,7 @@ impl Session {
         let model = self.teacher.open(&state.models.read(id)?, &summary).map_err(Error::Teacher)?;
         state.models.use_version(&path, id)?;
         state.region = model.region();
+        state.is_model_lost = false;
         self.teaching.set_model(Arc::from(model));
         state.save_project()
     }
@@ -234,7 +235,8 @@ impl Session {
     /// Searches this part of pictures alone from now on, with the model in use and with those that are taught; all of them with `None`.
     ///
     /// # Errors
-    /// A region that is none, or that the model cannot search; a teaching that goes on, whose model has the region that it began with.
+    /// A region that is none, that the model cannot search or, before there is one, that the marked part does not fit in; a teaching that goes
+    /// on, whose model has the region that it began with; a project that cannot be written.
     pub fn set_region(&self, region: Option<Region>) -> Result<()> {
         self.teaching.check_idle()?;
         if let Some(region) = &region {
@@ -242,9 +244,27 @@ impl Session {
         }
         if let Ok(model) = self.teaching.model() {
             model.look_in(region).map_err(Error::Teacher)?;
+        } else if let Some(region) = &region {
+            self.check_fits(region)?;
         }
-        self.state().region = region;
-        Ok(())
+        let mut state = self.state();
+        state.region = region;
+        state.save_project()
+    }
+
+    /// Whether the part on the photos that are marked so far fits in a region.
+    fn check_fits(&self, region: &Region) -> Result<()> {
+        let (label, marked) = {
+            let state = self.state();
+            let marked: Vec<_> = state.image_ids().map(|id| state.images[id].clone()).collect();
+            (state.label.clone(), marked)
+        };
+        // Marks that are not finished say nothing yet.
+        let demonstrations: Vec<_> = marked.iter().filter_map(|image| image.demonstration(&label).ok()).collect();
+        if demonstrations.is_empty() {
+            return Ok(());
+        }
+        self.teacher.check_region(region, &demonstrations).map_err(Error::Teacher)
     }
 
     /// The camera.
@@ -336,6 +356,7 @@ impl Session {
             };
             let mut state = locked(&state);
             state.models.keep(&model_path, &bytes, version)?;
+            state.is_model_lost = false;
             state.save_project()?;
             Ok(model_path)
         };

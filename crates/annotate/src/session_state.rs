@@ -13,7 +13,7 @@ use crate::marks::Marks;
 use crate::model_versions::{ModelVersions, Version, fingerprint};
 use crate::names::file_name;
 use crate::picture::Picture;
-use crate::project_file::{Gone, ProjectFile, ProjectPlace, Tried, relative};
+use crate::project_file::{Gone, ProjectFile, ProjectPlace, Searched, Tried, relative};
 use crate::region::Region;
 use crate::views::{ImageView, ModelView, Saved, TrialPictureView};
 
@@ -38,6 +38,8 @@ pub struct State {
     pub max_opening_px: Option<f64>,
     /// The part of pictures that the model in use searches, and that the next one will.
     pub region: Option<Region>,
+    /// The file of the model in use cannot be read.
+    pub is_model_lost: bool,
 }
 
 /// A picture of the object and what is marked on it.
@@ -159,7 +161,7 @@ impl State {
             summary: version.summary.clone(),
             photos: version.photos,
             negatives: version.negatives,
-            is_current: self.models.current == Some(id),
+            is_current: self.models.current == Some(id) && !self.is_model_lost,
             is_stale: version.material != material,
         };
         self.models.versions.iter().enumerate().map(view).collect()
@@ -179,6 +181,7 @@ impl State {
             removed: self.removed_earlier.clone(),
             models: self.models.versions.clone(),
             current_model: self.models.current,
+            searched: Some(self.region.map_or(Searched::All, Searched::Part)),
             ..ProjectFile::default()
         };
         for id in self.trial_ids() {

@@ -28,6 +28,12 @@ pub trait GraspTeacher: Send + Sync + 'static {
         observe: &mut dyn FnMut(TeachingStep) -> ControlFlow<()>,
     ) -> Result<Box<dyn TaughtModel>, TeacherError>;
 
+    /// Says whether the part of these demonstrations can be looked for in a region, before a model is taught of them.
+    ///
+    /// # Errors
+    /// A region that the part does not fit in, or that is not of the camera's pictures.
+    fn check_region(&self, region: &Region, demonstrations: &[Demonstration]) -> Result<(), TeacherError>;
+
     /// Reads a model that was taught before; `summary` is what was said of it then.
     ///
     /// # Errors

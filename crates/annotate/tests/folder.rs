@@ -167,7 +167,7 @@ fn without_a_project_one_is_made_of_a_photo_and_opened_again() {
     served.ask("PUT", "/api/images/0/marks", MARKS.as_bytes()).json();
 
     let start = served.ask("DELETE", "/api/projects", b"").json()["start"].clone();
-    assert_eq!(names(&start["recent"]), ["wing_bolt"]);
+    assert_eq!(names(&start["recent"]), ["wing bolt"]);
     let taken = served.ask("POST", "/api/projects?name=wing%20bolt&photo=a.png", &photo_png());
     assert!(taken.status == 500 && taken.text().contains("wing_bolt"), "{}", taken.text());
     let id = start["recent"][0]["id"].as_str().unwrap();

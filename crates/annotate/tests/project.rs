@@ -169,3 +169,40 @@ fn numbers_of_an_earlier_session_are_refused() {
     assert_eq!(put(&served, &id), 200);
     assert!(served.folder.path().join("photo.json").exists());
 }
+
+#[test]
+fn the_region_is_kept_whatever_the_model_says() {
+    let served = project();
+    served.ask("PUT", "/api/images/0/marks", MARKS.as_bytes()).json();
+    let region = json!({"x": 0, "y": 10, "width": 150, "height": 80, "picture": [200, 100]});
+    let put = |served: &Served, region: &Value| served.ask("PUT", "/api/region", region.to_string().as_bytes()).json();
+    put(&served, &region);
+    let served = Served::of_project(served.end());
+    assert_eq!(get(&served)["region"], region, "without a model");
+    teach(&served);
+    put(&served, &Value::Null);
+    let served = Served::of_project(served.end());
+    assert_eq!(get(&served)["region"], Value::Null, "all of the picture was chosen after the teaching");
+    put(&served, &region);
+    let served = Served::of_project(served.end());
+    assert_eq!(get(&served)["region"], region);
+}
+
+#[test]
+fn a_model_file_that_is_gone_is_told_once_and_stays_named() {
+    let served = project();
+    served.ask("PUT", "/api/images/0/marks", MARKS.as_bytes()).json();
+    teach(&served);
+    let name = get(&served)["models"][0]["file"].as_str().unwrap().to_owned();
+    let folder = served.end();
+    let (file, away) = (folder.path().join("models").join(&name), folder.path().join("away"));
+    std::fs::rename(&file, &away).unwrap();
+    let served = Served::of_project(folder);
+    let view = get(&served);
+    let notes: Vec<&str> = view["notes"].as_array().unwrap().iter().filter_map(Value::as_str).collect();
+    assert!(notes.len() == 1 && notes[0].matches("cannot read").count() == 1 && notes[0].contains(&name), "{notes:?}");
+    assert_eq!(view["models"][0]["is_current"], false);
+    let folder = served.end();
+    std::fs::rename(&away, &file).unwrap();
+    assert_eq!(get(&Served::of_project(folder))["models"][0]["is_current"], true);
+}

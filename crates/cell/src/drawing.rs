@@ -48,10 +48,10 @@ pub fn draw_detections<'a>(
     }
 }
 
-/// Draws the parts that are there in a frame, the best on top, with their numbers and scores.
+/// Draws the parts that are there in a frame, the best on top, with the numbers of their tracks, counted from 1 for people, and scores.
 pub fn draw_parts(drawn: &mut RgbImage, parts: &[Part], min_score: f64) {
     for part in parts.iter().rev().filter(|part| part.is_seen(min_score)) {
-        draw_numbered(drawn, &part.found.detection, true, part.track.map(|(number, ..)| number));
+        draw_numbered(drawn, &part.found.detection, true, part.track.map(|(number, ..)| number + 1));
     }
 }
 

@@ -13,13 +13,14 @@ use sdg_annotate::{
 use sdg_calibration::Frame;
 use sdg_cell::DEFAULT_MIN_SCORE;
 use sdg_cell::{Found, Perception};
+use sdg_demonstration::Demonstration;
 use sdg_evaluation::TaughtFile;
 use sdg_evaluation::held_back::HeldBackFigures;
 use sdg_evaluation::{Share, wilson_interval};
 use sdg_geometry::RotationalSymmetry;
 use sdg_grasp::{
     Advice, CheckConfig, GraspModel, PlanarPose, Preset, SearchRegion, TeachOptions, TeachingEvent, Verification,
-    check_region_from_above,
+    check_region_from_above, check_teaching_region,
 };
 use sdg_inputs::camera_files::CameraFile;
 
@@ -71,6 +72,17 @@ impl GraspTeacher for PageTeacher {
         let TaughtFile { model, bytes, .. } = file;
         let summary = summary(&model, page_figures(&figures), start.elapsed().as_secs_f64());
         Ok(Box::new(PageModel { detector: Mutex::new(self.detector(model)?), summary, bytes }))
+    }
+
+    fn check_region(&self, region: &Region, demonstrations: &[Demonstration]) -> Result<(), TeacherError> {
+        let region = search_region(region);
+        let Some((camera, [mark, grasp])) = &self.camera else {
+            let mut options = TeachOptions::new(0);
+            options.region = Some(region);
+            return Ok(check_teaching_region(demonstrations, &options)?);
+        };
+        let (seen, lengths) = camera.seen_from_above(demonstrations, *mark, *grasp)?;
+        Ok(check_region_from_above(&region, &seen, &camera.over_table, &lengths)?)
     }
 
     fn open(&self, bytes: &[u8], summary: &TaughtSummary) -> Result<Box<dyn TaughtModel>, TeacherError> {

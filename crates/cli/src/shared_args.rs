@@ -119,10 +119,10 @@ pub fn region(text: &str) -> Result<SearchRegion, String> {
 
 /// The same, or `all`.
 pub fn region_or_all(text: &str) -> Result<RegionArg, String> {
-    match text {
-        "all" => Ok(RegionArg::All),
-        _ => region(text).map(RegionArg::Part).map_err(|error| format!("{error}; or all, for all of the picture")),
+    if text.eq_ignore_ascii_case("all") {
+        return Ok(RegionArg::All);
     }
+    region(text).map(RegionArg::Part).map_err(|error| format!("{error}; or the word all, for all of the picture"))
 }
 
 /// A device's name.
@@ -211,7 +211,9 @@ mod tests {
         let expected = SearchRegion::new([100, 50, 200, 180]);
         assert_eq!(region("100,50,200,180"), Ok(expected));
         assert_eq!(region_or_all("100, 50, 200, 180"), Ok(RegionArg::Part(expected)));
-        assert_eq!(region_or_all("all"), Ok(RegionArg::All));
+        for all in ["all", "ALL", "All"] {
+            assert_eq!(region_or_all(all), Ok(RegionArg::All));
+        }
         for text in ["", "all", "100,50,200", "1,2,3,4,5", "1.5,2,30,40", "-1,2,30,40", "1;2;3;4", "4294967296,0,1,1"] {
             assert_eq!(region(text).unwrap_err(), REGION, "{text}");
         }
@@ -219,7 +221,7 @@ mod tests {
             region("10,10,0,5").unwrap_err(),
             "expected a width and a height of at least 1 pixel, found 0 and 5"
         );
-        assert!(region_or_all("everything").unwrap_err().ends_with("or all, for all of the picture"));
+        assert!(region_or_all("everything").unwrap_err().ends_with("or the word all, for all of the picture"));
     }
 
     #[test]

@@ -104,6 +104,13 @@ fn pictures_of_a_folder_and_on_request_show_what_files_show() {
     assert_eq!(detect(&["--from", &format!("dir:{}?fps=30", frames.display())]), expected);
     assert_eq!(detect(&["--from", &format!("file:{}", frames.join("1.png").display())]), expected[1..2]);
 
+    let (url, server) = serve(pictures);
+    assert_eq!(detect(&["--from", &url, "--frames", "5"]), expected);
+    server.join().unwrap();
+}
+
+/// A camera that gives these pictures, one for each request.
+fn serve(pictures: Vec<Vec<u8>>) -> (String, std::thread::JoinHandle<()>) {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let url = format!("http://{}/snapshot.png", listener.local_addr().unwrap());
     let server = std::thread::spawn(move || {
@@ -115,8 +122,57 @@ fn pictures_of_a_folder_and_on_request_show_what_files_show() {
             stream.write_all(&[head.as_bytes(), &picture].concat()).unwrap();
         }
     });
-    assert_eq!(detect(&["--from", &url, "--frames", "5"]), expected);
-    server.join().unwrap();
+    (url, server)
+}
+
+#[test]
+fn frames_of_another_size_than_the_regions_are_skipped_and_told_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = path(&folder, "part.sdg");
+    let (photo, marks) = (shipped("pendulum", "image.png"), shipped("pendulum", "annotation.json"));
+    let demo = format!("{}:{}", photo.display(), marks.display());
+    let region = ["--region", "220,140,200,200", "--out", &model];
+    assert!(sdg(&[&["teach", "--model", "S", "--demo", &demo], &region[..]].concat()).status.success());
+    let right = fs::read(&photo).unwrap();
+    let mut small = std::io::Cursor::new(Vec::new());
+    image::open(&photo).unwrap().thumbnail(320, 240).write_to(&mut small, image::ImageFormat::Png).unwrap();
+    let small = small.into_inner();
+    let detect = |pictures: &[&Vec<u8>], further: &[&str]| {
+        let count = pictures.len().to_string();
+        let (url, server) = serve(pictures.iter().map(|&picture| picture.clone()).collect());
+        let output = sdg(&[&["detect", "--grasp-model", &model, "--from", &url, "--frames", &count], further].concat());
+        // A stream that is ended at its first frame leaves requests unasked.
+        if output.status.code() == Some(0) {
+            server.join().unwrap();
+        }
+        output
+    };
+    let output = detect(&[&right, &small, &small, &right, &small], &["--json"]);
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    let lines = lines(&output);
+    let is_error: Vec<bool> = lines.iter().map(|line| line["error"].is_string()).collect();
+    assert_eq!(is_error, [false, true, false, true], "{lines:?}");
+    let told = lines[1]["error"].as_str().unwrap();
+    assert!(told.contains("frame 1") && told.contains("are skipped") && told.contains("found 320 × 240"), "{told}");
+    for line in [&lines[0], &lines[2]] {
+        assert_eq!(line["detections"].as_array().unwrap().len(), 1, "{line}");
+    }
+    // People read the number of a part from 1 on; programs read it as it always was.
+    assert_eq!(lines[0]["detections"][0]["track"], 0, "{}", lines[0]);
+    let words = String::from_utf8(detect(&[&right], &[]).stdout).unwrap();
+    assert!(words.contains("part 1 found again, ") || words.contains("part 1 followed, "), "{words}");
+
+    // A stream whose size is another one finds nothing ever: that is an error.
+    let output = detect(&[&small, &small], &[]);
+    let error = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{error}");
+    assert!(error.contains("the camera's pictures") && error.contains("--region all"), "{error}");
+    let output = sdg(&["detect", "--grasp-model", &model, "--from", "sim:pendulum", "--size", "320x240"]);
+    let error = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(
+        output.status.code() == Some(2) && error.contains("--size: expected 640x480, the size of the region"),
+        "{error}"
+    );
 }
 
 #[test]

@@ -11,7 +11,7 @@ use crate::model_versions::ModelVersions;
 use crate::names::proposed_label;
 use crate::picture::{Picture, pictures_in};
 use crate::preview::Previews;
-use crate::project_file::{Gone, ProjectFile, ProjectPlace, TRIED_FOLDER, relative};
+use crate::project_file::{Gone, ProjectFile, ProjectPlace, Searched, TRIED_FOLDER, relative};
 use crate::session_state::{MarkedPicture, State, TrialPicture};
 use crate::teacher::GraspTeacher;
 use crate::teaching::Teaching;
@@ -69,17 +69,30 @@ impl Session {
             current: project.current_model,
         };
         let teaching = Arc::new(Teaching::default());
-        let mut region = None;
+        let mut region = match project.searched {
+            Some(Searched::Part(region)) => Some(region),
+            Some(Searched::All) | None => None,
+        };
+        let mut is_model_lost = false;
         if let Some(id) = models.current {
             let opened = models
                 .read(id)
                 .and_then(|bytes| teacher.open(&bytes, &models.versions[id].summary).map_err(Error::Teacher));
             match opened {
                 Ok(model) => {
-                    region = model.region();
+                    // What was chosen on the page holds, whatever the model's file says.
+                    if project.searched.is_none() {
+                        region = model.region();
+                    } else if let Err(error) = model.look_in(region) {
+                        notes.push(format!("The frame that is searched does not suit this model: {error}"));
+                        region = model.region();
+                    }
                     teaching.set_model(Arc::from(model));
                 }
-                Err(error) => notes.push(format!("The model cannot be read: {error}")),
+                Err(error) => {
+                    is_model_lost = true;
+                    notes.push(format!("There is no model in use, as long as its file is not there: {error}"));
+                }
             }
         }
         // A camera's photo is not called after the photo that is taken first.
@@ -96,6 +109,7 @@ impl Session {
             offered: Vec::new(),
             max_opening_px: options.max_opening_px,
             region,
+            is_model_lost,
         };
         state.save_project()?;
         Ok(Self {

@@ -49,6 +49,13 @@ impl TaughtModel for ReadModel {
     }
 }
 
+fn fits(region: &Region, demonstration: &Demonstration) -> Result<(), TeacherError> {
+    if f64::from(region.width) < demonstration.annotation.bbox.width() {
+        return Err("the part does not fit in".into());
+    }
+    Ok(())
+}
+
 impl GraspTeacher for InPlace {
     fn teach(
         &self,
@@ -68,6 +75,10 @@ impl GraspTeacher for InPlace {
         let _ = observe(TeachingStep::Validated { done: planned, hit_rate: 1.0 });
         let (demonstration, negatives) = (material.demonstrations[0].clone(), material.negatives.clone());
         Ok(Box::new(InPlaceModel(demonstration, negatives, Mutex::new(request.region))))
+    }
+
+    fn check_region(&self, region: &Region, demonstrations: &[Demonstration]) -> Result<(), TeacherError> {
+        fits(region, &demonstrations[0])
     }
 
     fn open(&self, bytes: &[u8], summary: &TaughtSummary) -> Result<Box<dyn TaughtModel>, TeacherError> {
@@ -99,9 +110,7 @@ impl TaughtModel for InPlaceModel {
     }
 
     fn look_in(&self, region: Option<Region>) -> Result<(), TeacherError> {
-        if region.is_some_and(|region| f64::from(region.width) < self.0.annotation.bbox.width()) {
-            return Err("the part does not fit in".into());
-        }
+        region.map_or(Ok(()), |region| fits(&region, &self.0))?;
         *self.2.lock().unwrap() = region;
         Ok(())
     }

@@ -61,7 +61,8 @@ fn without_an_argument_a_photo_becomes_a_project_that_is_found_again() {
 
     page.click("#projects");
     page.wait_for("the list", "return document.querySelectorAll('#recent-list button').length === 1");
-    assert!(page.text("#recent-list").contains("hanging_pendulum"));
+    let listed = page.text("#recent-list");
+    assert!(listed.starts_with("hanging pendulum") && listed.contains("/hanging_pendulum"), "{listed}");
     theme(&page, "recent");
     // A name that is taken is told, and nothing is written over.
     page.browser.find("#new-input").unwrap().type_text(shipped_photo().to_str().unwrap()).unwrap();

@@ -86,8 +86,8 @@ pub fn teach(
 ) -> Result<Taught> {
     let start = Instant::now();
     check_marks(demonstrations, options.kind)?;
-    if let (Some(region), None) = (&options.region, &options.lengths) {
-        check_region(region, Some(&taught(demonstrations, options)?))?;
+    if options.lengths.is_none() {
+        check_teaching_region(demonstrations, options)?;
     }
     let options = options.with_start_read()?;
     let mut taught = match Plan::new(&options) {
@@ -100,6 +100,18 @@ pub fn teach(
     }
     taught.model = taught.model.with_region(options.region)?;
     Ok(taught)
+}
+
+/// Says whether a region can be searched for the part of these demonstrations with what [`TeachOptions`] says of it. Those that
+/// [`seen_from_above`](crate::seen_from_above) made are checked by [`check_region_from_above`](crate::check_region_from_above).
+///
+/// # Errors
+/// A region without pixels; where it says what pictures it is for, one that reaches out of them, and one that the part does not fit in.
+pub fn check_teaching_region(demonstrations: &[Demonstration], options: &TeachOptions) -> Result<()> {
+    match &options.region {
+        Some(region) => check_region(region, Some(&taught(demonstrations, options)?)),
+        None => Ok(()),
+    }
 }
 
 /// Smallest extent of a part in its photo: with less, whatever has two edges looks like it. Chosen by hand, not measured.

@@ -44,8 +44,8 @@ pub struct DetectArgs {
     /// with a camera, this or another one
     #[arg(long, value_name = "FILE", conflicts_with = "size_tolerance")]
     pub camera: Option<PathBuf>,
-    /// Search only this part of each picture: left edge, upper edge, width and height in its pixels, or all; without it, the part that the
-    /// model was taught with. A part counts whose grasp point lies in it and at least half of the part
+    /// Search only this part of each picture: left edge, upper edge, width and height in its pixels; the word "all" searches all of it;
+    /// without it, the part that the model was taught with. A part counts whose grasp point lies in it and at least half of the part
     #[arg(long, value_name = "X,Y,W,H|all", allow_hyphen_values = true, value_parser = region_or_all)]
     pub region: Option<RegionArg>,
     /// Accept detections that score at least so much; more for fewer wrong ones, less for fewer missed ones

@@ -9,7 +9,7 @@ use std::io::Write;
 use std::sync::Arc;
 use std::time::{Instant, UNIX_EPOCH};
 
-use anyhow::Result;
+use anyhow::{Result, anyhow};
 use image::RgbImage;
 use sdg_camera::{Address, Frame, MjpegServer};
 use sdg_cell::{FoundRecord, FrameDetector, Frames, Next, Part, Perception, drawing};
@@ -49,6 +49,7 @@ pub fn run(args: &DetectArgs, address: &Address, detector: Perception) -> Result
     let mut stdout = std::io::stdout().lock();
     let mut found_any = false;
     let mut left = args.frames.unwrap_or(u64::MAX);
+    let mut sizes = Sizes::default();
     while left > 0 && !interrupt.is_requested() {
         let mut frame = match frames.take() {
             Next::Frame(frame) => frame,
@@ -63,6 +64,15 @@ pub fn run(args: &DetectArgs, address: &Address, detector: Perception) -> Result
         left -= 1;
         let began = Instant::now();
         let picture = Arc::new(std::mem::take(&mut frame.picture));
+        // Of a folder each picture is told, as any that cannot be used.
+        if !matches!(address, Address::Folder { .. })
+            && let Some(error) = sizes.check(finder.perception(), &picture)?
+        {
+            if let Some(error) = error {
+                write_error(&mut stdout, args, address, &error.context(format!("frame {}", frame.number)))?;
+            }
+            continue;
+        }
         let parts = match finder.find(&picture, &frame) {
             Ok(parts) => parts,
             // One picture of a folder says nothing of the others.
@@ -86,11 +96,49 @@ pub fn run(args: &DetectArgs, address: &Address, detector: Perception) -> Result
     Ok(if found_any { Outcome::Done } else { Outcome::NothingToGrasp })
 }
 
-/// A calibrated camera is asked for the size that it was calibrated with.
+/// Which frames can be searched by their size: a camera that is set to another one gives frames that the region, or the calibration, is not
+/// for.
+#[derive(Default)]
+struct Sizes {
+    /// A frame could be searched.
+    is_any_right: bool,
+    /// The wrong size that was told last, until a right one comes.
+    told: Option<(u32, u32)>,
+}
+
+impl Sizes {
+    /// `None` for a picture that can be searched. A picture of another size is skipped; the first in a row gives the error to be told.
+    ///
+    /// # Errors
+    /// The first picture of the stream has another size: so will the others, and nothing would ever be found.
+    fn check(&mut self, detector: &Perception, picture: &RgbImage) -> Result<Option<Option<anyhow::Error>>> {
+        let Err(error) = detector.check_picture(picture) else {
+            *self = Self { is_any_right: true, told: None };
+            return Ok(None);
+        };
+        if !self.is_any_right {
+            return Err(anyhow::Error::from(error).context("the camera's pictures"));
+        }
+        let is_told = self.told.replace(picture.dimensions()) == Some(picture.dimensions());
+        let skipped = || anyhow!("frames of this size are skipped: {}", one_line(&error.into()));
+        Ok(Some((!is_told).then(skipped)))
+    }
+}
+
+/// A camera is asked for the size that it was calibrated with, or that the region is for.
 fn open(args: &DetectArgs, address: &Address, detector: &Perception) -> Result<Frames> {
     let mut options = args.request.options();
     options.frame = detector.pixel_frame();
-    if let Some([width, height]) = detector.picture_size() {
+    let of_region = detector.region().and_then(|region| region.picture);
+    if let Some([width, height]) = detector.picture_size().or(of_region) {
+        if let Some(asked) = args.request.size.filter(|&asked| asked != (width, height)) {
+            let whose = if detector.picture_size().is_some() { "of the calibration" } else { "of the region" };
+            return Err(Usage(format!(
+                "--size: expected {width}x{height}, the size {whose}, found {}x{}",
+                asked.0, asked.1
+            ))
+            .into());
+        }
         (options.width, options.height) = (width, height);
     }
     Ok(Frames::of(live_pictures::open(address, &options)?, address))
@@ -144,7 +192,8 @@ fn write_line(
         }
         let wording = Wording { detector, picture_size: [width, height], min_score: args.min_score };
         for part in shown() {
-            let of = part.track.map(|(id, state, _)| format!("part {id} {}, ", state_name(state).replace('_', " ")));
+            let of =
+                part.track.map(|(id, state, _)| format!("part {} {}, ", id + 1, state_name(state).replace('_', " ")));
             let text = wording.line(&part.found);
             writeln!(out, "frame {}: {}{text} ({:.1} ms)", frame.number, of.unwrap_or_default(), 1e3 * seconds)?;
         }
