@@ -122,7 +122,7 @@ pub fn region_or_all(text: &str) -> Result<RegionArg, String> {
     if text.eq_ignore_ascii_case("all") {
         return Ok(RegionArg::All);
     }
-    region(text).map(RegionArg::Part).map_err(|error| format!("{error}; or the word all, for all of the picture"))
+    region(text).map(RegionArg::Part).map_err(|error| format!("{error}; or all, for all of the picture"))
 }
 
 /// A device's name.
@@ -221,7 +221,7 @@ mod tests {
             region("10,10,0,5").unwrap_err(),
             "expected a width and a height of at least 1 pixel, found 0 and 5"
         );
-        assert!(region_or_all("everything").unwrap_err().ends_with("or the word all, for all of the picture"));
+        assert!(region_or_all("everything").unwrap_err().ends_with("or all, for all of the picture"));
     }
 
     #[test]
