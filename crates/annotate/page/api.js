@@ -101,6 +101,7 @@ export const api = {
   addTrialPicture: (file) => send("POST", `/api/trial-pictures?name=${encodeURIComponent(file.name)}`, file),
   trialPictureUrl: (id) => `/api/trial-pictures/${id}/picture`,
   detect: (id) => inTurn(() => send("POST", `/api/trial-pictures/${id}/detect`)),
+  wouldHelp: (id, question) => inTurn(() => json("POST", `/api/trial-pictures/${id}/would-help`, question)),
   live: () => send("GET", "/api/live"),
   livePicture: (number) => send("GET", `/api/live/${number}/picture`, undefined, { isPicture: true }),
   detectLive: (number) => inTurn(() => send("POST", `/api/live/${number}/detect`)),

@@ -1,10 +1,10 @@
 // What was found in all pictures, as a file: a line for each grasp, or JSON with the fields of "sdg detect --json".
 
 import { gripperOf } from "./geometry.js";
-import { isFound, state } from "./store.js";
+import { isFound, state, touchedBy } from "./store.js";
 
 const POSE = ["frame", "x_mm", "y_mm", "z_mm", "yaw_deg", "opening_mm"];
-const COLUMNS = ["image", "number", "found", "score", "x_px", "y_px", "angle_deg", "width_px", ...POSE];
+const COLUMNS = ["image", "number", "found", "score", "x_px", "y_px", "angle_deg", "width_px", ...POSE, "jaws_touch"];
 const rounded = (value) => Math.round(value * 1000) / 1000;
 
 function graspOf({ marks }) {
@@ -19,11 +19,14 @@ function field(value) {
   return /[",\n']/.test(plain) ? `"${plain.replaceAll('"', '""')}"` : plain;
 }
 
+/** The numbers of the found ones that its jaws touch. */
+const touched = (detection, { detections }) => touchedBy(detection, detections).map((other) => detections.indexOf(other) + 1);
+
 function rows(trial) {
   const found = trial.detections.map((detection, i) => {
     const { x, y, angle_deg: angle, width_px: width } = graspOf(detection);
     const { frame, position_mm: [px, py, pz] = [], yaw_deg: yaw, opening_mm: opening } = detection.pose ?? {};
-    return [trial.name, i + 1, isFound(detection), rounded(detection.score), x, y, angle, width, frame, px, py, pz, yaw, opening];
+    return [trial.name, i + 1, isFound(detection), rounded(detection.score), x, y, angle, width, frame, px, py, pz, yaw, opening, touched(detection, trial).join(" ")];
   });
   // A picture with nothing in it has a line, too.
   return found.length ? found : [[trial.name, 0, false]];
@@ -36,7 +39,7 @@ const record = ({ name, width, height, seconds, detections }) => ({
   seconds,
   detections: detections.map((detection) => ({
     score: detection.score, found: isFound(detection), box: detection.marks.box, polygon: detection.marks.outline ?? undefined,
-    grasp: graspOf(detection), pose: detection.pose ?? undefined, refused: detection.refusal?.reason,
+    grasp: graspOf(detection), pose: detection.pose ?? undefined, refused: detection.refusal?.reason, jaws_touch: touched(detection, { detections }).map((n) => n - 1),
   })),
 });
 

@@ -6,7 +6,7 @@ import { adopt } from "./editing.js";
 import { gripperOf } from "./geometry.js";
 import { numbered } from "./overlay.js";
 import { openImage, showCurrent } from "./strip.js";
-import { changed, isFound, isLive, state } from "./store.js";
+import { changed, isFound, isLive, state, touchedBy } from "./store.js";
 import { toast } from "./toast.js";
 import { replacePicture } from "./view.js";
 
@@ -174,6 +174,14 @@ export function placeText({ marks, pose }) {
   return pose ? `${inPicture}\n${poseText(pose)}` : inPicture;
 }
 
+/** Which parts the jaws of a found one touch, by their numbers among those that are listed; empty where they touch none. */
+export function touchText(detection, detections, listed) {
+  const touched = isFound(detection) ? touchedBy(detection, detections) : [];
+  if (!touched.length) return "";
+  const numbers = touched.map((other) => listed.indexOf(other) + 1).sort((a, b) => a - b).map((n) => (n ? `${n}` : "another"));
+  return `Warning: the jaws would touch part ${new Intl.ListFormat("en").format(numbers)}.`;
+}
+
 /** A grasp over the table, in words. */
 export function poseText({ frame, position_mm, yaw_deg, opening_mm, sigma_mm, sigma_deg }) {
   const [x, y, z] = position_mm.map((v) => v.toFixed(1));
@@ -208,7 +216,7 @@ function cards(detections) {
     const best = detections[0];
     return [["There is nothing to grasp.", best ? `best ${best.score.toFixed(2)}` : "", ""]];
   }
-  const told = accepted.slice(0, MAX_TOLD).map((d, i) => [numbered("Found the part", i, accepted.length), `score ${d.score.toFixed(2)}`, placeText(d)]);
+  const told = accepted.slice(0, MAX_TOLD).map((d, i) => [numbered("Found the part", i, accepted.length), `score ${d.score.toFixed(2)}`, placeText(d), touchText(d, detections, accepted)]);
   if (accepted.length > MAX_TOLD) told.push([`And ${accepted.length - MAX_TOLD} more`, "", ""]);
   return told;
 }
@@ -229,14 +237,16 @@ function renderTrying() {
   const text = JSON.stringify(told);
   if (by("live-found").dataset.shown === text) return;
   by("live-found").dataset.shown = text;
-  by("live-found").replaceChildren(...told.map(([title, score, pose]) => {
+  by("live-found").replaceChildren(...told.map(([title, score, pose, touching]) => {
     const item = document.createElement("div");
     item.className = "found";
-    item.innerHTML = '<h3><span></span><span class="score"></span></h3><p class="pose"></p>';
+    item.innerHTML = '<h3><span></span><span class="score"></span></h3><p class="pose"></p><p class="warning"></p>';
     item.querySelector("span").textContent = title;
     item.querySelector(".score").textContent = score;
     item.querySelector(".pose").textContent = pose;
     item.querySelector(".pose").hidden = !pose;
+    item.querySelector(".warning").textContent = touching;
+    item.querySelector(".warning").hidden = !touching;
     return item;
   }));
   // Told to those who do not see the page when the number changes only; the figures change with every frame.

@@ -1,7 +1,7 @@
 // Marks as they are drawn over the photo. Elements are kept from frame to frame, so that a handle in focus stays so.
 
 import { add, boundsOf, boxPolygon, direction, gripperOf, quarter, sub, times } from "./geometry.js";
-import { image, isFound, isLive, isMarking, marks, state, trialPicture } from "./store.js";
+import { image, isFound, isLive, isMarking, marks, state, touchedBy, trialPicture } from "./store.js";
 import { toScreen } from "./view.js";
 
 const SVG = "http://www.w3.org/2000/svg";
@@ -172,8 +172,9 @@ function drawDifferences(refusal, i) {
 export const numbered = (text, i, count) => (count > 1 ? `${i + 1}: ${text}` : text);
 
 /** A grasp that a model found: drawn alike, but not to be taken hold of. */
-function drawDetection(detection, i, count) {
-  const parent = group(`found${i}`, isFound(detection) ? "" : "refused");
+function drawDetection(detection, i, count, detections) {
+  const touches = isFound(detection) && touchedBy(detection, detections).length;
+  const parent = group(`found${i}`, isFound(detection) ? (touches ? "touching" : "") : "refused");
   const { outline, grasp, box } = detection.marks;
   if (outline) {
     const within = element(`found${i}/outline`, "g", { class: "outline" }, parent);
@@ -200,7 +201,7 @@ export function renderOverlay() {
     // Worst first, so that the best is on top.
     shown.map((d, i) => [d, i]).reverse().forEach(([d, i]) => {
       if (d.refusal && !isFound(d) && state.showDifferences) drawDifferences(d.refusal, i);
-      drawDetection(d, i, shown.length);
+      drawDetection(d, i, shown.length, detections);
     });
   } else if (image() && !isLive()) {
     const correcting = state.tool === "select" && isMarking();

@@ -68,6 +68,8 @@ export const isComplete = ({ marks: { box, outline, grasp } }) => Boolean((box |
 export const isAnyMarked = () => state.images.some(isComplete);
 /** Whether a detection counts as found at the least score that is chosen. */
 export const isFound = (detection) => detection.score >= state.minScore;
+/** The found ones among a picture's detections whose parts the jaws of one of them touch. */
+export const touchedBy = (detection, detections) => detection.touches.map((i) => detections[i]).filter((other) => other && isFound(other));
 export const size = () => [image().width, image().height];
 
 /** Whether the stage shows the camera: for the first photo, for a further one, or to try the model. */

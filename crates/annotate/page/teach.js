@@ -45,6 +45,8 @@ for (const [letter, name, says] of MODELS) {
 }
 
 export const isRunning = () => ["running", "stopping"].includes(state.teaching.status);
+/** Whether the model in use is taught in seconds: it then learns at once from what is right. */
+export const isQuick = () => state.models.find((model) => model.is_current)?.summary.model === "S" && !isRunning();
 const seconds = (s) => (s < 90 ? `${Math.round(s)} s` : `${Math.floor(s / 60)} min ${Math.round(s % 60)} s`);
 const percent = (share) => `${Math.round(share * 100)}\u00a0%`;
 
@@ -53,13 +55,12 @@ by("teach-form").addEventListener("submit", (event) => {
   teach();
 });
 
-/** Teaches as the form says. */
-export async function teach() {
-  if (isRunning()) return;
+/** What the form asks for. */
+export function teachRequest() {
   preselect();
   const number = (id) => (by(id).value === "" ? null : by(id).valueAsNumber);
   const minutes = number("budget");
-  const request = {
+  return {
     model: new FormData(by("teach-form")).get("model"),
     time_budget_secs: minutes === null ? null : minutes * 60,
     steps: number("steps"),
@@ -67,6 +68,12 @@ export async function teach() {
     fixed_height: by("fixed-height").checked && !state.isCalibrated,
     seed: number("seed") ?? 1,
   };
+}
+
+/** Teaches as the form says. */
+export async function teach() {
+  if (isRunning()) return;
+  const request = teachRequest();
   by("teach-error").hidden = true;
   try {
     state.teaching = await api.teach(request);

@@ -5,13 +5,14 @@ import { button } from "./buttons.js";
 import { uploadPhoto } from "./folder.js";
 import { adopt } from "./editing.js";
 import { boundsOf } from "./geometry.js";
-import { placeText } from "./live.js";
+import { renderHelps } from "./helps.js";
+import { placeText, touchText } from "./live.js";
 import { MIN_SHOWN, numbered } from "./overlay.js";
 import { exportPictures } from "./export.js";
 import { openImage, openTrialPicture, removeTrialPicture } from "./strip.js";
 import { changed, isFound, isLive, state, trialPicture } from "./store.js";
 import { openTab } from "./tabs.js";
-import { isRunning, teach } from "./teach.js";
+import { isQuick, isRunning, teach } from "./teach.js";
 import { toast } from "./toast.js";
 import { showBox } from "./view.js";
 
@@ -122,9 +123,6 @@ async function accept(marks, { correct }) {
   changed();
 }
 
-/** Whether the model in use is taught in seconds: it then learns at once from what is right. */
-const isQuick = () => state.models.find((model) => model.is_current)?.summary.model === "S" && !isRunning();
-
 /** What the last teaching changed on the pictures that were tried before it. */
 function renderLearnt() {
   const again = state.trialPictures.filter(({ before, detections }) => typeof before === "number" && detections);
@@ -173,7 +171,8 @@ function text(tag, content, classes = "") {
   return Object.assign(document.createElement(tag), { textContent: content, className: classes });
 }
 
-function card(detection, i, count, shown) {
+function card(detection, i, listed, shown) {
+  const count = listed.length;
   const item = document.createElement("section");
   item.className = "found";
   item.setAttribute("aria-label", `Grasp ${i + 1}`);
@@ -188,6 +187,8 @@ function card(detection, i, count, shown) {
   item.append(title);
   const refusal = isFound(detection) ? null : detection.refusal;
   item.append(text("p", placeText(detection), "pose"));
+  const touching = touchText(detection, shown.detections, listed);
+  if (touching) item.append(text("p", touching, "warning"));
   if (!isFound(detection) && !refusal) item.append(text("p", "Why: it scores less than you ask for.", "why"));
   if (refusal) {
     item.append(text("p", `Why: ${refusal.reason}.`, "why"));
@@ -224,7 +225,7 @@ function renderFound() {
       button("The part is here after all", () => setAbsent(shown, false), "plain"));
   }
   const listed = shown.detections.filter((d) => isFound(d) || isShown(d, shown));
-  listed.forEach((detection, i) => found.append(card(detection, i, listed.length, shown)));
+  listed.forEach((detection, i) => found.append(card(detection, i, listed, shown)));
   if (shown.became !== null) {
     const index = state.images.findIndex((image) => image.id === shown.became);
     found.append(text("p", `A demonstration now: ${state.images[index]?.name}.`), button("Look at its marks", () => {
@@ -293,6 +294,7 @@ export function renderTry() {
       : "Add pictures that were taken as the first one was, with the part lying in other ways.";
   renderJudge();
   renderLearnt();
+  renderHelps();
   renderFound();
   lookAtAll();
 }

@@ -205,6 +205,7 @@ mod tests {
             line_length: 40.0,
             pose: None,
             refusal: None,
+            touches: Vec::new(),
         };
         let marks = Marks::of_found(&found, [200, 100]);
         let line = marks.grasp.unwrap().line();

@@ -21,6 +21,7 @@ const FILES: &[(&str, &str, &str)] = &[
     ("folder.js", SCRIPT, include_str!("../page/folder.js")),
     ("geometry.js", SCRIPT, include_str!("../page/geometry.js")),
     ("gestures.js", SCRIPT, include_str!("../page/gestures.js")),
+    ("helps.js", SCRIPT, include_str!("../page/helps.js")),
     ("keyboard.js", SCRIPT, include_str!("../page/keyboard.js")),
     ("live.js", SCRIPT, include_str!("../page/live.js")),
     ("main.js", SCRIPT, include_str!("../page/main.js")),
@@ -121,6 +122,61 @@ mod tests {
             for px in value.split([' ', '(', ')', ',']).filter_map(|word| word.strip_suffix("px")) {
                 let px: i32 = px.parse().unwrap();
                 assert!(SPACES_PX.contains(&px.abs()), "a space of {px} px: {value}");
+            }
+        }
+    }
+
+    /// Reports are read beside the page.
+    const REPORT_CSS: &str = include_str!("../../report/src/page.css");
+
+    #[test]
+    fn reports_have_the_page_s_colours_types_and_spaces() {
+        const SHARED: [&str; 13] = [
+            "paper",
+            "raised",
+            "ink",
+            "soft",
+            "rule",
+            "accent",
+            "good",
+            "good-wash",
+            "bad",
+            "bad-wash",
+            "warning",
+            "warning-wash",
+            "wash",
+        ];
+        let css = FILES.iter().find(|(name, ..)| *name == "page.css").unwrap().2;
+        let value = |css: &'static str, name: &str| {
+            let (_, rest) = css.split_once(&format!("--{name}:")).unwrap_or_else(|| panic!("--{name}"));
+            rest.split([';', '}']).next().unwrap().trim().replace(", ", ",")
+        };
+        let (light, dark) = REPORT_CSS.split_once("prefers-color-scheme:dark").unwrap();
+        let whole = |color: String| match color.as_str() {
+            "#fff" => "#ffffff".to_owned(),
+            _ => color,
+        };
+        for name in SHARED {
+            let of_report = format!("light-dark({},{})", whole(value(light, name)), whole(value(dark, name)));
+            assert_eq!(value(css, name), of_report, "--{name}");
+        }
+        for name in ["sans", "mono"] {
+            assert_eq!(value(css, name), value(light, name), "--{name}");
+        }
+        // A document has larger headings and wider margins besides.
+        const SIZES: [&str; 6] = [".8125rem", ".9375rem", "1.0625rem", "1.25rem", "13px", "14px"];
+        const SPACES_PX: [i32; 8] = [2, 4, 8, 12, 16, 24, 40, 64];
+        let on_screen = REPORT_CSS.split("@page").next().unwrap();
+        for declaration in on_screen.split(['{', '}', ';', '\n']) {
+            let Some((name, value)) = declaration.split_once(':') else { continue };
+            if name == "font-size" {
+                assert!(SIZES.contains(&value) || value.starts_with("clamp("), "font-size: {value}");
+            }
+            if ["gap", "padding", "margin"].iter().any(|kind| name.starts_with(kind) || name.ends_with("-gap")) {
+                for px in value.split(' ').filter_map(|word| word.strip_suffix("px")) {
+                    let px: i32 = px.parse().unwrap();
+                    assert!(SPACES_PX.contains(&px.abs()), "a space of {px} px: {declaration}");
+                }
             }
         }
     }

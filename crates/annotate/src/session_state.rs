@@ -92,7 +92,7 @@ impl State {
     pub fn add_image(&mut self, picture: Picture, marks: Marks) -> Result<usize> {
         let opened = annotation_file::open(&picture.path, None, picture.size)?;
         let (file, note) = (opened.path, opened.note);
-        self.images.push(MarkedPicture { picture, marks, file, note, saved: Saved::Nothing, is_removed: false });
+        self.images.push(MarkedPicture { file, note, ..MarkedPicture::unsaved(picture, marks) });
         Ok(self.images.len() - 1)
     }
 
@@ -219,6 +219,11 @@ fn round(value: &mut Value) {
 }
 
 impl MarkedPicture {
+    /// A picture with marks that stand in no file.
+    pub fn unsaved(picture: Picture, marks: Marks) -> Self {
+        Self { picture, marks, file: PathBuf::new(), note: None, saved: Saved::Nothing, is_removed: false }
+    }
+
     /// A picture with the marks that stand beside it, and the object's name there.
     ///
     /// # Errors

@@ -28,6 +28,17 @@ pub trait GraspTeacher: Send + Sync + 'static {
         observe: &mut dyn FnMut(TeachingStep) -> ControlFlow<()>,
     ) -> Result<Box<dyn TaughtModel>, TeacherError>;
 
+    /// Teaches a model of those without a network, to see what a further demonstration would change: it takes a second, is not tried on samples
+    /// and has no figures.
+    ///
+    /// # Errors
+    /// As [`Self::teach`].
+    fn teach_on_trial(
+        &self,
+        material: &TeachingMaterial,
+        request: &TeachRequest,
+    ) -> Result<Box<dyn TaughtModel>, TeacherError>;
+
     /// Says whether the part of these demonstrations can be looked for in a region, before a model is taught of them.
     ///
     /// # Errors
@@ -250,6 +261,8 @@ pub struct FoundGrasp {
     pub pose: Option<GraspPose>,
     /// Why it is not accepted; `None` for what is.
     pub refusal: Option<Refusal>,
+    /// Numbers, in the picture's list, of those whose parts its jaws touch, found ones or not.
+    pub touches: Vec<usize>,
 }
 
 /// A grasp in millimetres and degrees, for people.

@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod folder;
+mod helps;
 mod live;
 mod project;
 mod refusals;

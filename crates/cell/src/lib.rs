@@ -8,6 +8,7 @@ mod error;
 mod finder;
 mod hand_reach;
 mod height;
+mod jaws;
 mod live_detection;
 mod live_tracker;
 mod mounted_camera;

@@ -4,6 +4,8 @@ use sdg_calibration::Frame;
 use sdg_cell::{DEFAULT_MIN_SCORE, Found, Perception};
 use sdg_grasp::{Advice, EvidenceKind, GraspDetection};
 
+use crate::paint::{Paint, Tone};
+
 /// Below it nothing resembles the part: advice would mislead. Chosen by hand.
 pub const MIN_ADVISED_SCORE: f64 = 0.03;
 /// Sizes nearer to the photo's than this are no reason to name. Chosen by hand.
@@ -31,11 +33,14 @@ pub struct Wording<'a> {
     pub picture_size: [u32; 2],
     /// The score from which they are accepted.
     pub min_score: f64,
+    /// Colours of the lines.
+    pub paint: Paint,
 }
 
 impl Wording<'_> {
-    /// A detection in words, in metres as well where the camera is known; for a refused one with the reasons.
-    pub fn line(&self, found: &Found) -> String {
+    /// A detection in words, in metres as well where the camera is known; for a refused one with the reasons, for an accepted one with the parts
+    /// that its jaws touch.
+    pub fn line(&self, found: &Found, touched: &[&GraspDetection]) -> String {
         let Found { detection, pose } = found;
         let grasp = detection.grasp;
         let metric = pose.zip(self.detector.frame()).map(|(pose, frame): (_, Frame)| {
@@ -50,10 +55,20 @@ impl Wording<'_> {
             )
         });
         let metric = metric.unwrap_or_default();
-        let refused = self.refusal(detection).map(|why| format!("; refused: {why}")).unwrap_or_default();
+        let refused =
+            self.refusal(detection).map(|why| format!("; {} {why}", self.doubtful("refused:"))).unwrap_or_default();
         let turn_source = detection.turn_source.name();
+        let at = |other: &&GraspDetection| format!("({:.0}, {:.0})", other.grasp.x, other.grasp.y);
+        let places: Vec<String> = touched.iter().map(at).collect();
+        let touching = match places.as_slice() {
+            [] => String::new(),
+            [place] => format!("; {} the jaws would touch the part at {place}", self.doubtful("warning:")),
+            _ => format!("; {} the jaws would touch the parts at {}", self.doubtful("warning:"), places.join(", ")),
+        };
+        let tone = if self.is_accepted(detection) { Tone::Good } else { Tone::Doubtful };
+        let grasp_word = self.paint.text(tone, "grasp");
         format!(
-            "grasp at ({:.1}, {:.1}), {:.1}°, {:.1} px wide{metric}; score {:.2} ({}; turn by {turn_source}){refused}",
+            "{grasp_word} at ({:.1}, {:.1}), {:.1}°, {:.1} px wide{metric}; score {:.2} ({}; turn by {turn_source}){refused}{touching}",
             grasp.x,
             grasp.y,
             grasp.angle.degrees(),
@@ -61,6 +76,21 @@ impl Wording<'_> {
             detection.score,
             self.measured(detection),
         )
+    }
+
+    /// For each detection those whose parts its jaws touch, as numbers in the list; between accepted ones alone.
+    pub fn touched(&self, detections: &[&GraspDetection]) -> Vec<Vec<usize>> {
+        let accepted: Vec<usize> = (0..detections.len()).filter(|&idx| self.is_accepted(detections[idx])).collect();
+        let among: Vec<&GraspDetection> = accepted.iter().map(|&idx| detections[idx]).collect();
+        let mut touched = vec![Vec::new(); detections.len()];
+        for (&idx, others) in accepted.iter().zip(self.detector.touched_by_jaws(&among)) {
+            touched[idx] = others.into_iter().map(|other| accepted[other]).collect();
+        }
+        touched
+    }
+
+    fn doubtful(&self, text: &str) -> String {
+        self.paint.text(Tone::Doubtful, text)
     }
 
     /// Whether a detection counts as the part.
@@ -123,7 +153,8 @@ impl Wording<'_> {
     /// each follows.
     pub fn nothing(&self, refused: &[&GraspDetection], are_listed: bool) -> String {
         let Some(best) = refused.iter().max_by(|a, b| a.score.total_cmp(&b.score)) else {
-            return format!("nothing to grasp{}{}", self.in_region(), self.of_other_size().unwrap_or_default());
+            let nothing = self.doubtful("nothing to grasp");
+            return format!("{nothing}{}{}", self.in_region(), self.of_other_size().unwrap_or_default());
         };
         let which = if refused.len() == 1 { "" } else { ", the best of them" };
         let see_all = if are_listed { "" } else { " (see --all)" };
@@ -133,7 +164,8 @@ impl Wording<'_> {
         let other_size =
             best.advice().filter(|_| best.score >= MIN_ADVISED_SCORE).map_or_else(|| self.of_other_size(), |_| None);
         format!(
-            "nothing accepted{}; {} refused{which} at ({x:.0}, {y:.0}): {}, score {:.2}{see_all}: {why}{}",
+            "{}{}; {} refused{which} at ({x:.0}, {y:.0}): {}, score {:.2}{see_all}: {why}{}",
+            self.doubtful("nothing accepted"),
             self.in_region(),
             refused.len(),
             self.measured(best),

@@ -23,6 +23,7 @@
 
 #[doc(hidden)]
 pub mod args;
+mod clock;
 mod commands;
 mod demonstrations;
 mod examples;
@@ -33,6 +34,7 @@ mod json_line;
 mod live_pictures;
 #[cfg(feature = "annotate")]
 mod page_teacher;
+mod paint;
 #[cfg(feature = "simulation")]
 mod parts;
 mod progress;
@@ -46,6 +48,7 @@ use clap::{Command as ClapCommand, CommandFactory, FromArgMatches};
 
 use crate::args::{Args, Command};
 use crate::exit::Outcome;
+use crate::paint::{Paint, Tone};
 
 #[doc(hidden)]
 /// The definition of the command line, with what no verb says by itself.
@@ -56,6 +59,7 @@ pub fn command() -> ClapCommand {
 #[doc(hidden)]
 /// Reads the arguments of this process; wrong ones end it with their message, as `--help` does with its text.
 pub fn parse_args() -> Args {
+    clock::start();
     Args::from_arg_matches(&command().get_matches()).unwrap_or_else(|error| error.exit())
 }
 
@@ -102,11 +106,24 @@ pub fn run(args: &Args) -> ExitCode {
         Command::Devices(devices) => commands::devices::run(devices),
     };
     match done {
-        Ok(outcome) => outcome.into(),
+        Ok(outcome) => {
+            if tells_its_time(&args.command) {
+                eprintln!("took {:.1} s from start to exit", clock::elapsed_secs());
+            }
+            outcome.into()
+        }
         Err(error) if exit::is_closed_pipe(&error) => Outcome::Done.into(),
         Err(error) => {
-            eprintln!("sdg: {}", exit::one_line(&error));
+            eprintln!("{} {}", Paint::stderr().text(Tone::Bad, "sdg:"), exit::one_line(&error));
             exit::code_of(&error)
         }
     }
+}
+
+/// Verbs that a person waits for, and that show the time of a part of their work or none; `teach` and `weights convert` tell theirs in their lines.
+fn tells_its_time(command: &Command) -> bool {
+    matches!(
+        command,
+        Command::Demo(_) | Command::Rehearse(_) | Command::Evaluate(_) | Command::Grasp(_) | Command::Augment(_)
+    )
 }

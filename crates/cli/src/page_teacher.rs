@@ -25,6 +25,7 @@ use sdg_grasp::{
 use sdg_inputs::camera_files::CameraFile;
 
 use crate::found_text::{MIN_ADVISED_SCORE, Wording};
+use crate::paint::Paint;
 
 /// Teaches with one preset.
 pub struct PageTeacher {
@@ -42,6 +43,51 @@ impl GraspTeacher for PageTeacher {
         observe: &mut dyn FnMut(TeachingStep) -> ControlFlow<()>,
     ) -> Result<Box<dyn TaughtModel>, TeacherError> {
         let start = Instant::now();
+        let (file, demonstrations) = self.taught_file(material, request, observe)?;
+        let figures = file.figures(&demonstrations, request.seed)?;
+        let TaughtFile { model, bytes, .. } = file;
+        let summary = summary(&model, Some(page_figures(&figures)), start.elapsed().as_secs_f64());
+        Ok(Box::new(PageModel { detector: Mutex::new(self.detector(model)?), summary, bytes }))
+    }
+
+    fn teach_on_trial(
+        &self,
+        material: &TeachingMaterial,
+        request: &TeachRequest,
+    ) -> Result<Box<dyn TaughtModel>, TeacherError> {
+        let start = Instant::now();
+        let (file, _) = self.taught_file(material, request, &mut |_| ControlFlow::Continue(()))?;
+        let TaughtFile { model, bytes, .. } = file;
+        let summary = summary(&model, None, start.elapsed().as_secs_f64());
+        Ok(Box::new(PageModel { detector: Mutex::new(self.detector(model)?), summary, bytes }))
+    }
+
+    fn check_region(&self, region: &Region, demonstrations: &[Demonstration]) -> Result<(), TeacherError> {
+        let region = search_region(region);
+        let Some((camera, [mark, grasp])) = &self.camera else {
+            let mut options = TeachOptions::new(0);
+            options.region = Some(region);
+            return Ok(check_teaching_region(demonstrations, &options)?);
+        };
+        let (seen, lengths) = camera.seen_from_above(demonstrations, *mark, *grasp)?;
+        Ok(check_region_from_above(&region, &seen, &camera.over_table, &lengths)?)
+    }
+
+    fn open(&self, bytes: &[u8], summary: &TaughtSummary) -> Result<Box<dyn TaughtModel>, TeacherError> {
+        let model = GraspModel::from_bytes(bytes, &TeachOptions::new(0).device)?;
+        let detector = Mutex::new(self.detector(model)?);
+        Ok(Box::new(PageModel { detector, summary: summary.clone(), bytes: bytes.to_vec() }))
+    }
+}
+
+impl PageTeacher {
+    /// A model, and the demonstrations as it was taught them: from above where a camera is known.
+    fn taught_file<'m>(
+        &self,
+        material: &'m TeachingMaterial,
+        request: &TeachRequest,
+        observe: &mut dyn FnMut(TeachingStep) -> ControlFlow<()>,
+    ) -> Result<(TaughtFile, Cow<'m, [Demonstration]>), TeacherError> {
         let mut options = TeachOptions::new(request.seed);
         options.kind = request.model;
         options.preset = self.preset;
@@ -68,31 +114,9 @@ impl GraspTeacher for PageTeacher {
             demonstrations = Cow::Owned(seen);
         }
         let file = TaughtFile::teach(&demonstrations, &options, &mut |event| observe(step(event)))?;
-        let figures = file.figures(&demonstrations, request.seed)?;
-        let TaughtFile { model, bytes, .. } = file;
-        let summary = summary(&model, page_figures(&figures), start.elapsed().as_secs_f64());
-        Ok(Box::new(PageModel { detector: Mutex::new(self.detector(model)?), summary, bytes }))
+        Ok((file, demonstrations))
     }
 
-    fn check_region(&self, region: &Region, demonstrations: &[Demonstration]) -> Result<(), TeacherError> {
-        let region = search_region(region);
-        let Some((camera, [mark, grasp])) = &self.camera else {
-            let mut options = TeachOptions::new(0);
-            options.region = Some(region);
-            return Ok(check_teaching_region(demonstrations, &options)?);
-        };
-        let (seen, lengths) = camera.seen_from_above(demonstrations, *mark, *grasp)?;
-        Ok(check_region_from_above(&region, &seen, &camera.over_table, &lengths)?)
-    }
-
-    fn open(&self, bytes: &[u8], summary: &TaughtSummary) -> Result<Box<dyn TaughtModel>, TeacherError> {
-        let model = GraspModel::from_bytes(bytes, &TeachOptions::new(0).device)?;
-        let detector = Mutex::new(self.detector(model)?);
-        Ok(Box::new(PageModel { detector, summary: summary.clone(), bytes: bytes.to_vec() }))
-    }
-}
-
-impl PageTeacher {
     fn detector(&self, model: GraspModel) -> anyhow::Result<Perception> {
         match &self.camera {
             None => Ok(Perception::of_any_camera(model)),
@@ -112,11 +136,11 @@ fn page_region(region: &SearchRegion) -> Region {
 }
 
 /// `seconds` is what the person waited: teaching, and trying the model on held-back samples.
-fn summary(model: &GraspModel, figures: Figures, seconds: f64) -> TaughtSummary {
+fn summary(model: &GraspModel, figures: Option<Figures>, seconds: f64) -> TaughtSummary {
     let negatives =
         model.facts().negatives.map(|said| NegativesRefused { refused: said.refused, pictures: said.pictures });
     let object = model.object().to_owned();
-    TaughtSummary { model: model.kind(), object, seconds, figures: Some(figures), negatives }
+    TaughtSummary { model: model.kind(), object, seconds, figures, negatives }
 }
 
 fn page_figures(figures: &HeldBackFigures) -> Figures {
@@ -168,9 +192,17 @@ impl PageModel {
     fn find(&self, image: &RgbImage, with_places: bool) -> Result<Vec<FoundGrasp>, TeacherError> {
         let detector = self.detector();
         let found = detector.detect(image, Verification::ByShape)?;
-        let wording =
-            Wording { detector: &detector, picture_size: image.dimensions().into(), min_score: DEFAULT_MIN_SCORE };
+        let wording = Wording {
+            detector: &detector,
+            picture_size: image.dimensions().into(),
+            min_score: DEFAULT_MIN_SCORE,
+            paint: Paint::PLAIN,
+        };
         let mut grasps: Vec<FoundGrasp> = found.iter().map(|found| found_grasp(&detector, found, &wording)).collect();
+        let detections: Vec<_> = found.iter().map(|found| &found.detection).collect();
+        for (grasp, touches) in grasps.iter_mut().zip(detector.touched_by_jaws(&detections)) {
+            grasp.touches = touches;
+        }
         if with_places {
             let explained: Vec<usize> = wording.explained(found.iter().map(|found| &found.detection));
             let detections: Vec<_> = explained.iter().map(|&idx| &found[idx].detection).collect();
@@ -223,24 +255,23 @@ fn remedy(advice: Advice) -> String {
     words.to_owned()
 }
 
-/// The marked line is as long, against the part, as the first demonstration's: detections tell its middle only.
+/// What it touches is not known of one alone.
 fn found_grasp(detector: &Perception, found: &Found, wording: &Wording<'_>) -> FoundGrasp {
-    let taught = &detector.model().demonstrations()[0].marks;
     let detection = &found.detection;
-    let scale = if taught.width_px > 0.0 { detection.grasp.width / taught.width_px } else { 1.0 };
     FoundGrasp {
         score: detection.score,
         is_accepted: detection.is_accepted(),
         bbox: detection.bbox,
         outline: detection.outline.clone(),
         grasp: detection.grasp,
-        line_length: taught.grasp.length() * scale,
+        line_length: detector.marked_length(detection),
         pose: found.pose.as_ref().zip(detector.frame()).map(|(pose, frame)| grasp_pose(pose, frame)),
         refusal: (!detection.is_accepted()).then(|| Refusal {
             reason: wording.reasons(detection, 2),
             remedy: detection.advice().filter(|_| detection.score >= MIN_ADVISED_SCORE).map(remedy),
             ..Refusal::default()
         }),
+        touches: Vec::new(),
     }
 }
 

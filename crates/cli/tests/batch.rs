@@ -5,7 +5,7 @@ use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
-use crate::support::{Folder, sdg, shipped, stdout, taught_pendulum};
+use crate::support::{Folder, pendulum_twice, sdg, shipped, stdout, taught_pendulum};
 use image::{ImageFormat, Rgb, RgbImage};
 use serde_json::Value;
 
@@ -229,4 +229,31 @@ fn a_monochrome_cameras_picture_shows_the_coloured_part() {
     let printed: Value = serde_json::from_str(&printed).unwrap();
     let score = printed["detections"][0]["score"].as_f64();
     assert!(score >= Some(0.9), "{printed}");
+}
+
+#[test]
+fn jaws_that_would_touch_a_neighbour_are_told() {
+    let folder = Folder::new();
+    let model = taught(&folder);
+    let (near, far) = (folder.path("near.png"), folder.path("far.png"));
+    // The neighbour's ring lies where a jaw of the first one comes down; the other neighbour is out of reach.
+    pendulum_twice([59, -6]).save(&near).unwrap();
+    pendulum_twice([-200, 100]).save(&far).unwrap();
+    let printed = stdout(&["detect", "--grasp-model", &model, "--json", &near, &far]);
+    let pictures: Vec<Value> = printed.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let detections = |line: &Value| line["detections"].as_array().unwrap().clone();
+    let (near_ones, far_ones) = (detections(&pictures[0]), detections(&pictures[1]));
+    assert_eq!([near_ones.len(), far_ones.len()], [2, 2], "{printed}");
+    let first = near_ones.iter().position(|one| one["grasp"]["x"].as_f64().unwrap() < 350.0).unwrap();
+    assert_eq!(near_ones[first]["jaws_touch"], serde_json::json!([1 - first]), "{printed}");
+    assert!(far_ones.iter().all(|one| one.get("jaws_touch").is_none()), "{printed}");
+
+    let words = stdout(&["detect", "--grasp-model", &model, &near, &far]);
+    let told = words.lines().filter(|line| line.contains("warning: the jaws would touch the part at ("));
+    assert!(told.clone().count() >= 1 && told.clone().all(|line| line.contains("near.png")), "{words}");
+    // A part that does not count is not in the way.
+    let alone = sdg(&["detect", "--grasp-model", &model, "--all", "--min-score", "1", "--json", &near]);
+    let alone = lines(&alone);
+    let listed = alone[0]["detections"].as_array().unwrap();
+    assert!(listed.len() >= 2 && listed.iter().all(|one| one.get("jaws_touch").is_none()), "{alone:?}");
 }

@@ -18,6 +18,7 @@ struct DetectionView {
     marks: Marks,
     pose: Option<GraspPose>,
     refusal: Option<Refusal>,
+    touches: Vec<usize>,
 }
 
 /// All of a picture, and how long they took.
@@ -53,6 +54,7 @@ pub fn detect(session: &Session, picture: &RgbImage, explained: Explained) -> Re
         marks: Marks::of_found(&found, size),
         pose: found.pose,
         refusal: found.refusal,
+        touches: found.touches,
     };
     Ok(DetectionsView { seconds, detections: found.into_iter().map(view).collect() })
 }

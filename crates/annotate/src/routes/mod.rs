@@ -25,6 +25,7 @@
 //! | `GET /api/trial-pictures/{id}/picture` | that picture |
 //! | `POST /api/trial-pictures/{id}/detect` | grasps in it |
 //! | `POST /api/trial-pictures/{id}/accept` | makes it a demonstration with the marks given |
+//! | `POST /api/trial-pictures/{id}/would-help` | what model S would find in others, had it learnt from this one, too |
 //! | `PUT /api/trial-pictures/{id}/absent` | says that the part is not there, or takes that back |
 //! | `PUT /api/models/{id}/current` | uses a version of the model, of those in `GET /api/session` |
 //! | `POST /api/models/{id}/compare/{other}` | what two versions find in the pictures to try |

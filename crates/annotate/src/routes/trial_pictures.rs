@@ -18,6 +18,9 @@ pub fn answer(session: &Session, request: &Request, method: &str, id: usize, res
             json_of(pixels.and_then(|pixels| detect(session, &pixels, Explained::WithPlaces)))
         }
         ("POST", ["accept"]) => json_of(read("marks", &request.body).and_then(|marks| session.accept(id, marks))),
+        ("POST", ["would-help"]) => {
+            json_of(read("question", &request.body).and_then(|question| session.would_help(id, question)))
+        }
         ("PUT", ["absent"]) => {
             json_of(read("absent", &request.body).and_then(|Absent { absent }| session.set_absent(id, absent)))
         }

@@ -2,14 +2,29 @@
 
 use std::path::Path;
 
+use sdg_demonstration::ModelKind;
+use serde::Deserialize;
+
 use super::{MAX_LABEL_CHARS, MAX_TRIAL_PICTURES, Session};
 use crate::error::{Error, Result};
 use crate::marks::Marks;
 use crate::names::{file_name, free_name};
 use crate::picture::{Picture, png};
-use crate::session_state::TrialPicture;
-use crate::teacher::TaughtModel;
+use crate::session_state::{MarkedPicture, TrialPicture};
+use crate::teacher::{TaughtModel, TeachRequest, TeachingMaterial};
 use crate::views::{ComparedPicture, ImageView, TrialPictureView};
+
+/// Whether learning from a picture would help in others.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct HelpQuestion {
+    /// How it is to be taught.
+    teaching: TeachRequest,
+    /// The marks that the picture would have.
+    marks: Marks,
+    /// Numbers of the other pictures.
+    others: Vec<usize>,
+}
 
 impl Session {
     /// A picture to try.
@@ -122,6 +137,42 @@ impl Session {
             })
         });
         compared.collect()
+    }
+
+    /// What a model without a network that has learnt from a tried picture, too, finds in other tried ones: the best score in each. Nothing is kept.
+    /// `None` while a teaching goes on, whose model is another question.
+    ///
+    /// # Errors
+    /// A model with a network; no such picture, marks that do not suffice.
+    pub(crate) fn would_help(&self, trial_id: usize, question: HelpQuestion) -> Result<Option<Vec<(usize, f64)>>> {
+        let HelpQuestion { teaching, marks, others } = question;
+        teaching.check()?;
+        if teaching.model != ModelKind::S {
+            let found = teaching.model.letter().to_string();
+            return Err(Error::Request { what: "model", expected: "S, which is taught in a second".into(), found });
+        }
+        if self.check_idle().is_err() {
+            return Ok(None);
+        }
+        let mut demonstrations = self.demonstrations(teaching.model)?;
+        let (further, negatives, pictures, region) = {
+            let state = self.state();
+            let picture = state.trial_picture(trial_id)?.picture.clone();
+            let pictures = others.iter().map(|&id| Ok((id, state.trial_picture(id)?.picture.clone())));
+            let pictures = pictures.collect::<Result<Vec<_>>>()?;
+            let negatives: Vec<Picture> = state.negatives().cloned().collect();
+            (MarkedPicture::unsaved(picture, marks).demonstration(&state.label)?, negatives, pictures, state.region)
+        };
+        demonstrations.push(further);
+        let negatives = negatives.iter().map(Picture::pixels).collect::<Result<Vec<_>>>()?;
+        let request = TeachRequest { region, ..teaching };
+        let material = TeachingMaterial { demonstrations, negatives };
+        let model = self.teacher.teach_on_trial(&material, &request).map_err(Error::Teacher)?;
+        let best_in = |(id, picture): (usize, Picture)| {
+            let found = model.detect(&picture.pixels()?).map_err(Error::Teacher)?;
+            Ok((id, found.iter().map(|one| one.score).fold(0.0, f64::max)))
+        };
+        pictures.into_iter().map(best_in).collect::<Result<_>>().map(Some)
     }
 
     /// Makes a tried picture a demonstration with these marks. One that came from the page, or that lies elsewhere, gets a place beside

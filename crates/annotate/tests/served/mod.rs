@@ -77,6 +77,15 @@ impl GraspTeacher for InPlace {
         Ok(Box::new(InPlaceModel(demonstration, negatives, Mutex::new(request.region))))
     }
 
+    fn teach_on_trial(
+        &self,
+        material: &TeachingMaterial,
+        request: &TeachRequest,
+    ) -> Result<Box<dyn TaughtModel>, TeacherError> {
+        let last = material.demonstrations.last().unwrap().clone();
+        Ok(Box::new(InPlaceModel(last, material.negatives.clone(), Mutex::new(request.region))))
+    }
+
     fn check_region(&self, region: &Region, demonstrations: &[Demonstration]) -> Result<(), TeacherError> {
         fits(region, &demonstrations[0])
     }
@@ -138,6 +147,7 @@ impl TaughtModel for InPlaceModel {
             line_length: line.length(),
             pose: None,
             refusal: None,
+            touches: Vec::new(),
         }])
     }
 }

@@ -20,6 +20,7 @@ use sdg_robot::{
 };
 use serde_json::{Value, json};
 
+use crate::clock;
 use crate::commands::devices;
 use crate::exit::{Outcome, Usage};
 use crate::interrupt::Interrupt;
@@ -288,7 +289,7 @@ fn print_report(args: &GraspArgs, prepared: &Prepared, ended: &Ended, secs: f64,
             let width_mm = grasp.closed.map_or(f64::NAN, |hand| hand.opening_m * 1e3);
             // A simulated arm ends with the program.
             let then = if robot == "sim" { "" } else { "; sdg robot open lets it go" };
-            eprintln!("the part is held, {width_mm:.0} mm between the fingers ({secs:.1} s){then}");
+            eprintln!("the part is held, {width_mm:.0} mm between the fingers (the arm took {secs:.1} s){then}");
             Ok(Outcome::Done)
         }
         (None, Some((goal, _))) => {
@@ -301,7 +302,7 @@ fn print_report(args: &GraspArgs, prepared: &Prepared, ended: &Ended, secs: f64,
                     error.angle_rad.abs().to_degrees()
                 ),
             };
-            eprintln!("the part {where_it_lies} \"{}\" ({secs:.1} s)", goal.name);
+            eprintln!("the part {where_it_lies} \"{}\" (the arm took {secs:.1} s)", goal.name);
             Ok(Outcome::Done)
         }
         (Some((_, why)), _) if is_nothing_found(grasp) => {
@@ -347,6 +348,7 @@ fn to_json(prepared: &Prepared, ended: &Ended, secs: f64, robot: &str) -> Value 
         "target": target,
         "closed_width_m": report.closed.map(|hand| hand.opening_m),
         "seconds": secs,
+        "total_seconds": clock::elapsed_secs(),
     });
     if let Some(height) = &report.height {
         object["height"] = height_json(height, prepared.workcell.table_height_m);

@@ -4,7 +4,7 @@ use std::fmt::Display;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use anyhow::Result;
 use clap::Args as ClapArgs;
@@ -18,11 +18,13 @@ use sdg_inputs::{TeachingFiles, base_weights};
 use sdg_weights_conversion::Report;
 use serde_json::{Value, json};
 
+use crate::clock;
 use crate::commands::devices;
 use crate::demonstrations;
 use crate::exit::{Outcome, Usage};
 use crate::interrupt::Interrupt;
 use crate::json_line::json_line;
+use crate::paint::{Paint, Tone};
 use crate::shared_args::{ComputeArgs, SizeTolerance, TaughtCameraArgs, region, seconds, size_tolerance};
 use crate::teaching_progress::TeachingProgress;
 
@@ -150,7 +152,6 @@ pub(super) fn teach_to_file(
 
 /// Checks everything that can be wrong before it starts to take minutes.
 pub fn run(args: &TeachArgs) -> Result<Outcome> {
-    let started = Instant::now();
     let mut options = options(args)?;
     let files = TeachingFiles {
         demonstrations: &demonstrations::pairs(&args.demonstrations)?,
@@ -194,7 +195,7 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
     let facts = taught.model.facts();
     let failure = figures.failure();
     if let Some(failure) = &failure {
-        eprintln!("warning: {failure}");
+        eprintln!("{} {failure}", Paint::stderr().text(Tone::Doubtful, "warning:"));
     }
     for told in taught_words::openings_by_the_box(&taught.model, &demonstrations) {
         eprintln!("{told}");
@@ -207,7 +208,7 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
             "out": args.out.display().to_string(),
             "bytes": bytes.len(),
             "teach_seconds": facts.seconds,
-            "seconds": started.elapsed().as_secs_f64(),
+            "seconds": clock::elapsed_secs(),
             "teaching": facts,
             "held_back": figures.to_json(),
             "failure": failure,
@@ -217,7 +218,7 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
         println!("{}", json_line(&line)?);
     } else {
         // What a person waits for, not the teaching alone.
-        let (seconds, training) = (started.elapsed().as_secs_f64(), taught_words::training(&taught));
+        let (seconds, training) = (clock::elapsed_secs(), taught_words::training(&taught));
         let object = taught.model.object();
         println!("taught \"{object}\" in {seconds:.1} s, of which the teaching took {:.1} s{training}", facts.seconds);
         println!("{}", figures.in_words());

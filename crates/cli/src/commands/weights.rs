@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::PathBuf;
-use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 use clap::{Args as ClapArgs, Subcommand};
@@ -16,6 +15,7 @@ use sdg_weights_conversion::{Architecture, Checkpoint, Conversion, Precision};
 use sdg_weights_conversion::{is_backbone_alone, naming_of, sha256_of};
 use serde_json::json;
 
+use crate::clock;
 use crate::commands::devices;
 use crate::exit::{Outcome, Usage};
 use crate::shared_args::ComputeArgs;
@@ -138,7 +138,6 @@ fn target(args: &ConvertArgs, checkpoint: &Checkpoint) -> Result<(Architecture, 
 
 /// The report comes first, whole even where something is missing; then the file is written, or nothing is.
 fn convert(args: &ConvertArgs) -> Result<Outcome> {
-    let start = Instant::now();
     let named = || args.input.display().to_string();
     let (mut source, checkpoint) = open(&args.input)?;
     let (architecture, metadata) = target(args, &checkpoint).with_context(named)?;
@@ -151,7 +150,7 @@ fn convert(args: &ConvertArgs) -> Result<Outcome> {
         write!(stdout, "{report}")?;
     }
     let written = conversion.write(&checkpoint, &mut source, paths, precision, &metadata);
-    let seconds = start.elapsed().as_secs_f64();
+    let seconds = clock::elapsed_secs();
     if args.json {
         let line = json!({
             "in": args.input.display().to_string(),

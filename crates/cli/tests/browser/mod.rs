@@ -13,3 +13,4 @@ mod project;
 mod projects;
 mod region;
 mod small_screen;
+mod tried;

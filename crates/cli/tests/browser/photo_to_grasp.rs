@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use serde_json::Value;
+
 use super::page::{BOX, HOLD, Page, shipped_photo};
 
 /// Issue 47: the page loads in under a second and stays below 190 KB, its photo apart.
@@ -178,15 +180,15 @@ fn teach(page: &Page) {
 }
 
 /// Asks again for longer than the browser's own patience: the computer may be busy.
-pub fn patiently(page: &Page, what: &str, script: &str) {
+pub fn patiently(page: &Page, what: &str, script: &str) -> Value {
     const TIMES: usize = 8;
     for _ in 1..TIMES {
-        if page.browser.wait_for(what, script).is_ok() {
-            return;
+        if let Ok(answer) = page.browser.wait_for(what, script) {
+            return answer;
         }
         std::thread::sleep(Duration::from_millis(10));
     }
-    page.wait_for(what, script);
+    page.wait_for(what, script)
 }
 
 fn try_on_another_picture(page: &Page) {

@@ -8,6 +8,9 @@ use std::io::{Read, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use image::RgbImage;
+use sdg_demonstration::{Annotation, ImageFacts};
+
 /// Runs `sdg` and waits for its end.
 pub fn sdg(arguments: &[impl AsRef<OsStr>]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_sdg")).args(arguments).output().unwrap()
@@ -63,6 +66,20 @@ pub fn taught_pendulum(out: impl AsRef<Path>, camera: Option<&Path>) {
         lock.write_all(made_of.as_bytes()).unwrap();
     }
     fs::copy(&model, out).unwrap();
+}
+
+/// The pendulum's photo with the part in it once more, cut out along its marked outline and laid down so many pixels further.
+pub fn pendulum_twice([dx, dy]: [i64; 2]) -> RgbImage {
+    let mut picture = image::open(shipped("pendulum", "image.png")).unwrap().into_rgb8();
+    let (width, height) = picture.dimensions();
+    let facts = ImageFacts { width, height, file_name: Some("image.png") };
+    let marks = fs::read(shipped("pendulum", "annotation.json")).unwrap();
+    let outline = Annotation::read(&marks, &facts).unwrap().remove(0).outline.unwrap();
+    let (photo, mask) = (picture.clone(), outline.rasterize(width, height));
+    for (x, y, pixel) in photo.enumerate_pixels().filter(|(x, y, _)| mask.get(*x, *y)) {
+        picture.put_pixel((i64::from(x) + dx) as u32, (i64::from(y) + dy) as u32, *pixel);
+    }
+    picture
 }
 
 /// A folder that is deleted at the end.

@@ -13,7 +13,7 @@ use anyhow::{Result, anyhow};
 use image::RgbImage;
 use sdg_camera::{Address, Frame, MjpegServer};
 use sdg_cell::{FoundRecord, FrameDetector, Frames, Next, Part, Perception, drawing};
-use sdg_grasp::{TrackState, TrackerConfig, Verification};
+use sdg_grasp::{GraspDetection, TrackState, TrackerConfig, Verification};
 use serde::Serialize;
 
 use super::args::DetectArgs;
@@ -23,6 +23,7 @@ use crate::found_text::Wording;
 use crate::interrupt::Interrupt;
 use crate::json_line::json_line;
 use crate::live_pictures;
+use crate::paint::{Paint, Tone};
 
 /// Reads frames until the camera ends, `--frames` are read or Ctrl-C is pressed.
 pub fn run(args: &DetectArgs, address: &Address, detector: Perception) -> Result<Outcome> {
@@ -161,10 +162,15 @@ fn write_line(
     seconds: f64,
     parts: &[Part],
 ) -> Result<()> {
-    let shown = || parts.iter().filter(|part| args.all || part.is_seen(args.min_score));
+    let shown: Vec<&Part> = parts.iter().filter(|part| args.all || part.is_seen(args.min_score)).collect();
+    let wording =
+        Wording { detector, picture_size: [width, height], min_score: args.min_score, paint: Paint::stdout() };
+    let detections: Vec<&GraspDetection> = shown.iter().map(|part| &part.found.detection).collect();
+    let touched = wording.touched(&detections);
     if args.json {
-        let record = |part: &Part| PartLine {
+        let record = |(part, touched): (&&Part, Vec<usize>)| PartLine {
             found: FoundRecord::new(&part.found, detector),
+            jaws_touch: touched,
             track: part.track.map(|(id, ..)| id),
             state: part.track.map(|(_, state, _)| state_name(state)),
             age_s: part.track.map(|(.., age)| age.as_secs_f64()),
@@ -180,21 +186,22 @@ fn write_line(
             seconds,
             region: detector.region().map(RegionRecord::of),
             faults: frame.faults.iter().map(fault).collect(),
-            detections: shown().map(record).collect(),
+            detections: shown.iter().zip(touched).map(record).collect(),
         };
         writeln!(out, "{}", json_line(&line)?)?;
     } else {
         for fault in &frame.faults {
             writeln!(out, "frame {}: {fault}", frame.number)?;
         }
-        if shown().next().is_none() {
-            writeln!(out, "frame {}: nothing to grasp ({:.1} ms)", frame.number, 1e3 * seconds)?;
+        if shown.is_empty() {
+            let nothing = wording.paint.text(Tone::Doubtful, "nothing to grasp");
+            writeln!(out, "frame {}: {nothing} ({:.1} ms)", frame.number, 1e3 * seconds)?;
         }
-        let wording = Wording { detector, picture_size: [width, height], min_score: args.min_score };
-        for part in shown() {
+        for (part, touched) in shown.iter().zip(touched) {
+            let touched: Vec<&GraspDetection> = touched.into_iter().map(|idx| detections[idx]).collect();
             let of =
                 part.track.map(|(id, state, _)| format!("part {} {}, ", id + 1, state_name(state).replace('_', " ")));
-            let text = wording.line(&part.found);
+            let text = wording.line(&part.found, &touched);
             writeln!(out, "frame {}: {}{text} ({:.1} ms)", frame.number, of.unwrap_or_default(), 1e3 * seconds)?;
         }
     }
@@ -242,6 +249,9 @@ struct FaultLine {
 struct PartLine {
     #[serde(flatten)]
     found: FoundRecord,
+    /// As for pictures.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    jaws_touch: Vec<usize>,
     #[serde(skip_serializing_if = "Option::is_none")]
     track: Option<u64>,
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -23,6 +23,7 @@ use crate::commands::devices;
 use crate::exit::{Outcome, Usage, one_line};
 use crate::found_text::{Wording, advice_in_words};
 use crate::json_line::json_line;
+use crate::paint::{Paint, Tone};
 use crate::shared_args::RegionArg;
 
 /// Every image gets its line; one that cannot be read gets its error, and the next one its turn.
@@ -153,7 +154,7 @@ impl<W: Write> Batch<'_, W> {
             writeln!(self.stdout, "{}", json_line(&line)?)?;
         } else if !self.is_alone {
             self.stdout.flush()?;
-            eprintln!("error: {error}");
+            eprintln!("{} {error}", Paint::stderr().text(Tone::Bad, "error:"));
         }
         self.last_error = error;
         Ok(())
@@ -199,19 +200,23 @@ impl Seen {
     }
 
     fn wording<'a>(&self, detector: &'a Perception, min_score: f64) -> Wording<'a> {
-        Wording { detector, picture_size: self.size, min_score }
+        Wording { detector, picture_size: self.size, min_score, paint: Paint::stdout() }
     }
 
     fn write(&self, out: &mut impl Write, args: &DetectArgs, detector: &Perception, name: &str) -> Result<()> {
         let wording = self.wording(detector, args.min_score);
         let refused: Vec<&GraspDetection> =
             self.detections.iter().map(|found| &found.detection).filter(|found| !wording.is_accepted(found)).collect();
-        let listed = self.detections.iter().filter(|found| args.all || wording.is_accepted(&found.detection));
+        let listed: Vec<&Found> =
+            self.detections.iter().filter(|found| args.all || wording.is_accepted(&found.detection)).collect();
+        let detections: Vec<&GraspDetection> = listed.iter().map(|found| &found.detection).collect();
+        let touched = wording.touched(&detections);
         if args.json {
-            let record = |found: &Found| PictureRecord {
+            let record = |(found, touched): (&&Found, Vec<usize>)| PictureRecord {
                 found: FoundRecord::new(found, detector),
                 size: detector.size_of(&found.detection, self.size),
                 advice: found.detection.advice().map(advice_in_words),
+                jaws_touch: touched,
             };
             let line = ImageLine {
                 image: name,
@@ -221,7 +226,7 @@ impl Seen {
                 seconds: self.seconds,
                 region: detector.region().map(RegionRecord::of),
                 num_refused: refused.len(),
-                detections: listed.map(record).collect(),
+                detections: listed.iter().zip(touched).map(record).collect(),
             };
             writeln!(out, "{}", json_line(&line)?)?;
             return Ok(());
@@ -229,8 +234,9 @@ impl Seen {
         if refused.len() == self.detections.len() {
             writeln!(out, "{name}: {}", wording.nothing(&refused, args.all))?;
         }
-        for found in listed {
-            writeln!(out, "{name}: {}", wording.line(found))?;
+        for (found, touched) in listed.iter().zip(touched) {
+            let touched: Vec<&GraspDetection> = touched.into_iter().map(|idx| detections[idx]).collect();
+            writeln!(out, "{name}: {}", wording.line(found, &touched))?;
         }
         Ok(())
     }
@@ -261,6 +267,9 @@ struct PictureRecord {
     size: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     advice: Option<&'static str>,
+    /// Numbers, in this list, of the parts that its jaws would touch.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    jaws_touch: Vec<usize>,
 }
 
 /// A line of `--json` for an image that cannot be used.

@@ -11,6 +11,7 @@ use super::args::TeachTriggerArgs;
 use crate::commands::teach::teach_to_file;
 use crate::demonstrations::photo_and_marks;
 use crate::interrupt::Interrupt;
+use crate::paint::{Paint, Tone};
 use crate::shared_args::{TaughtCameraArgs, height_mm};
 
 /// What a Trigger teaches, where that is said.
@@ -53,7 +54,7 @@ pub(super) fn teach(job: &TeachJob, camera: Option<&Path>, interrupt: &Interrupt
     let demonstrations = files.read(&mut options)?;
     let (_, figures) = teach_to_file(&demonstrations, &options, &job.out, interrupt)?;
     if let Some(failure) = figures.failure() {
-        eprintln!("warning: {failure}");
+        eprintln!("{} {failure}", Paint::stderr().text(Tone::Doubtful, "warning:"));
     }
     Ok(())
 }

@@ -1,0 +1,82 @@
+// After the first refusals: which of the refused pictures, learnt from, would help most in the others.
+//
+// Each of the few that come nearest is learnt from on trial, and the others are looked at with that. It is tried with model S alone, which is
+// taught in a second, and whether the part is where it was refused only the person knows.
+
+import { api } from "./api.js";
+import { button } from "./buttons.js";
+import { isFound, isLive, state, trialPicture } from "./store.js";
+import { openTrialPicture } from "./strip.js";
+import { isQuick, teachRequest } from "./teach.js";
+
+/** Below it nothing resembles the part. The same as in found_text.rs. */
+const MIN_LIKE = 0.03;
+const MAX_CANDIDATES = 3;
+const MAX_OTHERS = 8;
+/** No further one is begun after so long. */
+const MAX_MS = 6000;
+
+const by = (id) => document.getElementById(id);
+const best = ({ detections }) => detections[0]?.score ?? 0;
+
+/** What there is to try; null where there is nothing, or not yet. */
+function question() {
+  if (state.tab !== "try" || isLive() || !isQuick()) return null;
+  const { trialPictures } = state;
+  if (trialPictures.some((trial) => !trial.detections && !trial.failed)) return null;
+  const refused = trialPictures.filter((t) => t.detections && t.became === null && !t.is_absent && !t.detections.some(isFound));
+  const candidates = refused.filter((t) => best(t) >= MIN_LIKE).sort((a, b) => best(b) - best(a)).slice(0, MAX_CANDIDATES);
+  if (!candidates.length || refused.length < 2) return null;
+  const model = state.models.find(({ is_current }) => is_current).id;
+  const key = JSON.stringify([model, candidates.map(({ id }) => id), refused.map(({ id }) => id)]);
+  return { key, candidates, refused };
+}
+
+/** The question that is answered, or being answered; for each candidate the best score in each of the other pictures. */
+let [asked, answers, isDone, isAsking] = ["", [], true, false];
+
+async function ask({ key, candidates, refused }) {
+  [asked, answers, isDone, isAsking] = [key, [], false, true];
+  const start = performance.now();
+  for (const candidate of candidates) {
+    const others = refused.filter((trial) => trial !== candidate).slice(0, MAX_OTHERS).map(({ id }) => id);
+    try {
+      const scores = await api.wouldHelp(candidate.id, { teaching: { ...teachRequest(), model: "S" }, marks: candidate.detections[0].marks, others });
+      if (!scores) break;
+      answers.push({ candidate, scores: scores.map(([, score]) => score) });
+    } catch {
+      // Marks that cannot be taught: nothing is said of this one.
+    }
+    if (performance.now() - start > MAX_MS || question()?.key !== key) break;
+  }
+  [isDone, isAsking] = [true, false];
+  renderHelps();
+}
+
+/** What is said, and the picture that it is about. */
+function answer() {
+  if (!isDone) return { text: "Trying which of the refused pictures would help most…" };
+  const counted = answers.map(({ candidate, scores }) => ({ candidate, count: scores.filter((score) => score >= state.minScore).length, of: scores.length }));
+  const most = counted.reduce((a, b) => (b.count > (a?.count ?? -1) ? b : a), null);
+  if (!most) return { text: "" };
+  const { candidate, count, of } = most;
+  const others = of === 1 ? "the other picture in which it is refused" : `${count} of the ${of} other pictures in which it is refused`;
+  if (!count) return { text: "Learning from one of the refused pictures alone would not help in the others." };
+  const text = `${candidate.name} would help most: if the part is where it was refused there, and the model learns from it, the part is found in ${others}.`;
+  return { text, candidate };
+}
+
+/** Asks once what is to be asked, and shows what came of it. */
+export function renderHelps() {
+  const now = question();
+  if (now && now.key !== asked && !isAsking) ask(now);
+  const { text, candidate } = now && now.key === asked ? answer() : { text: "" };
+  const helps = by("helps");
+  helps.hidden = !text;
+  const isElsewhere = Boolean(candidate) && candidate !== trialPicture();
+  const wanted = `${text}${isElsewhere}`;
+  if (helps.dataset.shown === wanted) return;
+  helps.dataset.shown = wanted;
+  helps.replaceChildren(text);
+  if (isElsewhere) helps.append(" ", button("Look at it", () => openTrialPicture(state.trialPictures.indexOf(candidate)), "plain"));
+}

@@ -1,0 +1,125 @@
+//! Whether the jaws of a grasp touch another part, as far as the picture shows.
+//!
+//! ```text
+//!    ┌─────┐         jaw: from half the opening outwards, as long as a finger is wide
+//!    └─────┘
+//!   ═══════════      the part between them
+//!    ┌─────┐
+//!    └───╱─┘
+//!       ╱ neighbour  its outline reaches under a jaw
+//! ```
+//! The jaws are open as wide as the grasp is marked. A hand that opens wider needs more room, and what the model was not taught is not seen: no
+//! warning is no promise.
+
+use nalgebra::{Point2, Vector2};
+use sdg_geometry::{PlanarGrasp, Polygon};
+use sdg_grasp::GraspDetection;
+use sdg_kinematics::{FINGER_HALF_WIDTH_M, finger_thickness_m};
+
+use crate::perception::Perception;
+
+/// An outline that covers less of a jaw than this does not count: outlines are right to about a pixel. Chosen by hand.
+const MIN_COVERED: f64 = 0.03;
+/// Two detections that share more of their area than this are readings of one part. Chosen by hand.
+const SAME_PART: f64 = 0.5;
+
+/// A jaw seen from above, in pixels.
+#[derive(Debug, Clone, Copy)]
+struct Jaw {
+    /// Along the marked line.
+    length: f64,
+    /// Across it.
+    thickness: f64,
+}
+
+impl Jaw {
+    /// A finger of this width, as thick as the Franka hand's tips are for their width.
+    fn of_length(length: f64) -> Self {
+        Self { length, thickness: length * finger_thickness_m(0.0) / (2.0 * FINGER_HALF_WIDTH_M) }
+    }
+
+    /// Whether one of two such jaws at a grasp lies over a part.
+    fn touches(&self, grasp: &PlanarGrasp, part: &Polygon) -> bool {
+        let (sin, cos) = grasp.angle.radians().sin_cos();
+        let (along, across) = (Vector2::new(cos, sin), Vector2::new(-sin, cos));
+        [-1.0, 1.0].into_iter().any(|side| {
+            // In the jaw's own frame the polygon's clip against an image does the cutting.
+            let in_jaw = |p: &Point2<f64>| {
+                let from_middle = p - grasp.center();
+                let out = side * across.dot(&from_middle) - 0.5 * grasp.width;
+                Point2::new(along.dot(&from_middle) + 0.5 * self.length, out)
+            };
+            let part = Polygon { vertices: part.vertices.iter().map(in_jaw).collect() };
+            part.clip(self.length, self.thickness).area() > MIN_COVERED * self.length * self.thickness
+        })
+    }
+}
+
+fn region(detection: &GraspDetection) -> Polygon {
+    detection.outline.clone().unwrap_or_else(|| Polygon::from_box(&detection.bbox))
+}
+
+impl Perception {
+    /// For each detection in a picture, in their order, the numbers of those whose parts its jaws touch. Fingers have the Franka hand's size where
+    /// the camera's place is known; elsewhere they are as wide as the marked line is long.
+    pub fn touched_by_jaws(&self, detections: &[&GraspDetection]) -> Vec<Vec<usize>> {
+        let regions: Vec<Polygon> = detections.iter().map(|detection| region(detection)).collect();
+        let touched = |(idx, detection): (usize, &&GraspDetection)| {
+            let finger_px = self.metres_per_pixel(&detection.grasp.center()).map(|m| 2.0 * FINGER_HALF_WIDTH_M / m);
+            let jaw = Jaw::of_length(finger_px.unwrap_or_else(|| self.marked_length(detection)));
+            let is_touched = |&other: &usize| {
+                other != idx
+                    && jaw.touches(&detection.grasp, &regions[other])
+                    && regions[other].share_inside(&regions[idx]) < SAME_PART
+            };
+            (0..detections.len()).filter(is_touched).collect()
+        };
+        detections.iter().enumerate().map(touched).collect()
+    }
+
+    /// How long the marked line is on a detected part, in pixels: detections tell its middle only.
+    pub fn marked_length(&self, detection: &GraspDetection) -> f64 {
+        let taught = &self.model().demonstrations()[0].marks;
+        let scale = if taught.width_px > 0.0 { detection.grasp.width / taught.width_px } else { 1.0 };
+        taught.grasp.length() * scale
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sdg_geometry::{Angle, BoundingBox};
+
+    /// Jaws of 22 x 15 pixels that close over 20 pixels, from above and below at an angle of zero.
+    fn touches(angle_deg: f64, part: [f64; 4]) -> bool {
+        let grasp = PlanarGrasp { x: 100.0, y: 100.0, angle: Angle::from_degrees(angle_deg), width: 20.0 };
+        let [x1, y1, x2, y2] = part;
+        Jaw::of_length(22.0).touches(&grasp, &Polygon::from_box(&BoundingBox { x1, y1, x2, y2 }))
+    }
+
+    #[test]
+    fn a_part_under_a_jaw_is_touched_and_one_beside_it_is_not() {
+        // Jaws take y from 75 to 90 and from 110 to 125, x from 89 to 111.
+        assert!(touches(0.0, [60.0, 115.0, 140.0, 135.0]));
+        assert!(touches(0.0, [60.0, 60.0, 140.0, 85.0]));
+        assert!(!touches(0.0, [60.0, 126.0, 140.0, 146.0]));
+        assert!(!touches(0.0, [112.0, 60.0, 140.0, 140.0]));
+        // Between the jaws there is no jaw.
+        assert!(!touches(0.0, [60.0, 92.0, 140.0, 108.0]));
+        // A neighbour that is smaller than a jaw, wholly under it.
+        assert!(touches(0.0, [98.0, 114.0, 104.0, 119.0]));
+    }
+
+    #[test]
+    fn jaws_turn_with_the_grasp() {
+        // A quarter turn: x from 75 to 90 and from 110 to 125.
+        assert!(touches(90.0, [112.0, 60.0, 140.0, 140.0]));
+        assert!(!touches(90.0, [60.0, 126.0, 140.0, 146.0]));
+    }
+
+    #[test]
+    fn a_graze_of_less_than_a_pixel_does_not_count() {
+        assert!(!touches(0.0, [60.0, 124.7, 140.0, 146.0]));
+        assert!(touches(0.0, [60.0, 123.0, 140.0, 146.0]));
+    }
+}

@@ -1,0 +1,67 @@
+//! Colours for people at a terminal: none in files and pipes, none where `NO_COLOR` is set (https://no-color.org) or the terminal is dumb.
+
+use std::io::IsTerminal;
+
+/// What a colour says; the words say it, too.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Tone {
+    /// Found.
+    Good,
+    /// To be looked at: refused, a warning.
+    Doubtful,
+    /// An error.
+    Bad,
+}
+
+/// Whether a stream shows colours.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Paint(bool);
+
+impl Paint {
+    /// No colours.
+    pub const PLAIN: Self = Self(false);
+
+    /// For standard output.
+    pub fn stdout() -> Self {
+        Self(std::io::stdout().is_terminal() && is_wanted(|name| std::env::var_os(name)))
+    }
+
+    /// For standard error.
+    pub fn stderr() -> Self {
+        Self(std::io::stderr().is_terminal() && is_wanted(|name| std::env::var_os(name)))
+    }
+
+    /// The text in a tone's colour, of the terminal's own palette.
+    pub fn text(self, tone: Tone, text: &str) -> String {
+        let code = match tone {
+            Tone::Good => 32,
+            Tone::Doubtful => 33,
+            Tone::Bad => 31,
+        };
+        if self.0 { format!("\x1b[{code}m{text}\x1b[0m") } else { text.to_owned() }
+    }
+}
+
+fn is_wanted(variable: impl Fn(&str) -> Option<std::ffi::OsString>) -> bool {
+    let is_off = variable("NO_COLOR").is_some_and(|value| !value.is_empty());
+    !is_off && variable("TERM").is_none_or(|terminal| terminal != "dumb")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_color_and_a_dumb_terminal_are_honoured() {
+        let with =
+            |name: &'static str, value: &'static str| is_wanted(move |asked| (asked == name).then(|| value.into()));
+        assert!(with("TERM", "xterm-256color") && with("NO_COLOR", ""));
+        assert!(!with("NO_COLOR", "1") && !with("TERM", "dumb"));
+    }
+
+    #[test]
+    fn text_is_coloured_and_its_colour_ended() {
+        assert_eq!(Paint(true).text(Tone::Bad, "sdg:"), "\x1b[31msdg:\x1b[0m");
+        assert_eq!(Paint::PLAIN.text(Tone::Bad, "sdg:"), "sdg:");
+    }
+}

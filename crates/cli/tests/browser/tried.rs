@@ -1,0 +1,169 @@
+//! Pictures that are tried: jaws that touch a neighbour, which refused one helps most, two hundred at once.
+
+use image::{Rgb, RgbImage};
+use serde_json::{Value, json};
+
+use super::page::{HOLD, Page, repository, shipped_photo};
+use super::photo_to_grasp::patiently;
+use crate::support::pendulum_twice;
+
+/// A page whose model S was taught from the pendulum's photo.
+fn taught() -> Page {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::copy(shipped_photo(), folder.path().join("photo.png")).unwrap();
+    let marks = repository().join("datasets/demonstrations/pendulum/annotation.json");
+    std::fs::copy(marks, folder.path().join("photo.json")).unwrap();
+    let page = Page::open_in(folder, &["photo.png"]);
+    page.wait_for("the marks", "return document.querySelectorAll('.todo li.done').length === 3");
+    page.click("#tab-teach");
+    page.choose_model("S");
+    page.click("#teach-start");
+    patiently(&page, "a model", "return !document.getElementById('go-try').hidden");
+    page.click("#tab-try");
+    page
+}
+
+/// Adds pictures at once.
+fn add(page: &Page, pictures: &[(String, RgbImage)]) {
+    let paths: Vec<_> = pictures.iter().map(|(name, _)| page.folder.path().join(name)).collect();
+    for (path, (_, picture)) in paths.iter().zip(pictures) {
+        picture.save(path).unwrap();
+    }
+    let paths: Vec<_> = paths.iter().map(|path| path.to_str().unwrap()).collect();
+    page.browser.find("#picture-input").unwrap().type_text(&paths.join("\n")).unwrap();
+}
+
+/// Whether so many pictures were looked at.
+fn looked_at(count: usize) -> String {
+    format!(
+        "const words = [...document.querySelectorAll('#strip button')].map((b) => b.innerText);
+        return words.length === {count} && words.every((w) => /found/.test(w))"
+    )
+}
+
+fn photo() -> RgbImage {
+    image::open(shipped_photo()).unwrap().into_rgb8()
+}
+
+fn crop(picture: &RgbImage, [x, y]: [u32; 2]) -> RgbImage {
+    image::imageops::crop_imm(picture, x, y, 320, 240).to_image()
+}
+
+/// What a button saves.
+fn saved(page: &Page, css: &str) -> String {
+    let script = "const made = URL.createObjectURL; let blob;
+        URL.createObjectURL = (given) => made.call(URL, (blob = given));
+        document.querySelector(arguments[0]).click(); URL.createObjectURL = made; return blob.text()";
+    page.browser.run(script, &[json!(css)]).unwrap().as_str().unwrap().to_owned()
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn jaws_that_would_touch_a_neighbour_are_told() {
+    let page = taught();
+    add(&page, &[("near.png".to_owned(), pendulum_twice([59, -6]))]);
+    patiently(&page, "both parts", "return document.querySelectorAll('#found .found').length === 2");
+    let warnings = "return [...document.querySelectorAll('#found .warning')].map((p) => p.innerText)";
+    let told = page.browser.run(warnings, &[]).unwrap();
+    let told: Vec<&str> = told.as_array().unwrap().iter().map(|text| text.as_str().unwrap()).collect();
+    assert!(told.iter().any(|text| text.starts_with("Warning: the jaws would touch part ")), "{told:?}");
+    page.settle_frames();
+    let drawn = "return document.querySelectorAll('#overlay .touching').length";
+    assert_eq!(page.browser.run(drawn, &[]).unwrap(), json!(told.len()));
+    let csv = saved(&page, "#save-csv");
+    assert!(csv.lines().next().unwrap().ends_with(",jaws_touch"), "{csv}");
+    let record: Value = serde_json::from_str(saved(&page, "#save-json").lines().next().unwrap()).unwrap();
+    let touching = record["detections"].as_array().unwrap().iter().filter(|one| one["jaws_touch"] != json!([]));
+    assert_eq!(touching.count(), told.len(), "{record}");
+    page.screenshot("tried-1-jaws");
+    page.assert_accessible("jaws that touch");
+    page.browser.emulate(390, 800, false).unwrap();
+    page.settle_frames();
+    page.assert_accessible("jaws that touch, on a small screen");
+    page.assert_quiet();
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn the_page_says_which_refused_picture_helps_most() {
+    let page = taught();
+    let mut covered = photo();
+    for y in 150..300 {
+        for x in 344..400 {
+            covered.put_pixel(x, y, Rgb([120, 130, 70]));
+        }
+    }
+    let places = [[150, 90], [190, 120], [170, 60]];
+    let pictures: Vec<_> =
+        places.iter().enumerate().map(|(i, &place)| (format!("covered-{i}.png"), crop(&covered, place))).collect();
+    add(&page, &pictures);
+    let told =
+        "const text = document.getElementById('helps').innerText; return text.includes('the part is found in') && text";
+    let told = patiently(&page, "advice", told);
+    let told = told.as_str().unwrap();
+    assert!(told.contains("the part is found in 2 of the 2 other pictures in which it is refused"), "{told}");
+    page.screenshot("tried-2-helps");
+    page.assert_accessible("which picture helps");
+    let name = told.split(' ').next().unwrap().to_owned();
+    page.browser.run("document.querySelector('#helps button')?.click()", &[]).unwrap();
+    page.wait_for("that picture", &format!("return document.getElementById('photo').alt === 'Photo {name}'"));
+    let learn = "const b = [...document.querySelectorAll('#found button')].find((b) => /learn from it/.test(b.innerText)); if (b) b.click(); return Boolean(b)";
+    page.wait_for("the button", learn);
+    // What was said comes true.
+    let learnt = "const text = document.getElementById('learnt').innerText; return text.startsWith('The new model finds') && text";
+    let learnt = patiently(&page, "what was learnt", learnt);
+    assert!(learnt.as_str().unwrap().contains("finds the part in 3 of 3 pictures"), "{learnt}");
+    page.wait_for("no more advice", "return document.getElementById('helps').hidden");
+    page.assert_quiet();
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn two_hundred_pictures_are_tried_and_saved() {
+    const COUNT: usize = 200;
+    /// The grasp of the shipped marks, and how far it may be found from it, in pixels.
+    const MAX_OFF_PX: f64 = 2.0;
+    let page = taught();
+    let photo = photo();
+    let place = |number: usize| [(120 + number * 7 % 100) as u32, (60 + number * 13 % 90) as u32];
+    let is_empty = |number: usize| number % 10 == 9;
+    let pictures: Vec<_> = (0..COUNT)
+        .map(|number| {
+            let plain = || RgbImage::from_pixel(320, 240, Rgb([140, 140, 135]));
+            let picture = if is_empty(number) { plain() } else { crop(&photo, place(number)) };
+            (format!("{number:03}.png"), picture)
+        })
+        .collect();
+    add(&page, &pictures);
+    page.wait_for(
+        "progress",
+        "const bar = document.getElementById('looked'); return !bar.hidden && bar.value > 0 && bar.value < bar.max",
+    );
+    page.assert_accessible("two hundred pictures on their way");
+    patiently(&page, "all of them", &looked_at(COUNT));
+    let count = page.text("#least-score-count");
+    assert!(count.contains("in 180 of 200 pictures"), "{count}");
+    page.screenshot("tried-3-batch");
+    let csv = saved(&page, "#save-csv");
+    assert_eq!(csv.lines().filter(|line| line.contains(",true,")).count(), 180, "{csv}");
+    assert!(csv.lines().any(|line| line.starts_with("009.png,0,false")), "{csv}");
+    let json = saved(&page, "#save-json");
+    let records: Vec<Value> = json.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    assert_eq!(records.len(), COUNT);
+    let mut places = Vec::new();
+    for (number, record) in records.iter().enumerate() {
+        assert_eq!(record["image"], json!(format!("{number:03}.png")));
+        let found = record["detections"].as_array().unwrap().iter().filter(|one| one["found"] == json!(true));
+        let found: Vec<_> = found.map(|one| ["x", "y"].map(|axis| one["grasp"][axis].as_f64().unwrap())).collect();
+        assert_eq!(found.len(), usize::from(!is_empty(number)), "{record}");
+        let [x, y] = place(number).map(f64::from);
+        places.extend(found.into_iter().map(|at| [at[0] + x, at[1] + y]));
+    }
+    // All are the same part of the same photo.
+    let middle = |axis: usize| places.iter().map(|at| at[axis]).sum::<f64>() / places.len() as f64;
+    let middle = [middle(0), middle(1)];
+    assert!((middle[0] - HOLD[0]).hypot(middle[1] - HOLD[1]) < 40.0, "{middle:?}");
+    let off = places.iter().map(|at| (at[0] - middle[0]).hypot(at[1] - middle[1])).fold(0.0, f64::max);
+    assert!(off < MAX_OFF_PX, "{off} px");
+    page.assert_quiet();
+}
