@@ -178,7 +178,7 @@ export async function proposeOutline({ quietly = false, strokes = null } = {}) {
       target.strokesOf.set(target.committed, strokes);
       const last = strokes?.at(-1);
       const middle = last?.points[Math.floor(last.points.length / 2)];
-      if (!strokes) toast("Found an outline. Draw over what is wrong with “In” or “Out”, or drag the outline.");
+      if (!strokes) toast("Found an outline. Where it is wrong, draw “In” or “Out”.");
       else if (!last.isInside && isWithin(middle, outline)) {
         toast("That place has the part all around it. An outline is one line around the part and has no holes; a hole does no harm.");
       } else if (last.isInside && !isWithin(middle, outline)) {

@@ -102,7 +102,7 @@ function renderTodo() {
     const draw = item.querySelector(`[data-draw]`);
     if (kind !== "outline") draw.textContent = marks()[kind] ? "Draw anew" : kind === "box" ? "Draw" : "Place";
   }
-  by("turn-around").hidden = by("turn-to-fit").hidden = by("finger").hidden = !grasp;
+  by("turn-around").hidden = by("turn-to-fit").hidden = !grasp;
   by("remove-photo").hidden = state.images.length < 2;
   const noBox = !box && !outline && "Draw a box around the part first";
   for (const tool of ["in", "out"]) offBecause(document.querySelector(`button[data-tool=${tool}]`), noBox);
@@ -162,6 +162,7 @@ function renderAdvice({ advice }) {
     needed.textContent = `Every model needs ${models[0].lacks.join(" and ")}${marks().outline ? "" : "; model D the outline, too"}.`;
     return enough.replaceChildren(title, needed);
   }
+  if (ready === models.length) return enough.replaceChildren(title);
   const items = document.createElement("ul");
   for (const { model, lacks } of models) {
     const item = document.createElement("li");

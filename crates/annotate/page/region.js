@@ -111,6 +111,7 @@ export function renderRegion() {
   const size = pictureSize();
   by("region").hidden = !size;
   if (!size) return;
+  by("region-title").textContent = region ? "Where to look: in a part of the picture" : "Where to look: everywhere";
   by("region-draw").setAttribute("aria-pressed", String(isDrawing));
   by("region-all").hidden = !region;
   const isOther = region?.picture && String(region.picture) !== String(size);
@@ -126,6 +127,7 @@ export function renderRegion() {
   }
   const now = JSON.stringify([region, size]);
   if (now === shown) return;
+  if (region) by("region-fold").open = true;
   shown = now;
   const values = region ? SIDES.map((side) => region[side]) : [0, 0, ...size];
   SIDES.forEach((side, i) => {

@@ -11,10 +11,10 @@ const by = (id) => document.getElementById(id);
 const POLL_MS = 400;
 const MODELS = [
   ["C", "Keypoints (recommended)", "The best all-round. Half a minute."],
-  ["S", "Shape", "No network. Ready in seconds; weaker when the part is partly hidden."],
-  ["A", "Crop", "Box, and the turn from the crop in it. About a minute."],
-  ["B", "Box", "As C, but grips the middle of the box."],
-  ["D", "Mask", "Texture or outline within a mask. About a minute; needs the outline."],
+  ["S", "Shape", "Ready in seconds; weaker when partly hidden."],
+  ["A", "Crop", "The turn from the box’s crop. A minute."],
+  ["B", "Box", "As C, at the box’s middle."],
+  ["D", "Mask", "By a mask; needs the outline. A minute."],
 ];
 
 /** How often a part looks the same in a whole turn, each with a part that does. */
@@ -161,7 +161,7 @@ function renderOutcome(news) {
   for (const name of ["good", "doubtful", "poor"]) outcome.classList.toggle(name, name === grade);
   let text = "";
   if (news.status === "done" && summary) {
-    const better = grade === "good" ? "" : " Try it on your own pictures: each one you call right or wrong teaches it better, and so does a second photo.";
+    const better = grade === "good" ? "" : " Your own pictures teach it better: try it on them.";
     text = `Taught “${summary.object}” in ${seconds(summary.seconds)}. ${figuresText(summary)}${better} Written to ${news.written_to}`;
   }
   if (outcome.textContent !== text) outcome.textContent = text;

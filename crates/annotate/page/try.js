@@ -290,7 +290,7 @@ export function renderTry() {
     : state.trialPictures.length
       ? state.models.find((model) => model.is_current)?.is_stale
         ? "This model is old: photos, marks or pictures without the part have changed since. Teach again to use them."
-        : "Each picture is looked at as it comes in. What reaches the least score is found."
+        : "What reaches the least score is found."
       : "Add pictures that were taken as the first one was, with the part lying in other ways.";
   renderJudge();
   renderLearnt();

@@ -45,6 +45,7 @@ mod least_squares;
 mod pose;
 mod projection;
 mod table;
+mod taking;
 
 pub use board::{Board, Paper, Sheet};
 pub use camera_file::{CalibratedCamera, Frame, TablePose};
@@ -55,3 +56,4 @@ pub use hand_eye::{HandEye, HandEyeView, MIN_POSES, RobotPose, calibrate_hand_ey
 pub use intrinsics::{Advice, Calibration, CalibrationConfig, MIN_PICTURES, PictureFit, calibrate};
 pub use pose::{BoardPose, board_pose};
 pub use table::{FocalCost, FocalEstimate, SheetPose, focal_cost, focal_from_sheet, homography_rms_px, locate_sheet};
+pub use taking::{PictureTaker, Sight};

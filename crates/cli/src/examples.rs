@@ -68,7 +68,7 @@ const EXAMPLES: &[[&str; 2]] = &[
     ["sdg camera board --out board.svg --pdf board.pdf", "sdg camera board --paper a3 --squares 14x9 --out large.svg"],
     [
         "sdg camera calibrate --board board.svg --out camera.yaml a.png b.png c.png",
-        "sdg camera calibrate --board board.svg --measured-mm 98.5 --out camera.yaml a.png b.png c.png",
+        "sdg camera calibrate --board board.svg --measured-mm 98.5 --from v4l: --out camera.yaml",
     ],
     [
         "sdg camera table table.png --camera camera.yaml --board board.svg",

@@ -41,6 +41,7 @@ mod progress;
 mod robots;
 mod shared_args;
 mod teaching_progress;
+mod web_browser;
 
 use std::process::ExitCode;
 
@@ -120,10 +121,7 @@ pub fn run(args: &Args) -> ExitCode {
     }
 }
 
-/// Verbs that a person waits for, and that show the time of a part of their work or none; `teach` and `weights convert` tell theirs in their lines.
+/// Verbs that a person waits for, and that show the time of a part of their work or none; the others that are long tell theirs in their own lines.
 fn tells_its_time(command: &Command) -> bool {
-    matches!(
-        command,
-        Command::Demo(_) | Command::Rehearse(_) | Command::Evaluate(_) | Command::Grasp(_) | Command::Augment(_)
-    )
+    matches!(command, Command::Demo(_) | Command::Rehearse(_) | Command::Evaluate(_) | Command::Augment(_))
 }

@@ -189,6 +189,68 @@ fn from_the_sheet_to_a_camera_file_that_detects() {
     assert_eq!(line["width"], 640, "{line}");
 }
 
+#[test]
+fn a_camera_s_frames_are_taken_where_they_show_something_new() {
+    let files = Folder::new();
+    let camera = CAMERAS[0].1;
+    let frames = files.path("frames");
+    fs::create_dir(&frames).unwrap();
+    let poses = poses(&camera);
+    let mut random = Random(4);
+    // Each view twice, and now and then nothing at all.
+    for (k, pose) in poses.iter().enumerate() {
+        for copy in 0..2 {
+            let picture = render(&board(), &camera, pose, &Exposure::ORDINARY, &mut random);
+            picture.save(Path::new(&frames).join(format!("{k:02}-{copy}.png"))).unwrap();
+        }
+        if k % 5 == 0 {
+            let nothing = GrayImage::from_pixel(camera.width, camera.height, image::Luma([90]));
+            nothing.save(Path::new(&frames).join(format!("{k:02}-z.png"))).unwrap();
+        }
+    }
+    let (from, taken, out) = (format!("dir:{frames}"), files.path("taken"), files.path("camera.yaml"));
+    let arguments =
+        ["camera", "calibrate", "--from", &from, "--taken", &taken, "--no-browser", "--out", &out, "--json"];
+    let output = sdg(&arguments);
+    let told = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success(), "{told}");
+    let found: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let used = found["pictures"].as_array().unwrap();
+    // No view is taken twice, and it ends when nothing is lacking.
+    assert!((12..=poses.len()).contains(&used.len()), "{told}");
+    assert_eq!(fs::read_dir(&taken).unwrap().count(), used.len());
+    assert_eq!(told.lines().filter(|line| line.starts_with("taken: ")).count(), used.len(), "{told}");
+    assert!(told.contains("; next: tilt the board another way"), "{told}");
+    assert!((number(&found["intrinsics"]["fx"]) / camera.fx - 1.0).abs() < 2.0 * MAX_FOCAL_ERROR, "{found}");
+    assert_eq!(found["advice"], serde_json::json!([]), "{found}");
+    // The pictures are kept, and give the same camera again.
+    let again = files.path("again.yaml");
+    let pictures: Vec<String> = (0..used.len()).map(|k| format!("{taken}/{k:03}.png")).collect();
+    let mut arguments = vec!["camera", "calibrate", "--out", &again, "--json"];
+    arguments.extend(pictures.iter().map(String::as_str));
+    assert_eq!(json(&arguments)["intrinsics"], found["intrinsics"]);
+
+    assert_refused(
+        &["camera", "calibrate", "--from", &from, "--taken", &taken, "--no-browser", "--out", &out],
+        2,
+        &["--taken: expected a new or an empty folder"],
+    );
+    assert_refused(
+        &["camera", "calibrate", &pictures[0], "--taken", &taken, "--size", "640x480"],
+        2,
+        &["--taken, --size: expected live pictures (--from ADDRESS), found 1 pictures"],
+    );
+    let empty = files.path("empty");
+    fs::create_dir(&empty).unwrap();
+    fs::copy(Path::new(&frames).join("00-z.png"), Path::new(&empty).join("a.png")).unwrap();
+    let (from, taken) = (format!("dir:{empty}"), files.path("none"));
+    assert_refused(
+        &["camera", "calibrate", "--from", &from, "--taken", &taken, "--no-browser", "--out", &out],
+        1,
+        &["the board was never seen at rest"],
+    );
+}
+
 /// As a phone: a straight lens, never calibrated.
 const PHONE: PinholeCamera = PinholeCamera {
     width: 1280,

@@ -3,7 +3,7 @@
 //!
 //! What the page makes a person wait for is measured. What a person takes is added by the keystroke-level model (Card, Moran,
 //! Newell 1980) for what is done, and by 238 words a minute (Brysbaert 2019) for every line that the page shows for the first time.
-//! A line in which only numbers or its full stop have changed is not read again, and what is there for screen readers alone is not shown.
+//! `SDG_WALK_WORDS=1` prints these lines. A line in which only numbers or its full stop have changed is not read again, and what is there for screen readers alone is not shown.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -46,6 +46,9 @@ impl StopWatch {
         let letters = |line: &str| line.chars().filter(|c| c.is_alphabetic()).collect::<String>();
         let new: Vec<_> = text.lines().filter(|line| self.lines.insert(letters(line))).collect();
         let words = new.iter().map(|line| line.split_whitespace().count()).sum::<usize>();
+        if std::env::var_os("SDG_WALK_WORDS").is_some() {
+            new.iter().for_each(|line| println!("    {line}"));
+        }
         self.actions += actions;
         self.words += words;
         self.waited += waited;
@@ -58,9 +61,10 @@ impl StopWatch {
     }
 }
 
-/// What is seen of the page; `.sr` is for screen readers.
+/// What is seen of the page: `.sr` is for screen readers, and a closed list shows its chosen line alone.
 fn visible_text(page: &Page) -> String {
-    let script = "const sheet = document.styleSheets[0]; sheet.insertRule('.sr { display: none !important }', 0);
+    let script = "const sheet = document.styleSheets[0];
+        sheet.insertRule('.sr, option:not(:checked) { display: none !important }', 0);
         const text = document.body.innerText; sheet.deleteRule(0); return text";
     page.browser.run(script, &[]).unwrap().as_str().unwrap().to_owned()
 }

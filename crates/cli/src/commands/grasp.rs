@@ -284,12 +284,13 @@ fn print_report(args: &GraspArgs, prepared: &Prepared, ended: &Ended, secs: f64,
         let (sigma_mm, source) = (1e3 * height.sigma_m, height.source.name());
         eprintln!("its marks lie {height_mm:.1} ± {sigma_mm:.1} mm over the table, as {source}");
     }
+    let took = format!("the arm took {secs:.1} s of {:.1} s since the start", clock::elapsed_secs());
     match (failed, &prepared.place) {
         (None, None) => {
             let width_mm = grasp.closed.map_or(f64::NAN, |hand| hand.opening_m * 1e3);
             // A simulated arm ends with the program.
             let then = if robot == "sim" { "" } else { "; sdg robot open lets it go" };
-            eprintln!("the part is held, {width_mm:.0} mm between the fingers (the arm took {secs:.1} s){then}");
+            eprintln!("the part is held, {width_mm:.0} mm between the fingers ({took}){then}");
             Ok(Outcome::Done)
         }
         (None, Some((goal, _))) => {
@@ -302,7 +303,7 @@ fn print_report(args: &GraspArgs, prepared: &Prepared, ended: &Ended, secs: f64,
                     error.angle_rad.abs().to_degrees()
                 ),
             };
-            eprintln!("the part {where_it_lies} \"{}\" (the arm took {secs:.1} s)", goal.name);
+            eprintln!("the part {where_it_lies} \"{}\" ({took})", goal.name);
             Ok(Outcome::Done)
         }
         (Some((_, why)), _) if is_nothing_found(grasp) => {

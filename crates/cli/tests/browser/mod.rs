@@ -3,6 +3,7 @@
 //! Needs Chromium, and axe-core from npm in target/browser-test: `make test-browser` installs both. Screenshots are kept in
 //! target/browser-test.
 
+mod calibrating;
 mod corrections;
 mod drawn;
 mod keyboard;

@@ -35,6 +35,7 @@ fn teach(page: &Page) {
 }
 
 fn drag(page: &Page, [x, y, width, height]: [f64; 4]) {
+    page.unfold("#region-fold");
     page.click("#region-draw");
     page.settle_frames();
     let corners = [[x, y], [x + 0.5 * width, y + 0.5 * height], [x + width, y + height]];
@@ -66,6 +67,7 @@ fn a_region_is_drawn_and_typed_and_holds_live_and_in_the_next_model() {
     assert_eq!(region_of_file(&page), None);
     page.click("#go-try");
     live_found_is(&page, "Found the part");
+    page.unfold("#region-fold");
     assert!(page.text("#region-text").contains("All of the picture is searched"));
 
     // Drawn on the live picture, beside the part.

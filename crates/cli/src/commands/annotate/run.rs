@@ -2,7 +2,6 @@
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
 use std::sync::Arc;
 
 use anyhow::{Result, anyhow};
@@ -24,6 +23,7 @@ use crate::exit::{Outcome, Usage, one_line};
 use crate::interrupt::Interrupt;
 use crate::live_pictures;
 use crate::page_teacher::PageTeacher;
+use crate::web_browser;
 
 /// Keeps other pages from writing a file of marks; `None` where it cannot be written at all.
 fn lock(written: &Path) -> Result<Option<WriterLock>> {
@@ -73,7 +73,7 @@ pub fn run(args: &AnnotateArgs) -> Result<Outcome> {
         println!("Ctrl-C ends it; marks are saved as they are made");
     }
     if !args.no_browser {
-        open_browser(&url);
+        web_browser::open(&url);
     }
     let interrupt = Interrupt::watch();
     server.run(move || interrupt.is_requested())?;
@@ -243,12 +243,6 @@ fn split(argument: &str) -> (PathBuf, Option<PathBuf>) {
         Ok((image, annotation)) => (image, Some(annotation)),
         Err(_) => (argument.into(), None),
     }
-}
-
-/// Tries to; the address is printed in any case.
-fn open_browser(url: &str) {
-    let opener = if cfg!(target_os = "macos") { "open" } else { "xdg-open" };
-    let _ = Command::new(opener).arg(url).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
 }
 
 #[cfg(test)]

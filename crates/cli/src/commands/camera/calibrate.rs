@@ -12,14 +12,17 @@ use sdg_demonstration::PixelFrame;
 use serde_json::{Value, json};
 
 use super::board_in_use::{BoardInUse, grey, named};
+use super::taking::{Seen, TakingArgs};
 use crate::exit::{Outcome, one_line};
 
 /// `sdg camera calibrate`
 #[derive(Debug, Args)]
 pub struct CalibrateArgs {
     /// Pictures of the board, PNG or JPEG: 10 to 20, tilted every way by 20 to 40 degrees, all over the picture
-    #[arg(required = true, value_name = "PICTURE")]
+    #[arg(required_unless_present = "from", value_name = "PICTURE")]
     pictures: Vec<PathBuf>,
+    #[command(flatten)]
+    live: TakingArgs,
     #[command(flatten)]
     board: BoardInUse,
     /// The camera's name in its file; without it, that of the existing file or `camera`
@@ -36,13 +39,6 @@ pub struct CalibrateArgs {
     json: bool,
 }
 
-/// A picture in which the board was found.
-struct Seen<'a> {
-    path: &'a Path,
-    size: (u32, u32),
-    corners: Vec<SeenCorner>,
-}
-
 /// Larger camera files than any tool writes.
 const MAX_BYTES: u64 = 1 << 20;
 
@@ -50,10 +46,14 @@ const MAX_BYTES: u64 = 1 << 20;
 pub fn run(args: &CalibrateArgs) -> Result<Outcome> {
     let board = args.board.read()?;
     sdg_files::check_writable(&args.out)?;
-    let looked: Vec<(&Path, Result<Seen<'_>>)> =
-        args.pictures.par_iter().map(|path| (path.as_path(), look(path, &board))).collect();
+    let config = |(width, height)| CalibrationConfig { width, height, has_k3: args.k3 };
     let mut lines: Vec<Value> = Vec::new();
-    let mut seen = Vec::new();
+    let mut seen = match args.live.address(&args.pictures)? {
+        Some(address) => args.live.take(address, &board, config)?,
+        None => Vec::new(),
+    };
+    let looked: Vec<(&Path, Result<Seen>)> =
+        args.pictures.par_iter().map(|path| (path.as_path(), look(path, &board))).collect();
     for (path, result) in looked {
         match result {
             Ok(found) => seen.push(found),
@@ -65,9 +65,12 @@ pub fn run(args: &CalibrateArgs) -> Result<Outcome> {
         }
     }
     let Some(first) = seen.first() else {
+        if args.pictures.is_empty() {
+            bail!("expected pictures of the board, found that none was taken: the board was never seen at rest");
+        }
         bail!("expected pictures that show the board, found none among {}", args.pictures.len());
     };
-    let (size, first) = (first.size, first.path);
+    let (size, first) = (first.size, first.path.as_path());
     if let Some(other) = seen.iter().find(|other| other.size != size) {
         bail!(
             "{}: expected pictures of one size: {} x {} as {}, found {} x {}",
@@ -81,26 +84,25 @@ pub fn run(args: &CalibrateArgs) -> Result<Outcome> {
     }
     warn_of_squares(&board, &seen);
     let corners: Vec<Vec<SeenCorner>> = seen.iter().map(|seen| seen.corners.clone()).collect();
-    let config = CalibrationConfig { width: size.0, height: size.1, has_k3: args.k3 };
-    let found = calibrate(&board, &corners, &config)?;
+    let found = calibrate(&board, &corners, &config(size))?;
     write_camera(args, &found)?;
     for (seen, fit) in seen.iter().zip(&found.pictures) {
         lines.push(json!({
-            "picture": named(seen.path), "corners": seen.corners.len(), "rms_px": fit.rms_px, "left_out": fit.is_left_out,
+            "picture": named(&seen.path), "corners": seen.corners.len(), "rms_px": fit.rms_px, "left_out": fit.is_left_out,
         }));
     }
     report(args, &found, &seen, lines)?;
     Ok(Outcome::Done)
 }
 
-fn look<'a>(path: &'a Path, board: &Board) -> Result<Seen<'a>> {
+fn look(path: &Path, board: &Board) -> Result<Seen> {
     let picture = sdg_inputs::read_image_in(path, PixelFrame::Sensor)?;
     let corners = find_board(&grey(&picture), board).with_context(|| named(path))?;
-    Ok(Seen { path, size: picture.dimensions(), corners })
+    Ok(Seen { path: path.to_owned(), size: picture.dimensions(), corners })
 }
 
 /// Corners that no picture shows may not be there.
-fn warn_of_squares(board: &Board, seen: &[Seen<'_>]) {
+fn warn_of_squares(board: &Board, seen: &[Seen]) {
     let most = |axis: usize| {
         let corners = seen.iter().flat_map(|seen| &seen.corners);
         corners.map(|seen| seen.corner[axis]).max().unwrap_or_default() + 1
@@ -140,7 +142,7 @@ fn write_camera(args: &CalibrateArgs, found: &Calibration) -> Result<()> {
     Ok(sdg_files::extend(&args.out, Some(&args.out), text.as_bytes())?)
 }
 
-fn report(args: &CalibrateArgs, found: &Calibration, seen: &[Seen<'_>], lines: Vec<Value>) -> Result<()> {
+fn report(args: &CalibrateArgs, found: &Calibration, seen: &[Seen], lines: Vec<Value>) -> Result<()> {
     let mut stdout = std::io::stdout().lock();
     let advice: Vec<String> = found.advice.iter().map(ToString::to_string).collect();
     if args.json {

@@ -7,6 +7,7 @@ mod grab;
 mod hand_eye;
 mod list;
 mod table;
+mod taking;
 mod watch;
 
 use anyhow::Result;
@@ -25,7 +26,7 @@ pub enum CameraCommand {
     Watch(watch::WatchArgs),
     /// Write a board to print, for calibrate, table and hand-eye
     Board(board::BoardArgs),
-    /// Calibrate a camera from pictures of the board, into a camera file
+    /// Calibrate a camera from pictures of the board, or as it shows them, into a camera file
     Calibrate(calibrate::CalibrateArgs),
     /// Find where a camera is, from one picture of the board on the table
     Table(table::TableArgs),

@@ -1,0 +1,172 @@
+//! Which frames of a camera are worth a picture: the board lies still in them, and is seen as in none before.
+
+use nalgebra::Vector2;
+use sdg_geometry::median;
+
+use crate::detection::SeenCorner;
+
+/// A board whose corners stay this near to where they were, as a share of the picture's diagonal, lies still. Chosen by hand: 1.6 pixels of 640 × 480.
+const STILL_SHARE: f64 = 0.002;
+/// So many frames one after the other, so that no picture is blurred.
+const STILL_FRAMES: u32 = 4;
+/// A view whose corners all in all lie farther than this from where another view has them shows something new. Chosen by hand: 48 pixels of
+/// 640 × 480, a tenth of the board's width where it fills the picture.
+const NEW_PLACE_SHARE: f64 = 0.06;
+/// The same for the corners about their middle: another tilt or size at the same place. Chosen by hand: 10 pixels of 640 × 480, what a tilt by 25
+/// degrees does to a board that fills half of the picture.
+const NEW_SHAPE_SHARE: f64 = 0.0125;
+
+/// What a frame shows of the board.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sight {
+    /// It moves.
+    Moving,
+    /// It lies still, as in a picture that was taken.
+    Known,
+    /// It lies still, as in no picture before: to be taken.
+    New,
+}
+
+/// Chooses among the frames of a camera those that a calibration needs.
+#[derive(Debug, Clone, Default)]
+pub struct PictureTaker {
+    diagonal_px: f64,
+    still_frames: u32,
+    taken: Vec<Vec<SeenCorner>>,
+    /// Where the board was when it began to lie still, and for how many frames it has.
+    still: Option<(Vec<SeenCorner>, u32)>,
+}
+
+impl PictureTaker {
+    /// For pictures of this size that follow each other.
+    pub fn new(width: u32, height: u32) -> Self {
+        let diagonal_px = f64::from(width).hypot(f64::from(height));
+        Self { diagonal_px, still_frames: STILL_FRAMES, ..Self::default() }
+    }
+
+    /// For pictures that were taken one by one: the board lies still in each.
+    #[must_use]
+    pub fn of_single_pictures(self) -> Self {
+        Self { still_frames: 1, ..self }
+    }
+
+    /// Looks at the next frame, in which these corners are seen.
+    pub fn look(&mut self, corners: &[SeenCorner]) -> Sight {
+        let is_still = |from: &[SeenCorner]| {
+            distances_px(from, corners).is_some_and(|[place, _]| place <= STILL_SHARE * self.diagonal_px)
+        };
+        let num_still = match &mut self.still {
+            Some((from, num)) if is_still(from) => {
+                *num += 1;
+                *num
+            }
+            still => {
+                *still = Some((corners.to_vec(), 1));
+                1
+            }
+        };
+        if num_still < self.still_frames {
+            return Sight::Moving;
+        }
+        let is_known = |taken: &Vec<SeenCorner>| {
+            distances_px(taken, corners).is_some_and(|[place, shape]| {
+                place < NEW_PLACE_SHARE * self.diagonal_px && shape < NEW_SHAPE_SHARE * self.diagonal_px
+            })
+        };
+        if self.taken.iter().any(is_known) { Sight::Known } else { Sight::New }
+    }
+
+    /// The next frame does not show the board.
+    pub fn lose(&mut self) {
+        self.still = None;
+    }
+
+    /// Keeps the corners of a picture that was taken.
+    pub fn keep(&mut self, corners: Vec<SeenCorner>) {
+        self.taken.push(corners);
+    }
+
+    /// The corners of all pictures taken, in their order.
+    pub fn taken(&self) -> &[Vec<SeenCorner>] {
+        &self.taken
+    }
+}
+
+/// How far the corners that both show lie apart, and how far about their own middles, each in the median; `None` where they have none in common.
+fn distances_px(one: &[SeenCorner], other: &[SeenCorner]) -> Option<[f64; 2]> {
+    let apart = one.iter().filter_map(|seen| {
+        let same = other.iter().find(|same| same.corner == seen.corner)?;
+        Some(same.pixel - seen.pixel)
+    });
+    let apart: Vec<Vector2<f64>> = apart.collect();
+    let mean = apart.iter().sum::<Vector2<f64>>() / apart.len() as f64;
+    let place = median(apart.iter().map(|vector| vector.norm()))?;
+    Some([place, median(apart.iter().map(|vector| (vector - mean).norm()))?])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Point2;
+
+    /// Corners 0 to 11 of a row, from this place on.
+    fn row(x: f64, y: f64, corners: std::ops::Range<u32>) -> Vec<SeenCorner> {
+        let corner = |k: u32| SeenCorner { corner: [k, 0], pixel: Point2::new(x + 20.0 * f64::from(k), y) };
+        corners.map(corner).collect()
+    }
+
+    #[test]
+    fn a_board_is_taken_when_it_has_come_to_rest_and_only_once() {
+        let mut taker = PictureTaker::new(640, 480);
+        let moving = (0..6).map(|k| taker.look(&row(100.0 + 3.0 * f64::from(k), 50.0, 0..12)));
+        assert!(moving.collect::<Vec<_>>().iter().all(|sight| *sight == Sight::Moving));
+        let resting = row(115.5, 50.0, 0..12);
+        let sights = [(); 3].map(|()| taker.look(&resting));
+        assert_eq!(sights, [Sight::Moving, Sight::Moving, Sight::New]);
+        taker.keep(resting.clone());
+        assert_eq!(taker.look(&resting), Sight::Known);
+        // Nearer than 48 pixels it is the same view.
+        let sights = [(); 4].map(|()| taker.look(&row(115.5, 90.0, 0..12)));
+        assert_eq!(sights[3], Sight::Known);
+        let sights = [(); 4].map(|()| taker.look(&row(115.5, 100.0, 0..12)));
+        assert_eq!(sights[3], Sight::New);
+        assert_eq!(taker.taken().len(), 1);
+    }
+
+    #[test]
+    fn another_size_at_the_same_place_is_a_new_view() {
+        let mut taker = PictureTaker::new(640, 480).of_single_pictures();
+        let sized = |step: f64| -> Vec<SeenCorner> {
+            let corner =
+                |k: u32| SeenCorner { corner: [k, 0], pixel: Point2::new(320.0 + step * (f64::from(k) - 5.5), 240.0) };
+            (0..12).map(corner).collect()
+        };
+        taker.keep(sized(30.0));
+        // The corners lie 0.5 to 5.5 steps from their middle, 3 in the median: 2 pixels a step are 6, 4 are 12, and 10 are asked for.
+        assert_eq!(taker.look(&sized(32.0)), Sight::Known);
+        assert_eq!(taker.look(&sized(34.0)), Sight::New);
+    }
+
+    #[test]
+    fn slow_motion_is_no_rest_and_a_board_that_was_gone_begins_anew() {
+        let mut taker = PictureTaker::new(640, 480);
+        let mut seen = Vec::new();
+        for k in 0..30 {
+            seen.push(taker.look(&row(100.0 + 0.7 * f64::from(k), 50.0, 0..12)));
+        }
+        assert!(seen.iter().all(|sight| *sight == Sight::Moving), "{seen:?}");
+        let resting = row(200.0, 50.0, 0..12);
+        let first = [(); 3].map(|()| taker.look(&resting));
+        taker.lose();
+        assert_eq!((first, taker.look(&resting)), ([Sight::Moving; 3], Sight::Moving));
+    }
+
+    #[test]
+    fn other_corners_of_the_board_are_a_new_view_and_single_pictures_need_no_rest() {
+        let mut taker = PictureTaker::new(640, 480).of_single_pictures();
+        assert_eq!(taker.look(&row(100.0, 50.0, 0..6)), Sight::New);
+        taker.keep(row(100.0, 50.0, 0..6));
+        assert_eq!(taker.look(&row(100.0, 50.0, 6..12)), Sight::New);
+        assert_eq!(taker.look(&row(100.0, 50.0, 3..9)), Sight::Known);
+    }
+}

@@ -1,0 +1,58 @@
+//! `sdg camera calibrate --from`: the page that shows the next useful view.
+
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+
+use sdg_webdriver::{Browser, BrowserOptions};
+
+use super::page::{assert_accessible, repository};
+use crate::rendering::cameras::{CAMERAS, board, poses};
+use crate::rendering::{Exposure, Random, render};
+
+/// A program that ends with the test.
+struct Ended(Child);
+
+impl Drop for Ended {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn the_page_shows_the_board_and_what_is_lacking() {
+    let folder = tempfile::tempdir().unwrap();
+    let frames = folder.path().join("frames");
+    std::fs::create_dir(&frames).unwrap();
+    let camera = CAMERAS[0].1;
+    for (k, pose) in poses(&camera).iter().take(5).enumerate() {
+        let picture = render(&board(), &camera, pose, &Exposure::ORDINARY, &mut Random(k as u64));
+        picture.save(frames.join(format!("{k}.png"))).unwrap();
+    }
+    // Frames go round, so that the page has a picture for as long as it is looked at.
+    let from = format!("dir:{}?fps=4&loop", frames.display());
+    let arguments = ["camera", "calibrate", "--from", &from, "--no-browser", "--out", "camera.yaml"];
+    let mut command = Command::new(env!("CARGO_BIN_EXE_sdg"));
+    command.args(arguments).current_dir(folder.path()).stdout(Stdio::null()).stderr(Stdio::piped());
+    let mut child = Ended(command.spawn().unwrap());
+    let mut told = BufReader::new(child.0.stderr.take().unwrap()).lines();
+    let first = told.next().unwrap().unwrap();
+    let url = first.strip_prefix("pictures at ").unwrap_or_else(|| panic!("{first}")).to_owned();
+    for k in 0..5 {
+        let line = told.next().unwrap().unwrap();
+        assert!(line.starts_with(&format!("taken: calibration-pictures/00{k}.png")), "{line}");
+    }
+    let browser = Browser::start(&BrowserOptions::default()).unwrap();
+    browser.emulate(1280, 800, false).unwrap();
+    browser.open(&url).unwrap();
+    browser.wait_for("the picture", "return document.querySelector('img').naturalWidth === 640").unwrap();
+    browser.screenshot(&repository().join("target/browser-test/calibrating.png")).unwrap();
+    assert_accessible(&browser, "the board in the live picture");
+    assert_eq!(count(&folder.path().join("calibration-pictures")), 5, "the same views again are not taken");
+}
+
+fn count(folder: &Path) -> usize {
+    std::fs::read_dir(folder).unwrap().count()
+}
