@@ -1,7 +1,7 @@
 // Changes of marks: committed with a way back, saved at once.
 
 import { api, isLost, present } from "./api.js";
-import { boundsOf, boxPolygon, clamp, graspOf, gripperOf, isWithin, placedAt } from "./geometry.js";
+import { areaOf, boundsOf, boxPolygon, clamp, graspOf, gripperOf, isWithin, placedAt } from "./geometry.js";
 import { changed, image, marks, region, size, state } from "./store.js";
 import { toast } from "./toast.js";
 import { showBox } from "./view.js";
@@ -138,6 +138,9 @@ export function strokeOutline(points, isInside) {
 /** A person's box reaches beyond the outline by this share of its side at most; a looser one is drawn to a corrected outline. */
 const LOOSE = 0.06;
 
+/** Where a stroke leaves less of the outline than this share, that is told. */
+const MUCH_LEFT = 0.65;
+
 /** Draws a loose box to the outline that was corrected, with a little room. */
 function snapBox(marks) {
   const [x1, y1, x2, y2] = boundsOf(marks.outline);
@@ -168,6 +171,7 @@ export async function proposeOutline({ quietly = false, strokes = null } = {}) {
     if (waited && !outline) {
       if (!quietly) toast("Nothing in the box stands out from what is around it. Draw the outline by hand.");
     } else if (waited) {
+      const before = target.marks.outline;
       target.marks.outline = outline;
       if (!target.marks.grasp) state.selected = "outline";
       if (strokes && target.marks.box) {
@@ -183,6 +187,8 @@ export async function proposeOutline({ quietly = false, strokes = null } = {}) {
         toast("That place has the part all around it. An outline is one line around the part and has no holes; a hole does no harm.");
       } else if (last.isInside && !isWithin(middle, outline)) {
         toast("That place does not hang together with the part. Draw from there to the part, too, or draw the outline by hand.");
+      } else if (!last.isInside && before && areaOf(outline) < MUCH_LEFT * areaOf(before)) {
+        toast("“Out” took much of the outline.", { text: "Undo", run: undo });
       }
     }
   } catch (error) {

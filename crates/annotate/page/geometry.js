@@ -35,6 +35,8 @@ export function boundsOf(points) {
   return [Math.min(...xs), Math.min(...ys), Math.max(...xs), Math.max(...ys)];
 }
 
+export const areaOf = (polygon) => Math.abs(polygon.reduce((sum, [x, y], i) => sum + polygon.at(i - 1)[0] * y - x * polygon.at(i - 1)[1], 0)) / 2;
+
 /** Whether a point lies within a polygon: a ray from it to the right crosses the polygon's edges an odd number of times. */
 export function isWithin([x, y], polygon) {
   return polygon.filter(([bx, by], i) => {

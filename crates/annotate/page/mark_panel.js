@@ -156,13 +156,8 @@ function renderAdvice({ advice }) {
   enough.dataset.shown = text;
   const title = document.createElement("h3");
   const ready = models.filter((m) => !m.lacks.length).length;
-  title.textContent = ready === models.length ? "Enough for every model" : ready ? "Enough for these models" : "Not enough to teach yet";
-  if (!ready) {
-    const needed = document.createElement("p");
-    needed.textContent = `Every model needs ${models[0].lacks.join(" and ")}${marks().outline ? "" : "; model D the outline, too"}.`;
-    return enough.replaceChildren(title, needed);
-  }
-  if (ready === models.length) return enough.replaceChildren(title);
+  title.textContent = ready === models.length ? "Enough for every model" : ready ? "Enough for these models" : `Still needed: ${models[0].lacks.join(" and ")}`;
+  if (!ready || ready === models.length) return enough.replaceChildren(title);
   const items = document.createElement("ul");
   for (const { model, lacks } of models) {
     const item = document.createElement("li");
@@ -177,7 +172,7 @@ function hint() {
   const { box, grasp, outline } = marks();
   if (state.proposing) return "Looking for the outline…";
   if (state.tool === "box") return "Drag a box around the whole part";
-  if (state.tool === "grasp") return "Click the part where the gripper is to hold it, or drag along it";
+  if (state.tool === "grasp") return "Click the part where the gripper is to hold it";
   if (state.tool === "outline") {
     const count = state.draft?.points?.length ?? 0;
     return count > 2 ? "Click the first point, or press Enter, to close" : "Click around the part, point by point";

@@ -12,9 +12,9 @@ const POLL_MS = 400;
 const MODELS = [
   ["C", "Keypoints (recommended)", "The best all-round. Half a minute."],
   ["S", "Shape", "Ready in seconds; weaker when partly hidden."],
-  ["A", "Crop", "The turn from the box’s crop. A minute."],
+  ["A", "Crop", "Turn from a crop. A minute."],
   ["B", "Box", "As C, at the box’s middle."],
-  ["D", "Mask", "By a mask; needs the outline. A minute."],
+  ["D", "Mask", "Needs the outline. A minute."],
 ];
 
 /** How often a part looks the same in a whole turn, each with a part that does. */
@@ -161,7 +161,7 @@ function renderOutcome(news) {
   for (const name of ["good", "doubtful", "poor"]) outcome.classList.toggle(name, name === grade);
   let text = "";
   if (news.status === "done" && summary) {
-    const better = grade === "good" ? "" : " Your own pictures teach it better: try it on them.";
+    const better = grade === "good" ? "" : " Your own pictures teach it better.";
     text = `Taught “${summary.object}” in ${seconds(summary.seconds)}. ${figuresText(summary)}${better} Written to ${news.written_to}`;
   }
   if (outcome.textContent !== text) outcome.textContent = text;

@@ -19,6 +19,8 @@ import { showBox } from "./view.js";
 const by = (id) => document.getElementById(id);
 const stage = by("stage");
 const PICTURE = /\.(png|jpe?g|webp|bmp|tiff?)$/i;
+/** So few pictures are seen at a glance, whatever their order. */
+const MIN_SORTED = 5;
 const isTaught = () => Boolean(state.hasModel);
 
 by("add-pictures").addEventListener("click", () => by("picture-input").click());
@@ -277,7 +279,7 @@ function renderJudge() {
   by("looked").hidden = looked.length === all || all < 2;
   Object.assign(by("looked"), { max: Math.max(all, 1), value: looked.length });
   by("export").hidden = !looked.length;
-  by("sort-choice").hidden = all < 2;
+  by("sort-choice").hidden = all < MIN_SORTED;
   const differs = ({ refusal }) => refusal && (refusal.edges.length || refusal.surface.length);
   by("differences-choice").hidden = isLive() || !trialPicture()?.detections?.some((d) => !isFound(d) && differs(d));
 }
@@ -290,8 +292,9 @@ export function renderTry() {
     : state.trialPictures.length
       ? state.models.find((model) => model.is_current)?.is_stale
         ? "This model is old: photos, marks or pictures without the part have changed since. Teach again to use them."
-        : "What reaches the least score is found."
+        : ""
       : "Add pictures that were taken as the first one was, with the part lying in other ways.";
+  by("try-intro").hidden = !by("try-intro").textContent;
   renderJudge();
   renderLearnt();
   renderHelps();

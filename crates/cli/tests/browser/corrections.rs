@@ -131,3 +131,26 @@ fn a_stroke_removes_a_shadow_and_the_box_is_drawn_to_the_outline() {
     assert!(back.outline.unwrap().area() > 1.5 * plate && back.bbox.x2 > 420.0, "undone, both are as they were");
     page.assert_quiet();
 }
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn a_stroke_that_takes_much_of_the_outline_is_told_and_taken_back() {
+    let page = Page::open();
+    page.draw_box();
+    page.wait_for("the outline", "return document.querySelector('#do-outline.done') !== null");
+    page.settle();
+    let area = page.saved().outline.unwrap().area();
+    page.click("button[data-tool=out]");
+    let stroke = [[262.0, 194.0], [284.0, 198.0], [306.0, 206.0]].map(|place| page.on_screen(place));
+    page.browser.drag(&stroke).unwrap();
+    page.settle();
+    page.screenshot("corrections-2-much");
+    let note = "return document.getElementById('toasts').innerText.includes('took much of the outline')";
+    page.wait_for("a note", note);
+    assert!(page.saved().outline.unwrap().area() < 0.65 * area);
+    page.assert_accessible("a stroke that took too much");
+    page.browser.run("document.querySelector('#toasts button').click()", &[]).unwrap();
+    page.settle();
+    assert_eq!(page.saved().outline.unwrap().area(), area, "undone from the note");
+    page.assert_quiet();
+}

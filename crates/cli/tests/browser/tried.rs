@@ -75,6 +75,9 @@ fn jaws_that_would_touch_a_neighbour_are_told() {
     let record: Value = serde_json::from_str(saved(&page, "#save-json").lines().next().unwrap()).unwrap();
     let touching = record["detections"].as_array().unwrap().iter().filter(|one| one["jaws_touch"] != json!([]));
     assert_eq!(touching.count(), told.len(), "{record}");
+    // Words for screen readers alone make the page no longer.
+    let room = page.browser.run("return document.documentElement.scrollHeight - innerHeight", &[]).unwrap();
+    assert_eq!(room, json!(0), "the panel scrolls, not the page");
     page.screenshot("tried-1-jaws");
     page.assert_accessible("jaws that touch");
     page.browser.emulate(390, 800, false).unwrap();
