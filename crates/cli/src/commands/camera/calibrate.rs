@@ -22,8 +22,6 @@ pub struct CalibrateArgs {
     #[arg(required_unless_present = "from", value_name = "PICTURE")]
     pictures: Vec<PathBuf>,
     #[command(flatten)]
-    live: TakingArgs,
-    #[command(flatten)]
     board: BoardInUse,
     /// The camera's name in its file; without it, that of the existing file or `camera`
     #[arg(long, value_name = "NAME")]
@@ -37,6 +35,9 @@ pub struct CalibrateArgs {
     /// Print one JSON object
     #[arg(long)]
     json: bool,
+    // Last: the heading of its options would be that of what follows.
+    #[command(flatten)]
+    live: TakingArgs,
 }
 
 /// Larger camera files than any tool writes.

@@ -26,7 +26,7 @@ pub enum CameraCommand {
     Watch(watch::WatchArgs),
     /// Write a board to print, for calibrate, table and hand-eye
     Board(board::BoardArgs),
-    /// Calibrate a camera from pictures of the board, or as it shows them, into a camera file
+    /// Calibrate a camera from pictures of the board, which it may take by itself, into a camera file
     Calibrate(calibrate::CalibrateArgs),
     /// Find where a camera is, from one picture of the board on the table
     Table(table::TableArgs),
