@@ -37,11 +37,7 @@ pub(crate) fn load() -> Result<()> {
 
 fn open() -> std::result::Result<Surfaceless, String> {
     // SAFETY: loading libEGL runs its initialisers only; Debian's has no precondition.
-    let egl = unsafe { Egl::load_required() }.map_err(|error| {
-        format!(
-            "libEGL.so.1 could not be loaded ({error}); on Debian 12 the packages libegl1 and libgl1-mesa-dri have it"
-        )
-    })?;
+    let egl = unsafe { Egl::load_required() }.map_err(|error| format!("libEGL.so.1 could not be loaded ({error})"))?;
     // SAFETY: the default display is what the surfaceless platform expects, with an empty list of
     // attributes.
     let display =

@@ -267,6 +267,11 @@ fn dry_run<A: Arm>(
     let plan = DryRun::plan(state, hand.opening_m, target, limits, camera_pose, &prepared.config, place)?;
     eprintln!("what would be done:");
     print_plan(&plan, target.is_some())?;
+    #[cfg(feature = "simulation")]
+    if let Err(missing) = sdg_simulation::load() {
+        eprintln!("no motion is drawn: {missing}");
+        return Ok(());
+    }
     for file in draw_dry_run(&plan, &args.out, seen.filter(|_| target.is_some()), &prepared.workcell.obstacles)? {
         eprintln!("  {}", file.display());
     }

@@ -126,6 +126,11 @@ fn refused_by_limits(workcell: &Workcell, motions: &[Trajectory]) -> Option<Stri
 
 #[cfg(feature = "simulation")]
 fn draw(args: &PlanArgs, workcell: &Workcell, motions: &[Trajectory]) -> Result<()> {
+    // The plan is made; it is drawn where there is a simulator.
+    if let Err(missing) = sdg_simulation::load() {
+        eprintln!("  no motion is drawn: {missing}");
+        return Ok(());
+    }
     for file in sdg_evaluation::draw_motions(&args.out, workcell, motions, args.opening_mm * 1e-3)? {
         eprintln!("  {}", file.display());
     }
