@@ -2,7 +2,6 @@
 
 use std::fmt;
 use std::io;
-use std::process::ExitCode;
 
 use sdg_calibration::CalibrationError;
 use sdg_cell::CellError;
@@ -22,12 +21,13 @@ pub enum Outcome {
     ModelFails,
 }
 
-impl From<Outcome> for ExitCode {
-    fn from(outcome: Outcome) -> Self {
-        match outcome {
-            Outcome::Done => Self::SUCCESS,
-            Outcome::NothingToGrasp => Self::from(3),
-            Outcome::ModelFails => Self::from(4),
+impl Outcome {
+    /// The exit code.
+    pub fn code(self) -> u8 {
+        match self {
+            Self::Done => 0,
+            Self::NothingToGrasp => 3,
+            Self::ModelFails => 4,
         }
     }
 }
@@ -63,8 +63,8 @@ pub fn without_ros2() -> anyhow::Error {
 }
 
 /// 2 for wrong usage, 1 for everything else.
-pub fn code_of(error: &anyhow::Error) -> ExitCode {
-    if error.is::<Usage>() { ExitCode::from(2) } else { ExitCode::FAILURE }
+pub fn code_of(error: &anyhow::Error) -> u8 {
+    if error.is::<Usage>() { 2 } else { 1 }
 }
 
 /// Whether the reader of our output went away, as `head` does; no failure of ours.

@@ -43,7 +43,7 @@ mod shared_args;
 mod teaching_progress;
 mod web_browser;
 
-use std::process::ExitCode;
+use std::ffi::OsString;
 
 use clap::{Command as ClapCommand, CommandFactory, FromArgMatches};
 
@@ -58,15 +58,15 @@ pub fn command() -> ClapCommand {
 }
 
 #[doc(hidden)]
-/// Reads the arguments of this process; wrong ones end it with their message, as `--help` does with its text.
-pub fn parse_args() -> Args {
+/// Reads arguments, the program's name first; wrong ones end this process with their message, as `--help` does with its text.
+pub fn parse_args(arguments: impl IntoIterator<Item = OsString>) -> Args {
     clock::start();
-    Args::from_arg_matches(&command().get_matches()).unwrap_or_else(|error| error.exit())
+    Args::from_arg_matches(&command().get_matches_from(arguments)).unwrap_or_else(|error| error.exit())
 }
 
 #[doc(hidden)]
 /// Runs one command; prints the one line of an error and returns the exit code.
-pub fn run(args: &Args) -> ExitCode {
+pub fn run(args: &Args) -> u8 {
     let done = match &args.command {
         #[cfg(feature = "simulation")]
         Command::Demo(demo) => commands::demo::run(demo),
@@ -111,9 +111,9 @@ pub fn run(args: &Args) -> ExitCode {
             if tells_its_time(&args.command) {
                 eprintln!("took {:.1} s from start to exit", clock::elapsed_secs());
             }
-            outcome.into()
+            outcome.code()
         }
-        Err(error) if exit::is_closed_pipe(&error) => Outcome::Done.into(),
+        Err(error) if exit::is_closed_pipe(&error) => Outcome::Done.code(),
         Err(error) => {
             eprintln!("{} {}", Paint::stderr().text(Tone::Bad, "sdg:"), exit::one_line(&error));
             exit::code_of(&error)

@@ -5,5 +5,5 @@ use std::process::ExitCode;
 
 fn main() -> ExitCode {
     sdg_grasp::keep_freed_memory();
-    sdg_cli::run(&sdg_cli::parse_args())
+    sdg_cli::run(&sdg_cli::parse_args(std::env::args_os())).into()
 }
