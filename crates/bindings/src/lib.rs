@@ -1,0 +1,43 @@
+//! What the Python package and the C library share: a taught model behind a camera, trackers, teaching and evaluation, with every error
+//! as a kind and a text.
+//!
+//! ```text
+//! file ─ Model::read ─┐
+//! file ─ Camera::read ┴─ Model::detect(picture, View) ─ Detections: the records of `sdg detect --json`
+//! photo, marks ─ teach ─ Model         Tracker::frame(picture, time) ─ tracked parts         evaluate(folder) ─ figures
+//! ```
+//! Deliberately absent: another language's objects, pointers, options of a command line.
+//!
+//! ```no_run
+//! use std::path::Path;
+//!
+//! use sdg_bindings::{Model, View, read_picture};
+//!
+//! # fn main() -> Result<(), sdg_bindings::Fault> {
+//! let model = Model::read(Path::new("part.sdg"))?;
+//! let found = model.detect(&read_picture(Path::new("table.png"), None)?, &View::default())?;
+//! println!("{}", found.to_json());
+//! # Ok(())
+//! # }
+//! ```
+#![forbid(unsafe_code)]
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+mod camera;
+mod evaluation;
+mod fault;
+mod model;
+mod picture;
+mod teaching;
+mod threads;
+mod tracker;
+
+pub use camera::Camera;
+pub use evaluation::evaluate;
+pub use fault::{Fault, FaultKind, Result};
+pub use model::{Detections, Model, RegionChoice, View};
+pub use picture::{PixelOrder, PixelShape, read_picture};
+pub use sdg_geometry::RotationalSymmetry;
+pub use teaching::{CameraTeaching, Teaching, teach};
+pub use threads::on_threads;
+pub use tracker::Tracker;

@@ -1,0 +1,173 @@
+//! A grasp model, and what it finds in a picture.
+
+use std::path::Path;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use image::RgbImage;
+use sdg_cell::{FoundRecord, Perception};
+use sdg_grasp::{Device, GraspModel, SearchRegion, Verification};
+use sdg_inputs::check_replaces_a_model;
+use serde::Serialize;
+
+use crate::camera::Camera;
+use crate::fault::{Fault, FaultKind, Result};
+use crate::threads::on_threads;
+
+/// The part of pictures that is searched.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum RegionChoice {
+    /// The one that the model was taught with; all of the picture where it has none.
+    #[default]
+    OfModel,
+    /// All of the picture.
+    All,
+    /// Left edge, upper edge, width and height, in pixels.
+    Part([u32; 4]),
+}
+
+/// How a picture is looked at.
+#[derive(Debug, Clone, Default)]
+pub struct View {
+    /// The calibrated camera that took it.
+    pub camera: Option<Camera>,
+    /// Where parts are looked for.
+    pub region: RegionChoice,
+    /// Threads that compute; as many as there are cores with `None`.
+    pub threads: Option<usize>,
+}
+
+/// A grasp model, with the perception that was used last; shared among threads.
+#[derive(Debug)]
+pub struct Model {
+    model: GraspModel,
+    /// Plan views take milliseconds to set up.
+    last: Mutex<Option<LastPerception>>,
+}
+
+/// What a model looked through last, and what it was made for.
+#[derive(Debug)]
+struct LastPerception {
+    camera: Option<Camera>,
+    region: RegionChoice,
+    perception: Arc<Perception>,
+}
+
+impl LastPerception {
+    fn is_for(&self, camera: Option<&Camera>, region: RegionChoice) -> bool {
+        let is_same_camera = match (&self.camera, camera) {
+            (Some(one), Some(other)) => one.is_same(other),
+            (one, other) => one.is_none() && other.is_none(),
+        };
+        is_same_camera && self.region == region
+    }
+}
+
+/// What was found in a picture, best score first, the refused ones too.
+#[derive(Debug, Clone, Serialize)]
+#[serde(transparent)]
+pub struct Detections {
+    records: Vec<Record>,
+}
+
+/// A record of `sdg detect --json`, without advice, whose words are the command line's.
+#[derive(Debug, Clone, Serialize)]
+struct Record {
+    #[serde(flatten)]
+    found: FoundRecord,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    size: Option<f64>,
+}
+
+impl Model {
+    /// Reads a model's file.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or is no grasp model, damaged, or of another version.
+    pub fn read(path: &Path) -> Result<Self> {
+        sdg_inputs::read_model(path, &Device::flex()).map(Self::from).map_err(|error| {
+            let fault = Fault::from(error);
+            // A damaged photo in it is a damaged model.
+            if fault.kind == FaultKind::File { fault } else { Fault { kind: FaultKind::ModelFile, ..fault } }
+        })
+    }
+
+    /// Writes it, whole or not at all, over a grasp model or nothing.
+    ///
+    /// # Errors
+    /// A file of another kind, and one that cannot be written.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        check_replaces_a_model(path).map_err(Fault::of_kind(FaultKind::File))?;
+        Ok(sdg_files::write(path, &self.model.to_bytes()?)?)
+    }
+
+    /// The model itself.
+    pub fn grasp_model(&self) -> &GraspModel {
+        &self.model
+    }
+
+    /// Finds the part in a picture.
+    ///
+    /// # Errors
+    /// A picture of another size than the camera's, a region that does not lie in it, a model that was taught without a camera where one is
+    /// given.
+    pub fn detect(&self, picture: &RgbImage, view: &View) -> Result<Detections> {
+        on_threads(view.threads, || {
+            let perception = self.perception(view.camera.as_ref(), view.region)?;
+            let found = perception.detect(picture, Verification::ByShape)?;
+            let size = picture.dimensions().into();
+            let record = |found| Record {
+                found: FoundRecord::new(found, &perception),
+                size: perception.size_of(&found.detection, size),
+            };
+            Ok(Detections { records: found.iter().map(record).collect() })
+        })?
+    }
+
+    /// The model behind a camera, or behind any.
+    ///
+    /// # Errors
+    /// As [`Self::detect`].
+    pub fn perception(&self, camera: Option<&Camera>, region: RegionChoice) -> Result<Arc<Perception>> {
+        let last = || self.last.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(last) = last().as_ref().filter(|last| last.is_for(camera, region)) {
+            return Ok(Arc::clone(&last.perception));
+        }
+        let model = GraspModel::clone(&self.model);
+        let mut perception = match camera {
+            Some(camera) => Perception::calibrated(model, camera.calibrated())?,
+            None => Perception::of_any_camera(model),
+        };
+        match region {
+            RegionChoice::OfModel => {}
+            RegionChoice::All => perception.look_in(None)?,
+            RegionChoice::Part(bounds) => perception.look_in(Some(SearchRegion::new(bounds)))?,
+        }
+        let perception = Arc::new(perception);
+        *last() = Some(LastPerception { camera: camera.cloned(), region, perception: Arc::clone(&perception) });
+        Ok(perception)
+    }
+}
+
+impl From<GraspModel> for Model {
+    fn from(model: GraspModel) -> Self {
+        Self { model, last: Mutex::new(None) }
+    }
+}
+
+impl Detections {
+    /// As JSON, with every digit of every number.
+    pub fn to_json(&self) -> String {
+        // Numbers and names alone, whose serialisation cannot fail.
+        serde_json::to_string(self).unwrap_or_default()
+    }
+
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.records.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.records.is_empty()
+    }
+}

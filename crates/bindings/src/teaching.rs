@@ -1,0 +1,57 @@
+//! Teaching from a photo and marks.
+
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+
+use sdg_evaluation::TaughtFile;
+use sdg_grasp::{SearchRegion, TeachOptions, TeachingEvent};
+use sdg_inputs::TeachingFiles;
+
+use crate::fault::{Fault, FaultKind, Result};
+use crate::model::Model;
+use crate::threads::check_process;
+
+/// The calibrated camera that took the photo.
+#[derive(Debug, Clone)]
+pub struct CameraTeaching {
+    /// Its file.
+    pub file: PathBuf,
+    /// Height of the marks over the table, in metres.
+    pub mark_height_m: f64,
+    /// Height at which the gripper closes, in metres.
+    pub grasp_height_m: f64,
+}
+
+/// What a model is taught from.
+#[derive(Debug, Clone)]
+pub struct Teaching {
+    /// Photo and marks of each demonstration.
+    pub demonstrations: Vec<(PathBuf, PathBuf)>,
+    /// Pictures without the part.
+    pub negatives: Vec<PathBuf>,
+    /// The camera, for grasps in metres.
+    pub camera: Option<CameraTeaching>,
+}
+
+/// Teaches as `sdg teach` does; `observe` may end it early. The model is that of the file, whose weights are rounded.
+///
+/// # Errors
+/// Files that cannot be read, photos and marks that nothing can be taught from, a teaching that was ended before there was a model.
+pub fn teach(
+    from: &Teaching,
+    mut options: TeachOptions,
+    observe: &mut dyn FnMut(&TeachingEvent) -> ControlFlow<()>,
+) -> Result<Model> {
+    let heights = |camera: &CameraTeaching| [camera.mark_height_m, camera.grasp_height_m];
+    let files = TeachingFiles {
+        demonstrations: &from.demonstrations,
+        negatives: &from.negatives,
+        camera: from.camera.as_ref().map(|camera| (Path::new(&camera.file), heights(camera))),
+    };
+    if let Some(SearchRegion { width: 0, .. } | SearchRegion { height: 0, .. }) = options.region {
+        return Err(Fault::new(FaultKind::Region, "expected a region of at least 1 × 1 pixels"));
+    }
+    check_process()?;
+    let demonstrations = files.read(&mut options).map_err(Fault::of_kind_or(FaultKind::Teaching))?;
+    Ok(TaughtFile::teach(&demonstrations, &options, observe)?.model.into())
+}

@@ -1,0 +1,62 @@
+//! Pools of threads by their number.
+
+use std::process;
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+use crate::fault::{Fault, FaultKind, Result};
+
+/// Pools at rest: callers beside each other have one each.
+static AT_REST: Mutex<Vec<ThreadPool>> = Mutex::new(Vec::new());
+/// The process that computed first, which has the threads; 0 before.
+static COMPUTES_IN: AtomicU32 = AtomicU32::new(0);
+/// More than any machine has cores for.
+const MAX_THREADS: usize = 1024;
+
+/// Does some work on so many threads; on as many as there are cores with `None`, which all callers share.
+///
+/// # Errors
+/// No thread, too many, or threads that the system refuses; a process that was forked from one with threads of ours.
+pub fn on_threads<T: Send>(threads: Option<usize>, work: impl FnOnce() -> T + Send) -> Result<T> {
+    check_process()?;
+    let Some(count) = threads else { return Ok(work()) };
+    if !(1..=MAX_THREADS).contains(&count) {
+        return Err(Fault::new(
+            FaultKind::Argument,
+            format!("expected threads from 1 to {MAX_THREADS}, found {count}"),
+        ));
+    }
+    let at_rest = || AT_REST.lock().unwrap_or_else(PoisonError::into_inner);
+    let pool = {
+        let mut pools = at_rest();
+        pools.iter().position(|pool| pool.current_num_threads() == count).map(|idx| pools.swap_remove(idx))
+    };
+    let pool = match pool {
+        Some(pool) => pool,
+        None => ThreadPoolBuilder::new()
+            .num_threads(count)
+            .build()
+            .map_err(|error| Fault::new(FaultKind::Internal, format!("no threads for detection: {error}")))?,
+    };
+    let done = pool.install(work);
+    at_rest().push(pool);
+    Ok(done)
+}
+
+/// A forked process has none of the threads of the other, and would wait for them for ever.
+///
+/// # Errors
+/// A process that was forked from one that had computed.
+pub(crate) fn check_process() -> Result<()> {
+    let own = process::id();
+    match COMPUTES_IN.compare_exchange(0, own, Ordering::Relaxed, Ordering::Relaxed) {
+        Err(first) if first != own => Err(Fault::new(
+            FaultKind::Forked,
+            "expected a process that was started anew (spawn), found one that was forked after its parent had computed: the threads that \
+             compute are not in it",
+        )),
+        _ => Ok(()),
+    }
+}

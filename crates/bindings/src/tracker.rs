@@ -1,0 +1,84 @@
+//! Parts followed from frame to frame.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use image::RgbImage;
+use sdg_cell::{Found, FoundRecord, LiveTracker, Perception, SearchTime};
+use sdg_grasp::{TrackState, TrackerConfig};
+use serde::Serialize;
+
+use crate::fault::{Fault, FaultKind, Result};
+use crate::model::{Model, View};
+use crate::threads::{check_process, on_threads};
+
+/// A tracker of one camera's frames; a thread of its own searches beside.
+pub struct Tracker {
+    perception: Arc<Perception>,
+    tracker: LiveTracker,
+    threads: Option<usize>,
+    last_secs: f64,
+}
+
+#[derive(Serialize)]
+struct Record {
+    #[serde(flatten)]
+    found: FoundRecord,
+    track: u64,
+    state: &'static str,
+    age_s: f64,
+}
+
+impl Tracker {
+    /// A tracker that knows no part yet. With `search_frames` what a search found is known so many frames later, on any machine the same;
+    /// else as soon as it has ended.
+    ///
+    /// # Errors
+    /// As [`Model::detect`]; a thread that the system refuses.
+    pub fn new(model: &Model, view: &View, search_frames: Option<u32>) -> Result<Self> {
+        check_process()?;
+        let perception = model.perception(view.camera.as_ref(), view.region)?;
+        let search_time = search_frames.map_or(SearchTime::AsItTakes, SearchTime::Frames);
+        let tracker = LiveTracker::new(&perception, TrackerConfig::DEFAULT, search_time)?;
+        Ok(Self { perception, tracker, threads: view.threads, last_secs: 0.0 })
+    }
+
+    /// The parts in a frame as JSON, with the names of `sdg detect --from --json`; `captured_secs` counts from any moment that is the same
+    /// for all frames.
+    ///
+    /// # Errors
+    /// A time before that of the last frame, a picture of another size than the camera's.
+    pub fn frame(&mut self, picture: RgbImage, captured_secs: f64) -> Result<String> {
+        let Some(captured) =
+            Duration::try_from_secs_f64(captured_secs).ok().filter(|_| captured_secs >= self.last_secs)
+        else {
+            return Err(Fault::new(
+                FaultKind::Argument,
+                format!(
+                    "expected captured_s of at least {}, that of the frame before, found {captured_secs}",
+                    self.last_secs
+                ),
+            ));
+        };
+        self.perception.check_picture(&picture)?;
+        let tracker = &mut self.tracker;
+        let parts = on_threads(self.threads, || tracker.frame(Arc::new(picture), captured))??;
+        self.last_secs = captured_secs;
+        let record = |part: sdg_grasp::TrackedPart| Record {
+            track: part.id,
+            state: state_name(part.state),
+            age_s: part.age.as_secs_f64(),
+            found: FoundRecord::new(&Found { detection: part.detection, pose: part.pose }, &self.perception),
+        };
+        let records: Vec<Record> = parts.into_iter().map(record).collect();
+        Ok(serde_json::to_string(&records).unwrap_or_default())
+    }
+}
+
+fn state_name(state: TrackState) -> &'static str {
+    match state {
+        TrackState::Followed => "followed",
+        TrackState::FoundAgain => "found_again",
+        TrackState::Lost => "lost",
+    }
+}

@@ -1,0 +1,382 @@
+"""Teach a robot a grasp from one photo; find it in pictures, in pixels and in metres.
+
+    model = sdg.teach("part.png", "part.json", model="S")
+    best = model.detect(sdg.read_picture("table.png")).best
+    print(best.grasp.x, best.grasp.y, best.grasp.angle_deg)
+
+Arrays are numpy's, uint8, of shape (height, width, 3), or (height, width) for grey, with any strides; they are copied once, and Python's
+other threads run while something is computed. Lengths are metres and angles degrees where names say so.
+"""
+
+import json
+import tempfile
+from collections.abc import Mapping, Sequence
+from os import PathLike, fspath
+from operator import index
+from pathlib import Path
+from typing import Any, Optional, Union
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _native
+from ._detections import Detection, Detections, Grasp, Pose, TrackedPart
+from ._errors import (
+    ArgumentError,
+    CameraError,
+    ClosedError,
+    FileError,
+    ForkedError,
+    ModelFileError,
+    NothingToGrasp,
+    PictureError,
+    RegionError,
+    SdgError,
+    TeachingError,
+    VersionError,
+)
+
+__version__ = "0.1.0"
+if _native.VERSION != __version__:
+    raise VersionError(
+        f"expected a native part of version {__version__}, found {_native.VERSION}: install single-demo-grasp again",
+        name="sdg._native",
+    )
+
+__all__ = [
+    "ArgumentError",
+    "Camera",
+    "CameraError",
+    "ClosedError",
+    "Detection",
+    "Detections",
+    "FileError",
+    "ForkedError",
+    "Grasp",
+    "GraspModel",
+    "ModelFileError",
+    "NothingToGrasp",
+    "PictureError",
+    "Pose",
+    "RegionError",
+    "SdgError",
+    "TeachingError",
+    "TrackedPart",
+    "Tracker",
+    "VersionError",
+    "evaluate",
+    "read_picture",
+    "teach",
+]
+
+_Path = Union[str, "PathLike[str]"]
+_Array = npt.NDArray[np.uint8]
+_Region = Union[None, str, Sequence[int]]
+
+_MAX_THREADS = 1024
+_MAX_STEPS = 1_000_000
+_MAX_SEED = 2**64 - 1
+_MAX_SEARCH_FRAMES = 10_000
+
+
+class Camera:
+    """A calibrated camera with its pose over the table."""
+
+    def __init__(self, native: _native.Camera) -> None:
+        self._native = native
+
+    @classmethod
+    def load(cls, path: _Path) -> "Camera":
+        """Reads ROS's camera_info YAML with the camera's pose (`table:`), as `sdg camera calibrate` and `sdg camera table` write it.
+
+        Raises FileError and CameraError.
+        """
+        return cls(_native.Camera.load(path))
+
+    @classmethod
+    def from_yaml(cls, text: str) -> "Camera":
+        """The same from the file's text. Raises CameraError."""
+        return cls(_native.Camera.from_yaml(text))
+
+    @property
+    def size_px(self) -> tuple[int, int]:
+        """Width and height of its pictures, in pixels."""
+        return self._native.size_px
+
+    @property
+    def frame(self) -> Optional[str]:
+        """The frame of poses: "table" or "base"."""
+        return self._native.frame
+
+
+class GraspModel:
+    """A taught part. Threads may share it."""
+
+    def __init__(self, native: _native.Model) -> None:
+        self._native = native
+
+    @classmethod
+    def load(cls, path: _Path) -> "GraspModel":
+        """Reads a model's file. Raises FileError and ModelFileError."""
+        return cls(_native.Model.load(path))
+
+    def save(self, path: _Path) -> None:
+        """Writes the model's file, whole or not at all, over a grasp model or nothing. Raises FileError."""
+        self._native.save(path)
+
+    @property
+    def model(self) -> str:
+        """Its letter: S, A, B, C or D."""
+        return self._native.kind
+
+    @property
+    def object(self) -> str:
+        """The part's name."""
+        return self._native.object
+
+    def detect(
+        self,
+        array: _Array,
+        channels: str = "rgb",
+        camera: Optional[Camera] = None,
+        region: _Region = None,
+        threads: Optional[int] = None,
+        min_score: float = 0.5,
+    ) -> Detections:
+        """Finds the part in a picture.
+
+        array: uint8 of shape (height, width, 3), or (height, width) for grey; any strides.
+        channels: "rgb", or "bgr" for OpenCV's arrays.
+        camera: the calibrated camera that took it, for poses in metres; the model must have been taught with one.
+        region: (left, upper, width, height) in pixels, "all", or None for the one that the model was taught with.
+        threads: threads that compute; None for as many as there are cores.
+        min_score: detections that score less are in `.refused` of what is returned.
+
+        Raises PictureError, CameraError, RegionError and ArgumentError. A picture without the part gives an empty list, whose `.best` raises
+        NothingToGrasp.
+        """
+        if not 0 <= min_score <= 1:
+            raise ArgumentError(f"expected min_score from 0 to 1, found {min_score}")
+        found = self._native.detect(
+            _checked(array), channels, _native_of(camera), _checked_region(region), _checked_threads(threads)
+        )
+        return Detections([Detection.of(record) for record in json.loads(found)], min_score)
+
+    def __repr__(self) -> str:
+        return f"GraspModel(model={self.model!r}, object={self.object!r})"
+
+
+class Tracker:
+    """Follows parts from frame to frame; searches run on a thread of their own. A context manager, which closes it."""
+
+    def __init__(
+        self,
+        model: GraspModel,
+        camera: Optional[Camera] = None,
+        region: _Region = None,
+        threads: Optional[int] = None,
+        search_frames: Optional[int] = None,
+    ) -> None:
+        """camera, region and threads are those of `GraspModel.detect`.
+
+        search_frames: what a search found is known so many frames later, for results that are the same on every machine; None for as
+        soon as it has ended.
+        """
+        if search_frames is not None:
+            search_frames = _whole("search_frames", search_frames, 0, _MAX_SEARCH_FRAMES)
+        self._native = _native.Tracker(
+            model._native, _native_of(camera), _checked_region(region), _checked_threads(threads), search_frames
+        )
+
+    def frame(self, array: _Array, captured_s: float, channels: str = "rgb") -> list[TrackedPart]:
+        """The parts in the next frame, lost ones too.
+
+        array, channels: as in `GraspModel.detect`; captured_s: seconds since any moment that is the same for all frames.
+
+        Raises ClosedError after `close`, and what `GraspModel.detect` raises.
+        """
+        records = json.loads(self._native.frame(_checked(array), channels, captured_s))
+        return [TrackedPart.of(record) for record in records]
+
+    def close(self) -> None:
+        """Ends it; waits for a search that is running."""
+        self._native.close()
+
+    def __enter__(self) -> "Tracker":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def read_picture(path: _Path, camera: Optional[Camera] = None) -> _Array:
+    """Reads PNG, JPEG, WebP, BMP or TIFF as the program does: uint8 of shape (height, width, 3), red first.
+
+    camera: where a calibrated camera took it, pixels stay as its sensor has them; else the picture is turned upright (Exif).
+
+    Raises FileError and PictureError.
+    """
+    height, width, pixels = _native.read_picture(path, _native_of(camera))
+    return np.frombuffer(pixels, np.uint8).reshape(height, width, 3)
+
+
+def teach(
+    photo: _Path,
+    marks: Union[_Path, Mapping[str, Any]],
+    model: str = "C",
+    *,
+    preset: str = "edge",
+    seed: int = 1,
+    steps: Optional[int] = None,
+    time_budget_s: Optional[float] = None,
+    symmetry: Union[int, str] = 1,
+    size_tolerance: tuple[float, float] = (0.75, 1.35),
+    region: Optional[Sequence[int]] = None,
+    camera: Optional[_Path] = None,
+    mark_height_mm: Optional[float] = None,
+    grasp_height_mm: Optional[float] = None,
+    negatives: Sequence[_Path] = (),
+) -> GraspModel:
+    """Teaches a model from one photo, with the defaults of `sdg teach`. Ctrl-C ends it.
+
+    photo: a picture's file.
+    marks: a file of marks (COCO, LabelMe, YOLO-pose), or what such a JSON file holds, as a dictionary.
+    model: S, ready in seconds, or A, B, C or D, which have a network and take minutes.
+    steps, time_budget_s: bounds of the network's training.
+    symmetry: how often the part looks the same in a whole turn, or "full".
+    size_tolerance: smallest and largest size in a picture over that in the photo.
+    region: (left, upper, width, height) in pixels of the photo.
+    camera: the file of the calibrated camera that took the photo, for grasps in metres; then mark_height_mm is the height of the marks over
+    the table and grasp_height_mm that of the grasp, half of it without.
+    negatives: files of pictures without the part.
+
+    Raises FileError, PictureError, TeachingError, CameraError, RegionError and ArgumentError.
+    """
+    if (camera is None) != (mark_height_mm is None):
+        raise ArgumentError("expected camera and mark_height_mm together, found one without the other")
+    if time_budget_s is not None and not 0 < time_budget_s < 1e9:
+        raise ArgumentError(f"expected time_budget_s of more than 0 seconds, found {time_budget_s}")
+    of_camera = None
+    if camera is not None and mark_height_mm is not None:
+        grasp_mm = 0.5 * mark_height_mm if grasp_height_mm is None else grasp_height_mm
+        for name, value in [("mark_height_mm", mark_height_mm), ("grasp_height_mm", grasp_mm)]:
+            if not (value == 0 or 0.1 <= value <= 500):
+                raise ArgumentError(f"expected {name} of 0 to 500 millimetres, found {value}: metres given as millimetres?")
+        of_camera = (camera, 1e-3 * mark_height_mm, 1e-3 * grasp_mm)
+    # 0 for all turns.
+    turns = 0
+    if symmetry != "full":
+        if isinstance(symmetry, str):
+            raise ArgumentError(f'expected symmetry from 1 to 360 equal turns, or "full", found {symmetry!r}')
+        turns = _whole("symmetry", symmetry, 1, 360)
+    seed = _whole("seed", seed, 0, _MAX_SEED)
+    if steps is not None:
+        steps = _whole("steps", steps, 1, _MAX_STEPS)
+    smallest, largest = size_tolerance
+    if not (0.5 <= smallest <= 1 <= largest <= 2):
+        raise ArgumentError(
+            f"expected size_tolerance=(smallest, largest), from 0.5 to 1 and from 1 to 2, found {size_tolerance}"
+        )
+    bounds = None if region is None else _bounds(region)
+    with tempfile.TemporaryDirectory() as folder:
+        marks_file: _Path
+        if isinstance(marks, Mapping):
+            marks_file = Path(folder, f"{Path(fspath(photo)).stem}.json")
+            marks_file.write_text(json.dumps(marks), encoding="utf-8")
+        else:
+            marks_file = marks
+        taught = _native.teach(
+            [(photo, marks_file)],
+            model,
+            preset,
+            seed,
+            steps,
+            time_budget_s,
+            turns,
+            (smallest, largest),
+            bounds,
+            of_camera,
+            list(negatives),
+        )
+    return GraspModel(taught)
+
+
+def evaluate(
+    model: GraspModel,
+    folder: _Path,
+    camera: Optional[Camera] = None,
+    region: _Region = None,
+    threads: Optional[int] = None,
+    label: Optional[str] = None,
+    min_score: float = 0.5,
+    report: Optional[_Path] = None,
+) -> dict[str, Any]:
+    """Counts a model on a folder of labelled pictures: the figures of `sdg evaluate --pictures --json`.
+
+    report: a folder for a page with every picture; none is kept without.
+
+    Raises TeachingError for labels that cannot be counted on, and what `GraspModel.detect` raises.
+    """
+    with tempfile.TemporaryDirectory() as unkept:
+        figures: dict[str, Any] = json.loads(
+            _native.evaluate(
+                model._native,
+                folder,
+                _native_of(camera),
+                _checked_region(region),
+                _checked_threads(threads),
+                label,
+                min_score,
+                report if report is not None else unkept,
+            )
+        )
+    if report is None:
+        del figures["report"]
+    return figures
+
+
+def _native_of(camera: Optional[Camera]) -> Optional[_native.Camera]:
+    return None if camera is None else camera._native
+
+
+def _checked(array: Any) -> _Array:
+    """A numpy array of numpy's own class, without a copy."""
+    if not isinstance(array, np.ndarray):
+        raise PictureError(f"expected a numpy.ndarray, found {type(array).__name__}")
+    return np.asarray(array)
+
+
+def _checked_region(region: _Region) -> Any:
+    """None, True for all of a picture, or four numbers."""
+    if region is None:
+        return None
+    if isinstance(region, str):
+        if region != "all":
+            raise RegionError(f'expected region=(left, upper, width, height) or "all", found {region!r}')
+        return True
+    return _bounds(region)
+
+
+def _bounds(region: Sequence[int]) -> tuple[int, int, int, int]:
+    try:
+        left, upper, width, height = (index(number) for number in region)
+    except (TypeError, ValueError):
+        left = upper = width = height = -1
+    if not all(0 <= number < 2**32 for number in (left, upper, width, height)):
+        raise RegionError(f"expected region=(left, upper, width, height) in whole pixels of the picture, found {region!r}")
+    return left, upper, width, height
+
+
+def _checked_threads(threads: Optional[int]) -> Optional[int]:
+    return None if threads is None else _whole("threads", threads, 1, _MAX_THREADS)
+
+
+def _whole(name: str, value: int, least: int, most: int) -> int:
+    """A whole number of any of Python's or numpy's types, within bounds."""
+    try:
+        number = index(value)
+    except TypeError:
+        number = None
+    if number is None or not least <= number <= most:
+        raise ArgumentError(f"expected {name}, a whole number from {least} to {most}, found {value!r}")
+    return number

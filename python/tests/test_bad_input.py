@@ -1,0 +1,221 @@
+"""Wrong input: one exception of its own class, which says what was expected and what was found."""
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any, Callable
+
+import numpy as np
+import pytest
+
+import made_pictures
+import sdg
+
+GREY = np.zeros((480, 640, 3), np.uint8)
+
+
+class Subclass(np.ndarray):
+    """Could tell another address than its own."""
+
+
+@pytest.mark.parametrize(
+    "array, words",
+    [
+        (GREY.astype(np.float32), "expected an array of dtype uint8, found float32"),
+        (GREY.astype(np.int8), "expected an array of dtype uint8, found int8"),
+        (GREY.astype(bool), "expected an array of dtype uint8, found bool"),
+        (GREY.astype(object), "expected an array of dtype uint8, found object"),
+        (GREY[0, 0], "found [3]"),
+        (GREY[None], "expected an array of shape (height, width, 3), or (height, width) for grey, found [1, 480, 640, 3]"),
+        (GREY[:, :, :2], "expected a picture of 3 channels, or of 1 for grey, found 2 channels"),
+        (np.zeros((480, 640, 4), np.uint8), "found 4 channels"),
+        (np.zeros((3, 480, 640), np.uint8), "found 640 channels"),
+        (np.zeros((0, 640, 3), np.uint8), "expected a picture of at least 1 × 1 pixels, found 640 × 0"),
+        (np.broadcast_to(np.uint8(0), (1 << 20, 1 << 20)), "found 1048576 × 1048576"),
+        (np.zeros((2, 3, 3), np.uint8), "found 3 × 2"),
+        (GREY.tolist(), "expected a numpy.ndarray, found list"),
+        (GREY.tobytes(), "expected a numpy.ndarray, found bytes"),
+        (None, "expected a numpy.ndarray, found NoneType"),
+        ("table.png", "expected a numpy.ndarray, found str"),
+    ],
+)
+def test_arrays_that_are_no_pictures(array: Any, words: str, shape_model: sdg.GraspModel) -> None:
+    with pytest.raises(sdg.PictureError) as raised:
+        shape_model.detect(array)
+    assert words in str(raised.value)
+
+
+def test_a_subclass_is_read_as_the_array_that_it_is(shape_model: sdg.GraspModel) -> None:
+    photo = sdg.read_picture(made_pictures.PHOTO)
+    assert shape_model.detect(photo.view(Subclass)) == shape_model.detect(photo)
+
+
+def test_a_picture_of_nothing(shape_model: sdg.GraspModel) -> None:
+    found = shape_model.detect(np.full((480, 640, 3), 128, np.uint8))
+    assert found == []
+    with pytest.raises(sdg.NothingToGrasp, match="expected a part to grasp, found n"):
+        found.best
+
+
+def refused_model_file(content: bytes, folder: Path) -> str:
+    file = folder / "model.sdg"
+    file.write_bytes(content)
+    with pytest.raises(sdg.ModelFileError) as raised:
+        sdg.GraspModel.load(file)
+    assert str(file) in str(raised.value)
+    return str(raised.value)
+
+
+def test_damaged_model_files(models: dict[str, Path], tmp_path: Path) -> None:
+    whole = models["S"].read_bytes()
+    middle = len(whole) // 2
+    flipped = whole[:middle] + bytes([whole[middle] ^ 1]) + whole[middle + 1 :]
+    for content in (whole[: len(whole) // 2], whole[:20], flipped):
+        refused_model_file(content, tmp_path)
+    assert "expected a grasp model file" in refused_model_file(made_pictures.PHOTO.read_bytes(), tmp_path)
+    refused_model_file(b"", tmp_path)
+
+
+def test_paths_that_do_not_exist(shape_model: sdg.GraspModel, tmp_path: Path) -> None:
+    missing = tmp_path / "missing"
+    calls: list[Callable[[], object]] = [
+        lambda: sdg.GraspModel.load(missing),
+        lambda: sdg.GraspModel.load(str(missing)),
+        lambda: sdg.Camera.load(missing),
+        lambda: sdg.read_picture(missing),
+        lambda: sdg.teach(missing, made_pictures.MARKS, model="S"),
+        lambda: sdg.teach(made_pictures.PHOTO, missing, model="S"),
+        lambda: sdg.evaluate(shape_model, missing),
+        lambda: shape_model.save(missing / "model.sdg"),
+    ]
+    for call in calls:
+        with pytest.raises(sdg.FileError, match="missing") as raised:
+            call()
+        # As any of Python's errors of files.
+        assert isinstance(raised.value, OSError)
+
+
+def test_a_model_replaces_no_other_file(shape_model: sdg.GraspModel, tmp_path: Path) -> None:
+    picture = tmp_path / "picture.png"
+    picture.write_bytes(made_pictures.PHOTO.read_bytes())
+    with pytest.raises(sdg.FileError):
+        shape_model.save(picture)
+    assert picture.read_bytes() == made_pictures.PHOTO.read_bytes()
+
+
+def test_pictures_that_are_none(tmp_path: Path) -> None:
+    with pytest.raises(sdg.PictureError):
+        sdg.read_picture(made_pictures.MARKS)
+    cut = tmp_path / "cut.png"
+    cut.write_bytes(made_pictures.PHOTO.read_bytes()[:5000])
+    with pytest.raises(sdg.PictureError, match="cut.png"):
+        sdg.read_picture(cut)
+
+
+def test_cameras(models: dict[str, Path], shape_model: sdg.GraspModel) -> None:
+    text = made_pictures.CAMERA.read_text()
+    camera = sdg.Camera.from_yaml(text)
+    assert camera.size_px == (640, 480) and camera.frame == "base"
+    for wrong in ("", "image_width: 640\n", text.replace("table:", "floor:")):
+        with pytest.raises(sdg.CameraError):
+            sdg.Camera.from_yaml(wrong)
+    photo = sdg.read_picture(made_pictures.PHOTO, camera)
+    # Taught without a camera, so in pixels alone.
+    with pytest.raises(sdg.CameraError):
+        shape_model.detect(photo, camera=camera)
+    with pytest.raises(sdg.PictureError, match="640 × 480"):
+        sdg.GraspModel.load(models["S-camera"]).detect(photo[:470], camera=camera)
+
+
+@pytest.mark.parametrize("region", [(0, 0, 641, 480), (0, 0, 0, 5), (0, 0, 5), (-1, 0, 50, 50), (0.5, 0, 50, 50), "left"])
+def test_regions(region: Any, shape_model: sdg.GraspModel) -> None:
+    with pytest.raises(sdg.RegionError, match="expected"):
+        shape_model.detect(GREY, region=region)
+
+
+@pytest.mark.parametrize(
+    "arguments, words",
+    [
+        ({"channels": "hsv"}, 'found "hsv"'),
+        ({"threads": 0}, "expected threads, a whole number from 1 to 1024, found 0"),
+        ({"threads": 1.5}, "found 1.5"),
+        ({"threads": 1 << 30}, "found 1073741824"),
+        ({"min_score": 1.5}, "min_score from 0 to 1, found 1.5"),
+        ({"min_score": float("nan")}, "min_score from 0 to 1, found nan"),
+    ],
+)
+def test_arguments_of_detect(arguments: dict[str, Any], words: str, shape_model: sdg.GraspModel) -> None:
+    with pytest.raises(sdg.ArgumentError) as raised:
+        shape_model.detect(GREY, **arguments)
+    assert words in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        {"model": "Z"},
+        {"preset": "huge"},
+        {"symmetry": 0},
+        {"symmetry": "half"},
+        {"symmetry": 2.5},
+        {"steps": 0},
+        {"seed": -1},
+        {"time_budget_s": -1.0},
+        {"time_budget_s": float("nan")},
+        {"size_tolerance": (1.4, 0.8)},
+        {"mark_height_mm": 10.0},
+        {"camera": made_pictures.CAMERA, "mark_height_mm": 0.01},
+    ],
+)
+def test_arguments_of_teach(arguments: dict[str, Any]) -> None:
+    with pytest.raises(sdg.ArgumentError, match="expected"):
+        sdg.teach(made_pictures.PHOTO, made_pictures.MARKS, **{"model": "S", **arguments})
+
+
+def test_marks_that_nothing_can_be_taught_from() -> None:
+    for marks in ({}, {"shapes": []}):
+        with pytest.raises(sdg.TeachingError):
+            sdg.teach(made_pictures.PHOTO, marks, model="S")
+    with pytest.raises(sdg.TeachingError):
+        sdg.teach(made_pictures.PHOTO, made_pictures.DEMONSTRATIONS / "key" / "image.png", model="S")
+
+
+def test_trackers(shape_model: sdg.GraspModel) -> None:
+    tracker = sdg.Tracker(shape_model)
+    tracker.frame(GREY, captured_s=1.0)
+    for earlier in (0.5, float("nan"), float("inf")):
+        with pytest.raises(sdg.ArgumentError, match="captured_s of at least 1"):
+            tracker.frame(GREY, captured_s=earlier)
+    tracker.close()
+    with pytest.raises(sdg.ClosedError, match="found one that was closed"):
+        tracker.frame(GREY, captured_s=2.0)
+    tracker.close()
+
+
+FORKED = """
+import os, sys
+import sdg
+model, picture = sdg.GraspModel.load(sys.argv[1]), sdg.read_picture(sys.argv[2])
+model.detect(picture)
+for threads in (None, 1):
+    if os.fork() == 0:
+        try:
+            model.detect(picture, threads=threads)
+        except sdg.ForkedError as error:
+            print(error, flush=True)
+        os._exit(0)
+    os.wait()
+"""
+
+
+def test_a_forked_process_is_told_instead_of_waiting_for_ever(models: dict[str, Path]) -> None:
+    arguments = [sys.executable, "-c", FORKED, str(models["S"]), str(made_pictures.PHOTO)]
+    done = subprocess.run(arguments, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.count("expected a process that was started anew (spawn)") == 2
+
+
+def test_every_exception_is_of_this_package() -> None:
+    errors = [value for name, value in vars(sdg).items() if isinstance(value, type) and issubclass(value, Exception)]
+    assert len(errors) == 12
+    assert all(issubclass(error, sdg.SdgError) for error in errors)
