@@ -9,8 +9,19 @@ use std::process::Command;
 use sdg_checks::{crate_rows, headings, links, named_files, names_in_code};
 
 /// Folders of the repository whose files documents name by their path.
-const FOLDERS: [&str; 9] =
-    ["benches", "checks", "crates", "datasets", "docs", "scripts", "tests", "weights-conversion", ".ci"];
+const FOLDERS: [&str; 11] = [
+    "benches",
+    "checks",
+    "crates",
+    "datasets",
+    "docs",
+    "fuzz",
+    "python",
+    "scripts",
+    "tests",
+    "weights-conversion",
+    ".ci",
+];
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..").canonicalize().unwrap()

@@ -23,6 +23,8 @@
 //! assert_eq!(unsafe { sdg_mujoco_sys::mj_version() }, 222);
 //! ```
 
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
 #[cfg(not(feature = "buildtime_bindgen"))]
 #[rustfmt::skip]
 #[allow(missing_docs, non_camel_case_types, non_snake_case, non_upper_case_globals, clippy::all)]
