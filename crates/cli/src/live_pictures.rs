@@ -2,7 +2,7 @@
 
 use anyhow::{Context, Result};
 use clap::Args;
-use sdg_camera::{Address, Camera, Encoding, OpenOptions};
+use sdg_camera::{Address, Camera, Encoding, Frame, OpenOptions};
 
 use crate::exit::Usage;
 
@@ -26,6 +26,8 @@ const LIVE: &str = "Live pictures";
 const DEFAULT_SIZE: (u32, u32) = (640, 480);
 /// The time without a frame after which a camera is stale.
 const DEFAULT_STALL_SECS: f64 = 2.0;
+/// Consecutive faults after which a camera is given up: at the default stall timeout, half a minute.
+const MAX_FAULTS: u32 = 15;
 
 /// What a camera is asked for.
 #[derive(Debug, Args)]
@@ -156,6 +158,24 @@ fn parse_size(text: &str) -> Result<(u32, u32), String> {
     let sides = text.split_once('x').and_then(|(width, height)| Some((width.parse().ok()?, height.parse().ok()?)));
     let sides = sides.filter(|(width, height)| (1..=16384).contains(width) && (1..=16384).contains(height));
     sides.ok_or_else(|| "expected width and height in pixels, as in 640x480".to_owned())
+}
+
+/// The next frame; passing faults are printed and passed over, but not for ever.
+///
+/// # Errors
+/// One that does not pass, and too many in a row that do.
+pub fn next_frame(camera: &mut dyn Camera) -> Result<Option<Frame>> {
+    let mut num_faults = 0;
+    loop {
+        match camera.next_frame() {
+            Ok(frame) => return Ok(frame),
+            Err(error) if error.is_passing() && num_faults < MAX_FAULTS => {
+                eprintln!("sdg: {error}");
+                num_faults += 1;
+            }
+            Err(error) => return Err(error.into()),
+        }
+    }
 }
 
 #[cfg(test)]

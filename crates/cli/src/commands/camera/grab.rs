@@ -6,12 +6,12 @@ use std::time::{Duration, Instant, UNIX_EPOCH};
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use sdg_camera::{Address, Camera, Frame, LatestFrame};
+use sdg_camera::{Address, Frame, LatestFrame};
 use serde_json::json;
 
 use crate::exit::{Outcome, Usage};
 use crate::interrupt::Interrupt;
-use crate::live_pictures::{LiveArgs, open};
+use crate::live_pictures::{LiveArgs, next_frame, open};
 
 /// `sdg camera grab`
 #[derive(Debug, Args)]
@@ -31,9 +31,6 @@ pub struct GrabArgs {
     #[arg(long)]
     pub json: bool,
 }
-
-/// Consecutive faults after which a camera is given up: at the default stall timeout, half a minute.
-const MAX_FAULTS: u32 = 15;
 
 /// Frames to PNG files.
 pub fn run(args: &GrabArgs) -> Result<Outcome> {
@@ -83,21 +80,6 @@ pub fn run(args: &GrabArgs) -> Result<Outcome> {
         eprintln!("sdg: {} of {} frames: there are no more", num_written, args.count);
     }
     Ok(Outcome::Done)
-}
-
-/// The next frame; passing faults are printed and passed over, but not for ever.
-fn next_frame(camera: &mut dyn Camera) -> Result<Option<Frame>> {
-    let mut num_faults = 0;
-    loop {
-        match camera.next_frame() {
-            Ok(frame) => return Ok(frame),
-            Err(error) if error.is_passing() && num_faults < MAX_FAULTS => {
-                eprintln!("sdg: {error}");
-                num_faults += 1;
-            }
-            Err(error) => return Err(error.into()),
-        }
-    }
 }
 
 fn print_frame(path: &Path, frame: &Frame, is_json: bool) -> Result<()> {

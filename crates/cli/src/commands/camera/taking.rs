@@ -14,7 +14,7 @@ use nalgebra::Point2;
 use sdg_calibration::{
     Board, CalibrationConfig, CalibrationError, MIN_PICTURES, PictureTaker, SeenCorner, Sight, calibrate, find_board,
 };
-use sdg_camera::{Address, Camera, Frame, LatestFrame, MjpegServer};
+use sdg_camera::{Address, LatestFrame, MjpegServer};
 use sdg_demonstration::PixelFrame;
 use sdg_geometry::{BoundingBox, Keypoint, Polygon, convex_hull};
 use sdg_report::{Color, Pen, draw_box, draw_keypoints, draw_label, draw_polygon, line_width};
@@ -22,7 +22,7 @@ use sdg_report::{Color, Pen, draw_box, draw_keypoints, draw_label, draw_polygon,
 use super::board_in_use::{grey, named};
 use crate::exit::{Usage, one_line};
 use crate::interrupt::Interrupt;
-use crate::live_pictures::{self, RequestArgs};
+use crate::live_pictures::{self, RequestArgs, next_frame};
 use crate::web_browser;
 
 /// Where pictures are written unless the user says.
@@ -31,8 +31,6 @@ const DEFAULT_FOLDER: &str = "calibration-pictures";
 const ENOUGH: usize = 12;
 /// However much is lacking, more pictures do not help.
 const MAX_TAKEN: usize = 40;
-/// Consecutive faults after which a camera is given up: at the default stall timeout, half a minute.
-const MAX_FAULTS: u32 = 15;
 const BOARD: Color = Color([255, 196, 61]);
 
 /// Where pictures are taken.
@@ -132,21 +130,6 @@ impl TakingArgs {
             }
         }
         Ok(session.map(|taking| taking.seen).unwrap_or_default())
-    }
-}
-
-/// The next frame; passing faults are printed and passed over, but not for ever.
-fn next_frame(camera: &mut dyn Camera) -> Result<Option<Frame>> {
-    let mut num_faults = 0;
-    loop {
-        match camera.next_frame() {
-            Ok(frame) => return Ok(frame),
-            Err(error) if error.is_passing() && num_faults < MAX_FAULTS => {
-                eprintln!("{error}");
-                num_faults += 1;
-            }
-            Err(error) => return Err(error.into()),
-        }
     }
 }
 
