@@ -5,7 +5,7 @@ use std::net::{Ipv4Addr, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, OnceLock, PoisonError};
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use image::RgbImage;
 use image::codecs::jpeg::JpegEncoder;
@@ -20,24 +20,24 @@ const WRITE_TIMEOUT: Duration = Duration::from_secs(5);
 const REQUEST_TIMEOUT: Duration = Duration::from_secs(5);
 /// Between looks at whether the server ends, where no picture comes.
 const LOOK_EVERY: Duration = Duration::from_millis(200);
+/// The end waits so long for browsers to take the last picture.
+const LAST_PICTURE_WITHIN: Duration = Duration::from_millis(500);
 /// More than the windows of one user.
 const MAX_CONNECTIONS: usize = 32;
 /// More than a browser sends.
 const MAX_REQUEST_BYTES: usize = 16 << 10;
 
-const PAGE: &str = "<!doctype html>\n<html lang=\"en\"><meta charset=\"utf-8\"><title>Live picture · sdg</title>\n\
-                    <meta name=\"viewport\" content=\"width=device-width\">\n\
-                    <style>body{margin:0;background:#222}img{display:block;width:100vw;height:100vh;object-fit:contain}\n\
-                    h1{position:absolute;width:1px;height:1px;margin:0;overflow:hidden;clip-path:inset(50%)}</style>\n\
-                    <main><h1>Live picture</h1><img src=\"/stream\" alt=\"The live picture\"></main></html>\n";
+const PAGE: &str = include_str!("page/index.html");
+const SCRIPT: &str = include_str!("page/page.js");
 
 /// A server on 127.0.0.1 that shows the pictures which are published, to any number of browsers.
 ///
 /// | path | answer |
 /// |---|---|
-/// | `/` | a page with the live picture |
+/// | `/` | a page with the live picture, which tells when the program has ended |
 /// | `/stream` | `multipart/x-mixed-replace`, a JPEG in each part |
 /// | `/snapshot.jpg` | the newest picture; status 503 before the first |
+/// | `/words` | what the newest picture shows, in words; empty before the first |
 ///
 /// [`publish`](Self::publish) never waits: a picture is encoded when the first browser requests it, and a slow browser gets the newest one
 /// when it is ready for it. Only requests that name 127.0.0.1 or localhost with this port are answered, and none from other pages: a
@@ -59,8 +59,16 @@ struct Shared {
 struct Published {
     number: u64,
     picture: RgbImage,
+    /// For those who cannot see the picture.
+    words: String,
     /// Encoded on the first request.
     jpeg: OnceLock<Vec<u8>>,
+}
+
+impl Shared {
+    fn newest(&self) -> Option<Arc<Published>> {
+        self.newest.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
 }
 
 impl Published {
@@ -94,11 +102,11 @@ impl MjpegServer {
         format!("http://127.0.0.1:{}/", self.port)
     }
 
-    /// Shows a picture in place of the one before.
-    pub fn publish(&self, picture: RgbImage) {
+    /// Shows a picture in place of the one before; `words` tell a screen reader what it shows.
+    pub fn publish(&self, picture: RgbImage, words: impl Into<String>) {
         let mut newest = self.shared.newest.lock().unwrap_or_else(PoisonError::into_inner);
         let number = newest.as_ref().map_or(0, |published| published.number + 1);
-        *newest = Some(Arc::new(Published { number, picture, jpeg: OnceLock::new() }));
+        *newest = Some(Arc::new(Published { number, picture, words: words.into(), jpeg: OnceLock::new() }));
         drop(newest);
         self.shared.changed.notify_all();
     }
@@ -112,6 +120,10 @@ impl Drop for MjpegServer {
         let _ = TcpStream::connect((Ipv4Addr::LOCALHOST, self.port));
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
+        }
+        let stopped = Instant::now();
+        while self.shared.num_connections.load(Ordering::SeqCst) > 0 && stopped.elapsed() < LAST_PICTURE_WITHIN {
+            std::thread::sleep(Duration::from_millis(5));
         }
     }
 }
@@ -147,15 +159,20 @@ fn serve(mut stream: TcpStream, port: u16, shared: &Shared) -> std::io::Result<(
         Err((status, why)) => respond(&mut stream, status, "text/plain; charset=utf-8", why.as_bytes()),
         Ok(path) => match path.as_str() {
             "/" => respond(&mut stream, "200 OK", "text/html; charset=utf-8", PAGE.as_bytes()),
+            "/page.js" => respond(&mut stream, "200 OK", "text/javascript; charset=utf-8", SCRIPT.as_bytes()),
             "/stream" => stream_pictures(&mut stream, shared),
-            "/snapshot.jpg" => {
-                let newest = shared.newest.lock().unwrap_or_else(PoisonError::into_inner).clone();
-                match newest {
-                    Some(published) => respond(&mut stream, "200 OK", "image/jpeg", published.jpeg()),
-                    None => respond(&mut stream, "503 Service Unavailable", "text/plain", b"there is no picture yet\n"),
-                }
+            "/words" => {
+                let newest = shared.newest();
+                let words = newest.as_ref().map_or("", |published| published.words.as_str());
+                respond(&mut stream, "200 OK", "text/plain; charset=utf-8", words.as_bytes())
             }
-            _ => respond(&mut stream, "404 Not Found", "text/plain", b"there are /, /stream and /snapshot.jpg\n"),
+            "/snapshot.jpg" => match shared.newest() {
+                Some(published) => respond(&mut stream, "200 OK", "image/jpeg", published.jpeg()),
+                None => respond(&mut stream, "503 Service Unavailable", "text/plain", b"there is no picture yet\n"),
+            },
+            _ => {
+                respond(&mut stream, "404 Not Found", "text/plain", b"there are /, /stream, /snapshot.jpg and /words\n")
+            }
         },
     }
 }
@@ -206,7 +223,7 @@ fn head(status: &str, content_type: &str) -> String {
     format!(
         "HTTP/1.1 {status}\r\nContent-Type: {content_type}\r\nConnection: close\r\nCache-Control: no-store\r\n\
          X-Content-Type-Options: nosniff\r\nCross-Origin-Resource-Policy: same-origin\r\nContent-Security-Policy: default-src 'none'; \
-         img-src 'self'; style-src 'unsafe-inline'; frame-ancestors 'none'\r\n"
+         img-src 'self'; script-src 'self'; connect-src 'self'; style-src 'unsafe-inline'; frame-ancestors 'none'\r\n"
     )
 }
 
@@ -232,15 +249,13 @@ fn stream_pictures(stream: &mut TcpStream, shared: &Shared) -> std::io::Result<(
     Ok(())
 }
 
-/// Waits for a picture after the last one; `None` when the server ends.
+/// Waits for a picture after the last one; `None` when the server ends and all were taken.
 fn next_picture(shared: &Shared, last: Option<u64>) -> Option<Arc<Published>> {
     let mut newest = shared.newest.lock().unwrap_or_else(PoisonError::into_inner);
     loop {
-        if shared.is_stopped.load(Ordering::SeqCst) {
-            return None;
-        }
         match newest.as_ref() {
             Some(published) if Some(published.number) != last => return Some(Arc::clone(published)),
+            _ if shared.is_stopped.load(Ordering::SeqCst) => return None,
             _ => newest = shared.changed.wait_timeout(newest, LOOK_EVERY).unwrap_or_else(PoisonError::into_inner).0,
         }
     }

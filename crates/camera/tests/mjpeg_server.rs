@@ -40,10 +40,10 @@ fn open(address: &str) -> Box<dyn Camera> {
 fn what_is_published_arrives_at_every_browser() {
     let server = MjpegServer::start(0).unwrap();
     let stream = format!("{}stream", server.url());
-    server.publish(picture(100));
+    server.publish(picture(100), format!("level {}", 100));
     let mut cameras = [open(&stream), open(&stream)];
     for level in [100, 150, 200] {
-        server.publish(picture(level));
+        server.publish(picture(level), format!("level {}", level));
         for camera in &mut cameras {
             // At once, without waiting for the next picture; the one before may come first.
             let arrived = loop {
@@ -76,7 +76,7 @@ fn a_browser_that_reads_nothing_holds_nobody_up() {
     for seed in 0..100 {
         let picture = noise(seed);
         let start = Instant::now();
-        server.publish(picture);
+        server.publish(picture, "noise");
         longest = longest.max(start.elapsed());
         std::thread::sleep(Duration::from_millis(5));
     }
@@ -91,9 +91,24 @@ fn a_browser_that_reads_nothing_holds_nobody_up() {
 }
 
 #[test]
+fn the_last_picture_arrives_and_words_go_with_it() {
+    let server = MjpegServer::start(0).unwrap();
+    let words = |server: &MjpegServer| ask(server, "GET /words HTTP/1.1\r\nHost: localhost:PORT");
+    assert!(words(&server).ends_with("\r\n\r\n"), "no picture, no words: {}", words(&server));
+    let mut camera = open(&format!("{}stream", server.url()));
+    server.publish(picture(50), "moving");
+    camera.next_frame().unwrap().unwrap();
+    server.publish(picture(200), "done, Größe 3");
+    assert!(words(&server).ends_with("\r\n\r\ndone, Größe 3"), "{}", words(&server));
+    drop(server);
+    let level = camera.next_frame().unwrap().unwrap().picture.get_pixel(9, 9)[0];
+    assert!(level.abs_diff(200) < 5, "{level}");
+}
+
+#[test]
 fn foreign_names_other_pages_and_other_methods_are_refused() {
     let server = MjpegServer::start(0).unwrap();
-    server.publish(picture(7));
+    server.publish(picture(7), "level 7");
     for own in ["127.0.0.1", "localhost"] {
         assert!(ask(&server, &format!("GET / HTTP/1.1\r\nHost: {own}:PORT")).starts_with("HTTP/1.1 200 OK\r\n"));
     }

@@ -384,6 +384,13 @@ fn pictures_and_files_that_cannot_be_used_are_refused_with_what_is_missing() {
     let text = files.text("text.png", "no picture");
     calibrate(&[&text], 1, &["text.png", "found none among 1"]);
 
+    // A file that cannot be updated is told before pictures are taken for it.
+    let unusable = files.text("unusable.yaml", "{a: 1}");
+    let (from, taken) = (format!("dir:{}?loop", files.path("")), files.path("taken"));
+    let live = ["camera", "calibrate", "--from", &from, "--taken", &taken, "--no-browser", "--out", &unusable];
+    assert_refused(&live, 1, &["unusable.yaml"]);
+    assert!(!Path::new(&taken).exists());
+
     let known = files.camera(&camera);
     let table = |further: &[&str], code, parts: &[&str]| {
         assert_refused(&[&["camera", "table"], further].concat(), code, parts);

@@ -176,6 +176,13 @@ fn wrong_regions_are_one_clear_error_each() {
         assert!(found == Some(code) && error.contains(part), "{region}: {found:?} {error}");
         assert_eq!(error.matches("expected").count(), 1, "one error: {error}");
     }
+    // A folder that is read as a camera's pictures: none of them can be searched.
+    let from = format!("dir:{}", shipped("pendulum", "image.png").parent().unwrap().display());
+    let output =
+        sdg(&["detect", "--grasp-model", &model, "--from", &from, "--region", "600,10,100,100", "--every-frame"]);
+    let told = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{told}");
+    assert!(told.contains("found 100 × 100 pixels from (600, 10)") && told.contains("could not be used"), "{told}");
     let out = folder.path("new.sdg");
     let demo = format!("{photo}:{}", shipped("pendulum", "annotation.json").display());
     for (region, part) in [

@@ -5,6 +5,7 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 
 use sdg_webdriver::{Browser, BrowserOptions};
+use serde_json::json;
 
 use super::page::{assert_accessible, repository};
 use crate::rendering::cameras::{CAMERAS, board, poses};
@@ -50,7 +51,14 @@ fn the_page_shows_the_board_and_what_is_lacking() {
     browser.wait_for("the picture", "return document.querySelector('img').naturalWidth === 640").unwrap();
     browser.screenshot(&repository().join("target/browser-test/calibrating.png")).unwrap();
     assert_accessible(&browser, "the board in the live picture");
+    let words = "return document.getElementById('words').textContent.startsWith('5 taken; ')";
+    browser.wait_for("the same in words", words).unwrap();
+    assert_eq!(browser.run("return document.getElementById('ended').hidden", &[]).unwrap(), json!(true));
     assert_eq!(count(&folder.path().join("calibration-pictures")), 5, "the same views again are not taken");
+    drop(child);
+    browser.wait_for("that it has ended", "return !document.getElementById('ended').hidden").unwrap();
+    browser.screenshot(&repository().join("target/browser-test/calibrating-ended.png")).unwrap();
+    assert_accessible(&browser, "the program has ended");
 }
 
 fn count(folder: &Path) -> usize {

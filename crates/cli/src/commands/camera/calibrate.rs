@@ -9,6 +9,7 @@ use clap::Args;
 use rayon::prelude::*;
 use sdg_calibration::{Board, CalibratedCamera, Calibration, CalibrationConfig, SeenCorner, calibrate, find_board};
 use sdg_demonstration::PixelFrame;
+use sdg_geometry::PinholeCamera;
 use serde_json::{Value, json};
 
 use super::board_in_use::{BoardInUse, grey, named};
@@ -47,6 +48,7 @@ const MAX_BYTES: u64 = 1 << 20;
 pub fn run(args: &CalibrateArgs) -> Result<Outcome> {
     let board = args.board.read()?;
     sdg_files::check_writable(&args.out)?;
+    check_updatable(&args.out)?;
     let config = |(width, height)| CalibrationConfig { width, height, has_k3: args.k3 };
     let mut lines: Vec<Value> = Vec::new();
     let mut seen = match args.live.address(&args.pictures)? {
@@ -116,6 +118,17 @@ fn warn_of_squares(board: &Board, seen: &[Seen]) {
             board.rows()
         );
     }
+}
+
+/// Tells of a file that cannot be updated before pictures are taken for it. Not noted as an input: it is read again when it is written.
+fn check_updatable(path: &Path) -> Result<()> {
+    let Ok(text) = fs::read_to_string(path) else { return Ok(()) };
+    let intrinsics = PinholeCamera::symmetric(640, 480, 500.0);
+    let any = CalibratedCamera { name: "camera".to_owned(), intrinsics, table: None, flange_from_camera: None };
+    if !text.trim().is_empty() {
+        any.update_yaml(&text).with_context(|| named(path))?;
+    }
+    Ok(())
 }
 
 fn write_camera(args: &CalibrateArgs, found: &Calibration) -> Result<()> {

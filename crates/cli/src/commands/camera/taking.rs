@@ -27,7 +27,7 @@ use crate::web_browser;
 
 /// Where pictures are written unless the user says.
 const DEFAULT_FOLDER: &str = "calibration-pictures";
-/// With so many pictures that lack nothing it is done.
+/// With so many pictures that lack nothing it is done; docs/calibration.md names both numbers.
 const ENOUGH: usize = 12;
 /// However much is lacking, more pictures do not help.
 const MAX_TAKEN: usize = 40;
@@ -39,7 +39,7 @@ pub struct TakingArgs {
     /// Take the pictures with a camera instead: v4l:, v4l:/dev/video0, http://HOST/PATH, 'cmd:PROGRAM', dir:FOLDER
     ///
     /// A page opens that shows the board's corners, where it was seen so far, and the view that helps next. A picture is taken
-    /// whenever the board lies still in a new view; Ctrl-C ends it early with what there is.
+    /// whenever the board lies still in a new view, until 12 lack nothing, or 40 are taken; Ctrl-C ends it early with what there is.
     #[arg(long, value_name = "ADDRESS", conflicts_with = "pictures")]
     from: Option<Address>,
     /// With --from: the folder for the pictures, new or empty; without this option, calibration-pictures
@@ -123,8 +123,8 @@ impl TakingArgs {
                 eprintln!("a frame of {} x {} pixels is passed over", size.0, size.1);
                 continue;
             }
-            let drawn = taking.look(frame.picture)?;
-            server.publish(drawn);
+            let (drawn, words) = taking.look(frame.picture)?;
+            server.publish(drawn, words);
             if taking.is_done() {
                 break;
             }
@@ -160,8 +160,8 @@ impl<'a> Taking<'a> {
         self.seen.len() >= MAX_TAKEN || (self.seen.len() >= ENOUGH && self.next.is_empty())
     }
 
-    /// Looks at a frame, writes it where it is worth it, and gives what the page shows.
-    fn look(&mut self, picture: RgbImage) -> Result<RgbImage> {
+    /// Looks at a frame, writes it where it is worth it, and gives what the page shows, and the same in words.
+    fn look(&mut self, picture: RgbImage) -> Result<(RgbImage, String)> {
         let corners = find_board(&grey(&picture), self.board);
         let now = match &corners {
             Err(error) => {
@@ -182,8 +182,16 @@ impl<'a> Taking<'a> {
                 }
             },
         };
-        let words = Words { now, next: self.next.clone() };
-        Ok(self.drawn(picture, corners.as_deref().unwrap_or_default(), &words))
+        let so_far = format!("{} taken", self.seen.len());
+        let words = match self.is_done() {
+            true => Words {
+                now: format!("{so_far}: done"),
+                next: "the camera is calculated, its file is named in the terminal".to_owned(),
+            },
+            false => Words { now: format!("{so_far}; {now}"), next: self.next.clone() },
+        };
+        let drawn = self.drawn(picture, corners.as_deref().unwrap_or_default(), &words);
+        Ok((drawn, format!("{}. {}", words.now, words.next)))
     }
 
     fn keep(&mut self, picture: &RgbImage, corners: &[SeenCorner]) -> Result<()> {
@@ -227,13 +235,12 @@ impl<'a> Taking<'a> {
         draw_keypoints(&mut picture, &places, &Pen::new(BOARD).width(0.6 * width));
         let text_px = (f64::from(picture.width().max(picture.height())) / 55.0).max(8.0);
         let mut bottom = f64::from(picture.height());
-        let so_far = format!("{} taken; {}", self.seen.len(), words.now);
         // A sentence has its own line, so that all of it is in the picture.
         for line in words.next.split(": ").collect::<Vec<_>>().into_iter().rev().filter(|line| !line.is_empty()) {
             draw_label(&mut picture, Point2::new(0.0, bottom), line, Color::NEUTRAL, text_px);
             bottom -= 2.5 * text_px;
         }
-        draw_label(&mut picture, Point2::new(0.0, bottom), &so_far, BOARD, 1.2 * text_px);
+        draw_label(&mut picture, Point2::new(0.0, bottom), &words.now, BOARD, 1.2 * text_px);
         picture
     }
 

@@ -9,7 +9,7 @@ use std::io::Write;
 use std::sync::Arc;
 use std::time::{Instant, UNIX_EPOCH};
 
-use anyhow::{Result, anyhow};
+use anyhow::{Result, anyhow, bail};
 use image::RgbImage;
 use sdg_camera::{Address, Frame, MjpegServer};
 use sdg_cell::{FoundRecord, FrameDetector, Frames, Next, Part, Perception, drawing};
@@ -49,6 +49,7 @@ pub fn run(args: &DetectArgs, address: &Address, detector: Perception) -> Result
     let interrupt = Interrupt::watch();
     let mut stdout = std::io::stdout().lock();
     let mut found_any = false;
+    let [mut num_searched, mut num_failed] = [0_u64; 2];
     let mut left = args.frames.unwrap_or(u64::MAX);
     let mut sizes = Sizes::default();
     while left > 0 && !interrupt.is_requested() {
@@ -80,10 +81,12 @@ pub fn run(args: &DetectArgs, address: &Address, detector: Perception) -> Result
             Err(error) if matches!(address, Address::Folder { .. }) => {
                 let error = anyhow::Error::from(error).context(format!("frame {} of {address}", frame.number));
                 write_error(&mut stdout, args, address, &error)?;
+                num_failed += 1;
                 continue;
             }
             Err(error) => return Err(error.into()),
         };
+        num_searched += 1;
         let seconds = began.elapsed().as_secs_f64();
         found_any |= parts.iter().any(|part| part.is_seen(args.min_score));
         write_line(&mut stdout, args, finder.perception(), &frame, picture.dimensions(), seconds, &parts)?;
@@ -91,8 +94,13 @@ pub fn run(args: &DetectArgs, address: &Address, detector: Perception) -> Result
             let mut drawn = RgbImage::clone(&picture);
             drawing::draw_region(&mut drawn, finder.perception().region());
             drawing::draw_parts(&mut drawn, &parts, args.min_score);
-            server.publish(drawn);
+            let num_seen = parts.iter().filter(|part| part.is_seen(args.min_score)).count();
+            let parts_word = if num_seen == 1 { "part" } else { "parts" };
+            server.publish(drawn, format!("{num_seen} {parts_word} to grasp"));
         }
+    }
+    if num_searched == 0 && num_failed > 0 {
+        bail!("{num_failed} of {num_failed} pictures could not be used");
     }
     Ok(if found_any { Outcome::Done } else { Outcome::NothingToGrasp })
 }
