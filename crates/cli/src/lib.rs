@@ -123,5 +123,9 @@ pub fn run(args: &Args) -> u8 {
 
 /// Verbs that a person waits for, and that show the time of a part of their work or none; the others that are long tell theirs in their own lines.
 fn tells_its_time(command: &Command) -> bool {
-    matches!(command, Command::Demo(_) | Command::Rehearse(_) | Command::Evaluate(_) | Command::Augment(_))
+    match command {
+        Command::Demo(_) | Command::Rehearse(_) | Command::Augment(_) => true,
+        Command::Evaluate(evaluate) => !evaluate.sharing.list_units,
+        _ => false,
+    }
 }

@@ -96,6 +96,18 @@ fn annotations_that_mark_nothing_usable_are_refused() {
 }
 
 #[test]
+fn the_demonstration_is_no_picture_without_the_part() {
+    let folder = Folder::new();
+    let photo = shipped("pendulum", "image.png");
+    let copy = folder.path("copy.png");
+    fs::copy(&photo, &copy).unwrap();
+    let (demo, out) = (pair(&photo, &shipped("pendulum", "annotation.json")), folder.path("model.sdg"));
+    let teach = ["teach", "--model", "S", "--demo", &demo, "--negative", &copy, "--out", &out];
+    assert_refused(&teach, 2, &["--negative: expected a picture without the part", "copy.png"]);
+    assert!(!fs::exists(&out).unwrap());
+}
+
+#[test]
 fn what_is_no_model_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let image = shipped("pendulum", "image.png");

@@ -33,6 +33,8 @@ pub struct TeachingPage<'a> {
     /// The photos and their marks.
     pub demonstrations: &'a [Demonstration],
     pub seed: u64,
+    /// What the user waited for: from the start of the program to the finished model and its figures.
+    pub seconds: f64,
     /// The command that makes the same model again.
     pub command: &'a str,
 }
@@ -44,7 +46,6 @@ impl TeachingPage<'_> {
     /// Samples that cannot be made, and errors of detection.
     pub fn report(&self) -> Result<Report> {
         let model = &self.taught.model;
-        let facts = model.facts();
         let name = model.object().replace('_', " ");
         let photos = match self.demonstrations.len() {
             1 => "one photo".to_owned(),
@@ -57,7 +58,11 @@ impl TeachingPage<'_> {
                  finds the part in samples that it had not seen.",
                 model.kind()
             ))
-            .key_figure(KeyFigure::new(format!("{:.0}", facts.seconds), "s", format!("to teach, from {photos}")));
+            .key_figure(KeyFigure::new(
+                format!("{:.1}", self.seconds),
+                "s",
+                format!("to teach from {photos} and to try the model"),
+            ));
         let (found, false_alarms) = (self.figures.found(), self.figures.false_alarms());
         let tone = match found.percent() {
             Some(percent) if percent >= 80.0 => Tone::Good,
@@ -131,6 +136,12 @@ impl TeachingPage<'_> {
 
 /// The photos as they are and as they were marked, and samples made from them.
 pub fn demonstration(model: &GraspModel, demonstrations: &[Demonstration], seed: u64) -> Result<Section> {
+    let as_seen = match model.facts().lengths {
+        None => "As the camera saw it.",
+        Some(_) => {
+            "What the camera saw, as seen straight from above: turned so that x of the camera's frame points to the right."
+        }
+    };
     let mut pictures = Vec::new();
     for (at, Demonstration { image, annotation }) in demonstrations.iter().enumerate() {
         let mut marked = image.clone();
@@ -142,7 +153,7 @@ pub fn demonstration(model: &GraspModel, demonstrations: &[Demonstration], seed:
             annotation.grasp.as_ref(),
             grasp.as_ref(),
         );
-        pictures.push(Figure::photo(image.clone()).caption("As the camera saw it."));
+        pictures.push(Figure::photo(image.clone()).caption(as_seen));
         pictures.push(Figure::photo(marked).caption(
             "As marked: box (blue), outline (yellow), grasp line (dashed), and the jaws that follow (orange).",
         ));

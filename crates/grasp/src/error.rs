@@ -105,6 +105,12 @@ pub enum GraspError {
     /// A demonstration that the model cannot be taught from.
     #[error(transparent)]
     Demonstration(#[from] sdg_demonstration::Error),
+    /// A demonstration among the pictures that are to lack the part.
+    #[error("expected pictures without the part, found that picture {number} of them is a demonstration")]
+    DemonstrationAsNegative {
+        /// Its number among those pictures, from 1.
+        number: usize,
+    },
     /// A demonstration in which there is no shape to compare.
     #[error("the demonstration cannot be laid over images: {0}")]
     Shape(#[from] sdg_shape::ShapeError),

@@ -46,7 +46,7 @@ pub enum SimulationError {
     },
 
     /// The model has no object of that kind and name.
-    #[error("the model has no {kind} named {name:?}; it has: {}", existing.join(", "))]
+    #[error("unknown {kind} {name:?}; known: {}", existing.join(", "))]
     UnknownName {
         /// Body, joint, geom, site, camera or actuator.
         kind: &'static str,

@@ -350,7 +350,7 @@ mod tests {
     fn an_unknown_name_lists_the_names() {
         let model = Model::from_xml("<mujoco><worldbody><camera name='wrist'/></worldbody></mujoco>", &[]).unwrap();
         let error = model.id::<Camera>("rist").unwrap_err();
-        assert_eq!(error.to_string(), "the model has no camera named \"rist\"; it has: wrist");
+        assert_eq!(error.to_string(), "unknown camera \"rist\"; known: wrist");
     }
 
     #[test]

@@ -173,6 +173,10 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
         }
         Some(GraspError::NeedsBaseWeights { .. }) => Usage(format!("--base-weights: {error}")).into(),
         Some(GraspError::Region(_)) => of_region(error),
+        Some(GraspError::DemonstrationAsNegative { number }) => {
+            let picture = args.negatives[number - 1].display();
+            Usage(format!("--negative: expected a picture without the part, found the demonstration {picture}")).into()
+        }
         Some(_) => error.context(args.demonstrations.join(", ")),
         None => error,
     })?;
@@ -185,6 +189,7 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
                 figures: &figures,
                 demonstrations: &demonstrations,
                 seed: args.seed,
+                seconds: clock::elapsed_secs(),
                 command: &command,
             };
             Some(page.report()?.write(folder)?)

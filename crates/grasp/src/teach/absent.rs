@@ -184,6 +184,17 @@ mod tests {
     }
 
     #[test]
+    fn a_demonstration_is_no_picture_without_the_part() {
+        let demonstrations = [demonstration()];
+        let mut options = TeachOptions::new(1);
+        options.kind = ModelKind::S;
+        let other = RgbImage::from_pixel(64, 64, image::Rgb([90, 90, 90]));
+        options.negatives = vec![other, demonstrations[0].image.clone()];
+        let error = teach(&demonstrations, &options, &mut |_| ControlFlow::Continue(())).unwrap_err();
+        assert!(matches!(error, crate::GraspError::DemonstrationAsNegative { number: 2 }), "{error}");
+    }
+
+    #[test]
     fn a_picture_without_the_part_lowers_the_score_and_the_file_keeps_it() {
         let demonstrations = [demonstration()];
         let mut options = TeachOptions::new(1);
@@ -194,9 +205,11 @@ mod tests {
         let photo = &demonstrations[0].image;
         let score = |model: &GraspModel| model.detect(photo, Verification::ByShape).unwrap()[0].score;
         assert!(score(&before) > 0.9);
-        // The very photo said to be without the part is as like it as anything: scores go down as far as they may, no farther.
-        options.negatives =
-            vec![photo.clone(), RgbImage::from_pixel(photo.width(), photo.height(), image::Rgb([90, 90, 90]))];
+        // The photo but for a pixel, said to be without the part, is as like it as anything: scores go down as far as they may, no farther.
+        let mut nearly = photo.clone();
+        nearly.put_pixel(0, 0, image::Rgb([0, 0, 0]));
+        assert_ne!(nearly, *photo);
+        options.negatives = vec![nearly, RgbImage::from_pixel(photo.width(), photo.height(), image::Rgb([90, 90, 90]))];
         let after = teach_s(&options);
         let facts = after.facts().negatives.unwrap();
         assert!(facts.log_odds < -0.5 && facts.pictures == 2 && (1..=2).contains(&facts.refused), "{facts:?}");

@@ -34,6 +34,7 @@ pub(crate) mod tests;
 use std::ops::ControlFlow;
 use std::time::Instant;
 
+use image::RgbImage;
 use sdg_demonstration::{Augmenter, Demonstration};
 use sdg_detection::GeneralizedRcnn;
 use sdg_geometry::GraspLine;
@@ -78,7 +79,7 @@ pub struct Taught {
 /// best network so far, if it is any good.
 ///
 /// # Errors
-/// No demonstration, one that lacks what the model needs, or a training that led to nothing usable.
+/// No demonstration, one that lacks what the model needs or is among the pictures without the part, or a training that led to nothing usable.
 pub fn teach(
     demonstrations: &[Demonstration],
     options: &TeachOptions,
@@ -86,6 +87,10 @@ pub fn teach(
 ) -> Result<Taught> {
     let start = Instant::now();
     check_marks(demonstrations, options.kind)?;
+    let is_shown = |picture: &RgbImage| demonstrations.iter().any(|demonstration| demonstration.image == *picture);
+    if let Some(at) = options.negatives.iter().position(is_shown) {
+        return Err(GraspError::DemonstrationAsNegative { number: at + 1 });
+    }
     if options.lengths.is_none() {
         check_teaching_region(demonstrations, options)?;
     }
