@@ -23,6 +23,11 @@ impl CaptureRange {
         Self { start, limits }
     }
 
+    /// One pose alone.
+    pub(crate) fn at(pose: Pose) -> Self {
+        Self { start: pose, limits: [0.0; 4] }
+    }
+
     pub(crate) fn pose_at_cell(&self, cell: [i32; 4], counts: [i32; 4]) -> Pose {
         let step = [0, 1, 2, 3].map(|k| self.limits[k] * f64::from(cell[k]) / f64::from(counts[k].max(1)));
         self.start.moved(step)

@@ -7,6 +7,7 @@
 use nalgebra::{Matrix2, Point2, SVector, Vector2};
 use sdg_geometry::{Angle, PlanarSimilarity};
 
+use crate::capture_range::CaptureRange;
 use crate::consensus::{WIDTHS, consensus_at, fit_offsets};
 use crate::edge_points::EdgePoint;
 use crate::gradient_field::GradientField;
@@ -22,6 +23,9 @@ const NUM_DIRECTIONS: usize = 6;
 const ROUNDS: usize = 3;
 /// More is no part on a table: 50°. Derived.
 const MAX_LOG_RATIO: f64 = 0.45;
+
+/// What a shortening moves edges by, as shift in x and in y (px), turn (rad) and ln scale. Chosen by hand, and more than any does.
+const READ_WITHIN: [f64; 4] = [24.0, 24.0, 0.0, 0.5];
 
 /// The shortening of a part at a pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -51,7 +55,7 @@ impl ShapeTemplate {
     pub fn foreshortening(&self, field: &GradientField, start: &PlanarSimilarity) -> Option<Foreshortening> {
         let pose = Pose::from_similarity(start, self.center);
         let level = &self.levels[self.agreement_level_idx];
-        let matched = level.matched_level(field, &pose);
+        let matched = level.matched_level(field, &CaptureRange::around(pose, READ_WITHIN));
         let (sin, cos) = pose.angle_rad.sin_cos();
         let linear = start.scale * Matrix2::new(cos, -sin, sin, cos);
         let upright = Affine { center: pose.center, linear };

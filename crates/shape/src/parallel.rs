@@ -25,15 +25,15 @@ pub fn join<A, B>(one: impl FnOnce() -> A, other: impl FnOnce() -> B) -> (A, B) 
     (one(), other())
 }
 
-/// `work` done on stretches of `len` values.
+/// `work` done on stretches of `len` values, each with its number.
 #[cfg(feature = "parallel")]
-pub fn for_each_stretch<T: Send>(values: &mut [T], len: usize, work: impl Fn(&mut [T]) + Sync + Send) {
+pub fn for_each_stretch<T: Send>(values: &mut [T], len: usize, work: impl Fn(usize, &mut [T]) + Sync + Send) {
     use rayon::prelude::*;
-    values.par_chunks_mut(len).for_each(work);
+    values.par_chunks_mut(len).enumerate().for_each(|(number, values)| work(number, values));
 }
 
-/// `work` done on stretches of `len` values.
+/// `work` done on stretches of `len` values, each with its number.
 #[cfg(not(feature = "parallel"))]
-pub fn for_each_stretch<T>(values: &mut [T], len: usize, work: impl Fn(&mut [T])) {
-    values.chunks_mut(len).for_each(work);
+pub fn for_each_stretch<T>(values: &mut [T], len: usize, work: impl Fn(usize, &mut [T])) {
+    values.chunks_mut(len).enumerate().for_each(|(number, values)| work(number, values));
 }

@@ -34,6 +34,9 @@ pub struct Structure {
     num_regions: usize,
     /// Demonstration pixels per pixel of the level that is compared.
     pixel_size: f64,
+    /// All points lie within `reach` of it, in demonstration pixels.
+    center: Point2<f64>,
+    reach: f64,
     config: StructureConfig,
 }
 
@@ -78,7 +81,9 @@ impl Structure {
             }
         }
         let num_regions = points.iter().map(|point| point.region + 1).max().unwrap_or(0);
-        Self { points, num_regions, pixel_size, config: *config }
+        let center = bounds.center();
+        let reach = 0.5 * width.hypot(height);
+        Self { points, num_regions, pixel_size, center, reach, config: *config }
     }
 
     /// Compares an image, whose gradients are `field`, with the demonstration at a pose.
@@ -127,7 +132,9 @@ impl Structure {
         mut visit: impl FnMut(&GridPoint, Point2<f64>, [f32; 2], [f32; 2]),
     ) {
         let level_idx = field.level_idx_for(self.pixel_size * image_from_demonstration.scale);
-        let (level, pixel_size) = (field.level(level_idx), f64::from(1u32 << level_idx));
+        let pixel_size = f64::from(1u32 << level_idx);
+        let reach = self.reach * image_from_demonstration.scale + pixel_size;
+        let level = field.level_about(level_idx, &image_from_demonstration.apply(&self.center), reach);
         let (sin, cos) = (2.0 * image_from_demonstration.angle.radians()).sin_cos();
         let (sin, cos) = (sin as f32, cos as f32);
         for point in &self.points {

@@ -5,11 +5,13 @@ use nalgebra::Point2;
 use sdg_geometry::{PlanarSimilarity, Polygon};
 
 use crate::alignment::PointLanes;
+use crate::capture_range::CaptureRange;
 use crate::config::{MIN_POINTS, ShapeConfig, check_config};
 use crate::edge_points::{EdgePoint, EdgeSelection, rms_radius, select_edge_points};
 use crate::error::ShapeError;
 use crate::gradient_field::{GradientField, GradientLevel};
 use crate::pose::{LevelMap, Pose};
+use crate::sightings::FIRST_REACH;
 
 /// Smallest extent of an outline, in demonstration pixels. Chosen by hand, not measured.
 const MIN_EXTENT_PX: f64 = 12.0;
@@ -32,6 +34,9 @@ pub struct ShapeTemplate {
     pub(crate) agreement_level_idx: usize,
 }
 
+/// What is read beside the edge points, in level pixels: along their normals, and between pixels.
+const BESIDE: f64 = (FIRST_REACH + 4) as f64;
+
 /// The edge points seen at one pyramid level of the demonstration.
 #[derive(Debug, Clone)]
 pub(crate) struct TemplateLevel {
@@ -39,6 +44,8 @@ pub(crate) struct TemplateLevel {
     pub(crate) pixel_size: f64,
     /// Root mean square distance of the points from the centre, in demonstration pixels.
     pub(crate) radius_px: f64,
+    /// The largest.
+    reach_px: f64,
     pub(crate) points: Vec<EdgePoint>,
     lanes: PointLanes,
 }
@@ -105,7 +112,9 @@ impl ShapeTemplate {
                 break;
             }
             let lanes = PointLanes::new(&points);
-            levels.push(TemplateLevel { pixel_size, radius_px: rms_radius(&points), points, lanes });
+            let reach_px =
+                points.iter().map(|point| f64::from(point.offset[0].hypot(point.offset[1]))).fold(0.0, f64::max);
+            levels.push(TemplateLevel { pixel_size, radius_px: rms_radius(&points), reach_px, points, lanes });
         }
         let agreement_level_idx = levels_to(config.agreement.extent).saturating_sub(finest).min(levels.len() - 1);
         Ok(Self { config: config.clone(), center, levels, agreement_level_idx })
@@ -130,7 +139,8 @@ impl ShapeTemplate {
 
     pub(crate) fn agreement_at(&self, field: &GradientField, pose: &Pose) -> f64 {
         let level = &self.levels[self.agreement_level_idx];
-        level.matched_level(field, pose).mean_alignment(level, pose, LevelSampling::Bilinear).max(0.0)
+        let matched = level.matched_level(field, &CaptureRange::at(*pose));
+        matched.mean_alignment(level, pose, LevelSampling::Bilinear).max(0.0)
     }
 }
 
@@ -149,9 +159,14 @@ pub(crate) struct MatchedLevel<'a> {
 }
 
 impl TemplateLevel {
-    pub(crate) fn matched_level<'a>(&self, field: &'a GradientField, pose: &Pose) -> MatchedLevel<'a> {
-        let idx = field.level_idx_for(self.pixel_size * pose.log_scale.exp());
-        MatchedLevel { image_level: field.level(idx), image_pixel_size: (1u32 << idx) as f64 }
+    /// The level of the picture that shows edges at the size that they have at the start of a range, to be read at all its poses.
+    pub(crate) fn matched_level<'a>(&self, field: &'a GradientField, range: &CaptureRange) -> MatchedLevel<'a> {
+        let CaptureRange { start, limits } = range;
+        let idx = field.level_idx_for(self.pixel_size * start.log_scale.exp());
+        let image_pixel_size = (1u32 << idx) as f64;
+        let shift = limits[0].hypot(limits[1]);
+        let reach = self.reach_px * (start.log_scale + limits[3]).exp() + shift + BESIDE * image_pixel_size;
+        MatchedLevel { image_level: field.level_about(idx, &start.center, reach), image_pixel_size }
     }
 }
 

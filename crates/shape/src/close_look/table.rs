@@ -115,16 +115,18 @@ fn shrunk(image: &RgbImage) -> Vec<[f32; 3]> {
     }
     let block = width.max(height).div_ceil(SIDE).max(1) as usize;
     let (columns, rows) = ((width as usize / block).max(1), (height as usize / block).max(1));
-    let mut sums = vec![([0u32; 3], 0u32); columns * rows];
+    let mut sums = vec![[0u32; 3]; columns * rows];
     for (y, row) in image.as_raw().chunks_exact(3 * width as usize).enumerate().take(rows * block) {
-        for (x, pixel) in row.chunks_exact(3).enumerate().take(columns * block) {
-            let (sum, count) = &mut sums[y / block * columns + x / block];
-            (0..3).for_each(|c| sum[c] += u32::from(pixel[c]));
-            *count += 1;
+        let blocks = row.chunks(3 * block).take(columns);
+        for (sum, pixels) in sums[y / block * columns..][..columns].iter_mut().zip(blocks) {
+            for pixel in pixels.chunks_exact(3) {
+                (0..3).for_each(|c| sum[c] += u32::from(pixel[c]));
+            }
         }
     }
-    let mean = |(sum, count): ([u32; 3], u32)| lab(&sum.map(|value| value as f32 / (255.0 * count.max(1) as f32)));
-    sums.into_iter().map(mean).collect()
+    // A picture that is narrower than a block has one of its own width.
+    let count = (block.min(width as usize) * block.min(height as usize)) as f32;
+    sums.into_iter().map(|sum| lab(&sum.map(|value| value as f32 / (255.0 * count)))).collect()
 }
 
 /// CIE L*a*b* of an sRGB colour from 0 to 1, under D65, L* stretched to 255: differences are about as large as they look.

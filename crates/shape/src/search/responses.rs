@@ -18,7 +18,10 @@
 
 use std::f32::consts::TAU;
 
-use crate::gradient_field::GradientLevel;
+use pulp::{Simd, WithSimd};
+
+use crate::gradient_field::{GradientLevel, whole};
+use crate::lanes::in_lanes;
 use crate::parallel;
 
 /// Directions over half a turn; neighbours are 11.25° apart, which costs at most 2 % of the cosine. Derived:
@@ -71,9 +74,12 @@ impl Responses {
             tables: Vec::new(),
         };
         let directions: Vec<usize> = (0..NUM_DIRECTIONS).collect();
+        let planes = DirectionPlanes::of(level);
         let tables = parallel::map(&directions, |&k| {
             let (sin, cos) = (k as f32 * TAU / NUM_DIRECTIONS as f32).sin_cos();
-            made.split(&spread(level, [cos, sin]), level.width())
+            let mut tables = made.empty_tables();
+            planes.spread([cos, sin], |row, responses| made.split(row, responses, &mut tables));
+            tables
         });
         made.tables = tables.into_iter().flatten().collect();
         made
@@ -94,44 +100,93 @@ impl Responses {
         &self.tables[idx]
     }
 
-    /// One direction's responses, row by row, in the order of [`table_idx`].
-    fn split(&self, responses: &[u8], level_width: usize) -> Vec<Vec<u8>> {
+    /// The tables of one direction, in the order of [`table_idx`].
+    fn empty_tables(&self) -> Vec<Vec<u8>> {
         let len = (self.height + 2 * self.pad) * self.stride() + self.pad + BLOCK;
-        let mut tables = vec![vec![0u8; len]; PITCH * PITCH];
-        for (y, row) in responses.chunks_exact(level_width).enumerate() {
-            for right in 0..PITCH {
-                let at = self.idx_of(0, y / PITCH);
-                let out = &mut tables[table_idx(0, right, y)][at..at + self.width];
-                for (out, &value) in out.iter_mut().zip(row.iter().skip(right).step_by(PITCH)) {
-                    *out = value;
-                }
+        vec![vec![0u8; len]; PITCH * PITCH]
+    }
+
+    /// Puts a row of one direction's responses into its tables.
+    fn split(&self, row: usize, responses: &[u8], tables: &mut [Vec<u8>]) {
+        let at = self.idx_of(0, row / PITCH);
+        for right in 0..PITCH {
+            let out = &mut tables[table_idx(0, right, row)][at..at + self.width];
+            let (pairs, last) = responses.as_chunks::<PITCH>();
+            for (out, pair) in out.iter_mut().zip(pairs) {
+                *out = pair[right];
+            }
+            if let (Some(out), Some(&value)) = (out.get_mut(pairs.len()), last.get(right)) {
+                *out = value;
             }
         }
-        tables
     }
 }
 
-/// The responses of one direction at every pixel of the level, row by row.
-fn spread(level: &GradientLevel, direction: [f32; 2]) -> Vec<u8> {
-    let (width, height) = (level.width(), level.height());
-    let mut across = vec![0u8; width * height];
-    let mut plain = vec![0u8; width + 2 * SPREAD];
-    for (row, out) in across.chunks_exact_mut(width).enumerate() {
-        for (out, sample) in plain[SPREAD..SPREAD + width].iter_mut().zip(level.row(row)) {
-            let cosine = sample[0] * direction[0] + sample[1] * direction[1];
-            *out = (cosine.max(0.0) * f32::from(FULL) + 0.5) as u8;
-        }
-        for shift in 0..=2 * SPREAD {
-            raise(out, &plain[shift..shift + width]);
+/// The directions of a level, each coordinate on its own: they are read once for each direction of a table.
+struct DirectionPlanes {
+    width: usize,
+    height: usize,
+    x: Vec<f32>,
+    y: Vec<f32>,
+}
+
+impl DirectionPlanes {
+    fn of(level: &GradientLevel) -> Self {
+        let (width, height) = (level.width(), level.height());
+        let samples = || (0..height).flat_map(|row| level.row(row));
+        let (x, y) = samples().map(|sample| (sample[0], sample[1])).unzip();
+        Self { width, height, x, y }
+    }
+
+    /// The responses of one direction at every pixel: `put` is called with each row from the first to the last.
+    fn spread(&self, direction: [f32; 2], mut put: impl FnMut(usize, &[u8])) {
+        const RING: usize = 2 * SPREAD + 1;
+        let (width, height) = (self.width, self.height);
+        // Each row spread to the left and right; the last few are kept.
+        let mut across = [(); RING].map(|()| vec![0u8; width]);
+        let mut plain = vec![0u8; width + 2 * SPREAD];
+        let mut spread = vec![0u8; width];
+        for row in 0..height + SPREAD {
+            if row < height {
+                let range = row * width..(row + 1) * width;
+                let out = &mut plain[SPREAD..SPREAD + width];
+                in_lanes(Responded { x: &self.x[range.clone()], y: &self.y[range], direction, out });
+                let across = &mut across[row % RING];
+                across.copy_from_slice(&plain[..width]);
+                for shift in 1..RING {
+                    raise(across, &plain[shift..shift + width]);
+                }
+            }
+            let Some(middle) = row.checked_sub(SPREAD) else { continue };
+            spread.copy_from_slice(&across[middle % RING]);
+            for near in middle.saturating_sub(SPREAD)..(middle + SPREAD + 1).min(height) {
+                raise(&mut spread, &across[near % RING]);
+            }
+            put(middle, &spread);
         }
     }
-    let mut spread = vec![0u8; width * height];
-    for (row, out) in spread.chunks_exact_mut(width).enumerate() {
-        for near in row.saturating_sub(SPREAD)..(row + SPREAD + 1).min(height) {
-            raise(out, &across[near * width..][..width]);
+}
+
+/// The responses of a row.
+struct Responded<'a> {
+    x: &'a [f32],
+    y: &'a [f32],
+    direction: [f32; 2],
+    out: &'a mut [u8],
+}
+
+impl WithSimd for Responded<'_> {
+    type Output = ();
+
+    /// A plain loop; compiled for the widest instructions that the machine has.
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self { x, y, direction, out } = self;
+        for ((out, &x), &y) in out.iter_mut().zip(x).zip(y) {
+            let cosine = x * direction[0] + y * direction[1];
+            *out = whole((cosine.max(0.0) * f32::from(FULL) + 0.5).floor()) as u8;
         }
     }
-    spread
 }
 
 /// Raises every value to at least its counterpart.
@@ -146,6 +201,20 @@ mod tests {
     use super::*;
     use crate::GradientField;
     use image::{Rgb, RgbImage};
+
+    /// The responses of one direction, pixel by pixel.
+    fn looked_up(level: &GradientLevel, direction: [f32; 2]) -> Vec<u8> {
+        let response = |x: usize, y: usize| {
+            let [dx, dy, ..] = level.row(y)[x];
+            ((dx * direction[0] + dy * direction[1]).max(0.0) * f32::from(FULL) + 0.5) as u8
+        };
+        let near = |at: usize, end: usize| at.saturating_sub(SPREAD)..(at + SPREAD + 1).min(end);
+        let best = |x: usize, y: usize| {
+            let rows = near(y, level.height());
+            rows.flat_map(|y| near(x, level.width()).map(move |x| (x, y))).map(|(x, y)| response(x, y)).max()
+        };
+        (0..level.width() * level.height()).map(|i| best(i % level.width(), i / level.width()).unwrap()).collect()
+    }
 
     #[test]
     fn directions_are_numbered_at_twice_their_angle() {
@@ -175,7 +244,7 @@ mod tests {
         let image = RgbImage::from_fn(51, 49, |x, y| Rgb([(x * x) as u8, (y * 5 + x) as u8, 0]));
         let field = GradientField::new(&image);
         let responses = Responses::new(field.level(0), 3);
-        let (k, plain) = (4, spread(field.level(0), [0.0, 1.0]));
+        let (k, plain) = (4, looked_up(field.level(0), [0.0, 1.0]));
         for y in 0..49 {
             for x in 0..51 {
                 let kept = responses.table(table_idx(k, x, y))[responses.idx_of(x / PITCH, y / PITCH)];

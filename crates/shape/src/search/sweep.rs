@@ -54,7 +54,7 @@ pub(crate) fn sweep(responses: &Responses, bank: &Bank, count: usize, min_respon
     let least = (min_response * full).ceil() as i16;
     let of_groups: Vec<usize> = (0..groups.count).collect();
     let mut starts = parallel::map(&of_groups, |&group| {
-        let field = PeakField::new(responses, |offset| swept[offset / STRETCH].sums[group][offset % STRETCH]);
+        let field = PeakField::new(responses, |offset| &swept[offset / STRETCH].sums[group][offset % STRETCH..]);
         let start = |(place, sum): ([usize; 2], i16)| {
             let offset = responses.idx_of(place[0], place[1]) - first;
             Start {
@@ -103,16 +103,21 @@ struct PeakField {
 }
 
 impl PeakField {
-    /// `sum` by the offset from the first place's.
-    fn new(responses: &Responses, sum: impl Fn(usize) -> i16) -> Self {
+    /// `sums` by the offset from the first place's: some from there on.
+    fn new<'a>(responses: &Responses, sums_from: impl Fn(usize) -> &'a [i16]) -> Self {
         let (width, height) = (responses.width, responses.height);
         let stride = width + 2 * PEAK_RADIUS;
         let mut sums = vec![-1; stride * (height + 2 * PEAK_RADIUS)];
         let first = responses.idx_of(0, 0);
         for (y, row) in sums.chunks_exact_mut(stride).skip(PEAK_RADIUS).take(height).enumerate() {
-            let begin = responses.idx_of(0, y) - first;
-            for (x, value) in row[PEAK_RADIUS..][..width].iter_mut().enumerate() {
-                *value = sum(begin + x);
+            let mut at = responses.idx_of(0, y) - first;
+            let mut left = &mut row[PEAK_RADIUS..][..width];
+            while !left.is_empty() {
+                let some = sums_from(at);
+                let (now, later) = left.split_at_mut(some.len().min(left.len()));
+                now.copy_from_slice(&some[..now.len()]);
+                at += now.len();
+                left = later;
             }
         }
         Self { width, height, sums }
@@ -121,10 +126,10 @@ impl PeakField {
     /// Places, row by row, whose sum is at least `least` and the most within [`PEAK_RADIUS`].
     fn peaks(&self, least: i16) -> impl Iterator<Item = ([usize; 2], i16)> {
         let stride = self.width + 2 * PEAK_RADIUS;
-        (0..self.width * self.height).filter_map(move |i| {
-            let (x, y) = (i % self.width, i / self.width);
-            let here = self.sums[(y + PEAK_RADIUS) * stride + x + PEAK_RADIUS];
-            (here >= least && self.is_peak(x, y, here)).then_some(([x, y], here))
+        let rows = self.sums.chunks_exact(stride).skip(PEAK_RADIUS).take(self.height).enumerate();
+        rows.flat_map(move |(y, row)| {
+            let places = row[PEAK_RADIUS..][..self.width].iter().enumerate();
+            places.filter_map(move |(x, &here)| (here >= least && self.is_peak(x, y, here)).then_some(([x, y], here)))
         })
     }
 
