@@ -15,19 +15,15 @@ pub(super) struct Planes {
 impl Planes {
     pub(super) fn from_image(image: &RgbImage) -> Self {
         let (width, height) = (image.width() as usize, image.height() as usize);
-        let mut channels = [(); 3].map(|()| vec![0; width * height]);
-        for (idx, pixel) in image.as_raw().chunks_exact(3).enumerate() {
-            for (channel, &value) in channels.iter_mut().zip(pixel) {
-                channel[idx] = value;
-            }
-        }
+        let (pixels, _) = image.as_raw().as_chunks::<3>();
+        let channels = of_each_channel(|c| pixels.iter().map(|pixel| pixel[c]).collect());
         Self { width, height, channels }
     }
 
     /// Mean of 2×2 pixels; an odd last row or column is left out.
     pub(super) fn halved(&self) -> Self {
         let (width, height) = (self.width / 2, self.height / 2);
-        let channels = [0, 1, 2].map(|c| {
+        let channels = of_each_channel(|c| {
             let mut out = Vec::with_capacity(width * height);
             for row in 0..height {
                 let top = &self.channels[c][2 * row * self.width..][..2 * width];
@@ -44,10 +40,19 @@ impl Planes {
 
     /// Part of it, from its upper left corner.
     fn cut(&self, [left, top]: [usize; 2], [width, height]: [usize; 2]) -> Self {
-        let row = |channel: &[u8], row: usize| channel[(top + row) * self.width + left..][..width].to_vec();
-        let channels = [0, 1, 2].map(|c| (0..height).flat_map(|y| row(&self.channels[c], y)).collect());
+        let mut channels = [(); 3].map(|()| Vec::with_capacity(width * height));
+        for (cut, channel) in channels.iter_mut().zip(&self.channels) {
+            for row in top..top + height {
+                cut.extend_from_slice(&channel[row * self.width + left..][..width]);
+            }
+        }
         Self { width, height, channels }
     }
+}
+
+fn of_each_channel(values: impl Fn(usize) -> Vec<u8> + Sync + Send) -> [Vec<u8>; 3] {
+    let mut channels = parallel::map(&[0, 1, 2], |&c| values(c)).into_iter();
+    [(); 3].map(|()| channels.next().unwrap_or_default())
 }
 
 /// A tensor depends on pixels so far to each side. Derived: 2 of the blur, 1 of the difference, 1 of the smoothing.
@@ -61,7 +66,11 @@ pub(super) fn tensors_of_part(planes: &Planes, corner: [usize; 2], size: [usize;
     let cut = planes.cut(first, [end[0] - first[0], end[1] - first[1]]);
     let [left, top] = [corner[0] - first[0], corner[1] - first[1]];
     let rows = tensors_of_band(&cut, top, top + size[1]);
-    rows.chunks_exact(cut.width).flat_map(|row| row[left..left + size[0]].iter().copied()).collect()
+    let mut part = Vec::with_capacity(size[0] * size[1]);
+    for row in rows.chunks_exact(cut.width) {
+        part.extend_from_slice(&row[left..left + size[0]]);
+    }
+    part
 }
 
 /// Pixels repeated at each end of a row, so that the filters need no case for the border. Derived: the radius of the 5-tap

@@ -133,8 +133,11 @@ struct DirectionPlanes {
 impl DirectionPlanes {
     fn of(level: &GradientLevel) -> Self {
         let (width, height) = (level.width(), level.height());
-        let samples = || (0..height).flat_map(|row| level.row(row));
-        let (x, y) = samples().map(|sample| (sample[0], sample[1])).unzip();
+        let (mut x, mut y) = (Vec::with_capacity(width * height), Vec::with_capacity(width * height));
+        for row in (0..height).map(|row| level.row(row)) {
+            x.extend(row.iter().map(|sample| sample[0]));
+            y.extend(row.iter().map(|sample| sample[1]));
+        }
         Self { width, height, x, y }
     }
 
