@@ -1,5 +1,6 @@
 //! `~/teach`: a teaching in a thread, so that pictures are searched meanwhile.
 
+use std::io::Write;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::thread::JoinHandle;
@@ -8,6 +9,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, bail};
 use sdg_inputs::one_line;
 use sdg_ros2::messages::TeachRequest;
+use tempfile::TempPath;
 
 /// What is to be taught.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,23 +42,24 @@ impl TeachJob {
     pub const DEFAULT_SEED: u64 = 1;
 
     /// The job of a request, and the marks that came with it.
-    fn read(request: &TeachRequest) -> Result<(Self, Option<MarksFile>)> {
+    fn read(request: &TeachRequest) -> Result<(Self, Option<TempPath>)> {
         if request.photo_path.is_empty() || request.out_path.is_empty() {
             bail!("expected photo_path and out_path, found \"{}\" and \"{}\"", request.photo_path, request.out_path);
         }
         let brought = match request.annotation.as_str() {
             "" => None,
             text => {
-                let path = std::env::temp_dir().join(format!("sdg-marks-{}.json", std::process::id()));
-                std::fs::write(&path, text).with_context(|| path.display().to_string())?;
-                Some(MarksFile(path))
+                // A new file with a name that nobody can guess: others may write to the folder.
+                let mut file = tempfile::Builder::new().prefix("sdg-marks-").suffix(".json").tempfile()?;
+                file.write_all(text.as_bytes()).with_context(|| file.path().display().to_string())?;
+                Some(file.into_temp_path())
             }
         };
         let named = || (!request.annotation_path.is_empty()).then(|| PathBuf::from(&request.annotation_path));
         let (model, budget_secs) = (request.model.as_str(), request.time_budget_secs);
         let job = Self {
             photo: request.photo_path.clone(),
-            marks: brought.as_ref().map(|file| file.0.clone()).or_else(named),
+            marks: brought.as_ref().map(|file| file.to_path_buf()).or_else(named),
             out: PathBuf::from(&request.out_path),
             model: if model.is_empty() { Self::DEFAULT_MODEL } else { model }.to_owned(),
             seed: if request.seed == 0 { Self::DEFAULT_SEED } else { request.seed },
@@ -70,16 +73,6 @@ impl TeachJob {
     }
 }
 
-/// Marks that a request brought, as a file that lives as long as the teaching.
-struct MarksFile(PathBuf);
-
-impl Drop for MarksFile {
-    fn drop(&mut self) {
-        // What is left in the system's folder for such files harms nobody.
-        let _ = std::fs::remove_file(&self.0);
-    }
-}
-
 /// A teaching under way.
 pub(super) struct Teaching {
     thread: Option<JoinHandle<Result<(), String>>>,
@@ -87,7 +80,7 @@ pub(super) struct Teaching {
     started: Instant,
     pub(super) is_used: bool,
     /// Has the marks that came with the request; removed with it.
-    _marks: Option<MarksFile>,
+    _marks: Option<TempPath>,
 }
 
 impl Teaching {
