@@ -5,7 +5,7 @@ CARGO ?= cargo
 PROFILE := --release
 
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo web edge wheel test-python test test-compile test-browser walk acceptance test-v4l test-peers test-ros2 test-slurm slurm-image deb tarball hardening network-grasps placing heights test-wgpu test-ndarray test-torch package lint base-weights bench bench-search bench-browser bench-planning clean
+.PHONY: help setup build demo web edge wheel test-python test test-compile test-browser film walk acceptance test-v4l test-peers test-ros2 test-slurm slurm-image deb tarball hardening network-grasps placing heights test-wgpu test-ndarray test-torch package lint base-weights bench bench-search bench-browser bench-planning clean
 
 help: ## Lists the targets
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
@@ -54,8 +54,12 @@ test: setup ## Runs every test
 test-browser: build web ## Tests our pages in headless Chromium
 	@scripts/install.sh chromium chromium-driver
 	@scripts/axe.sh
-	$(CARGO) test $(PROFILE) --locked --workspace --test cli -- --ignored --test-threads 1 browser::
+	$(CARGO) test $(PROFILE) --locked --workspace --test cli -- --ignored --test-threads 1 browser:: --skip film::
 	$(CARGO) test $(PROFILE) --locked --workspace --test browser -- --ignored --test-threads 1
+
+film: build ## Makes the front page's animation of the page, datasets/pictures/page.gif
+	@scripts/install.sh chromium chromium-driver
+	$(CARGO) test $(PROFILE) --locked --workspace --test cli -- --ignored film::
 
 # A folder has demo.* and further pictures with LabelMe marks beside them; FOLDER=2 where the part looks the same after half a turn.
 walk: build ## From a photograph to a tried model with a stop-watch, through the page in Chromium (SETS="FOLDER …")

@@ -23,9 +23,9 @@ impl CaptureRange {
         Self { start, limits }
     }
 
-    /// One pose alone.
-    pub(crate) fn at(pose: Pose) -> Self {
-        Self { start: pose, limits: [0.0; 4] }
+    /// The level of the picture that a template's level is laid over at all poses of the range.
+    pub(crate) fn matched_level<'a>(&self, level: &TemplateLevel, field: &'a GradientField) -> MatchedLevel<'a> {
+        level.matched_level(field, &self.start, self.limits)
     }
 
     pub(crate) fn pose_at_cell(&self, cell: [i32; 4], counts: [i32; 4]) -> Pose {

@@ -49,10 +49,10 @@ impl ShapeTemplate {
         let start = Pose::from_similarity(start, self.center);
         let range = reach.about(start);
         let coarse = &self.levels[self.agreement_level_idx];
-        let mut pose = snap_from(coarse, &coarse.matched_level(field, &range), &range, start, Starts::Around).pose;
+        let mut pose = snap_from(coarse, &range.matched_level(coarse, field), &range, start, Starts::Around).pose;
         if self.agreement_level_idx > 0 {
             let finest = &self.levels[0];
-            pose = snap_from(finest, &finest.matched_level(field, &range), &range, pose, Starts::Here).pose;
+            pose = snap_from(finest, &range.matched_level(finest, field), &range, pose, Starts::Here).pose;
         }
         pose.to_similarity(self.center)
     }

@@ -7,7 +7,6 @@
 use nalgebra::{Matrix2, Point2, SVector, Vector2};
 use sdg_geometry::{Angle, PlanarSimilarity};
 
-use crate::capture_range::CaptureRange;
 use crate::consensus::{WIDTHS, consensus_at, fit_offsets};
 use crate::edge_points::EdgePoint;
 use crate::gradient_field::GradientField;
@@ -55,7 +54,7 @@ impl ShapeTemplate {
     pub fn foreshortening(&self, field: &GradientField, start: &PlanarSimilarity) -> Option<Foreshortening> {
         let pose = Pose::from_similarity(start, self.center);
         let level = &self.levels[self.agreement_level_idx];
-        let matched = level.matched_level(field, &CaptureRange::around(pose, READ_WITHIN));
+        let matched = level.matched_level(field, &pose, READ_WITHIN);
         let (sin, cos) = pose.angle_rad.sin_cos();
         let linear = start.scale * Matrix2::new(cos, -sin, sin, cos);
         let upright = Affine { center: pose.center, linear };

@@ -63,7 +63,7 @@ impl ShapeTemplate {
         candidates.push(start);
         let mut num_rounds = 0;
         for (idx, level) in self.levels.iter().enumerate().rev() {
-            let matched = level.matched_level(field, range);
+            let matched = range.matched_level(level, field);
             let mut snapped: Vec<Snapped> = candidates
                 .iter()
                 .map(|&pose| snap(level, &matched, range, climb(level, &matched, range, pose)))
@@ -92,7 +92,7 @@ impl ShapeTemplate {
     /// Climbs from `from` within `range` at the coarsest level; the pose and its agreement there.
     pub(crate) fn climb_coarsest(&self, field: &GradientField, range: &CaptureRange, from: Pose) -> (Pose, f64) {
         let level = &self.levels[self.levels.len() - 1];
-        let matched = level.matched_level(field, range);
+        let matched = range.matched_level(level, field);
         let pose = climb(level, &matched, range, from);
         (pose, matched.mean_alignment(level, &pose, LevelSampling::Bilinear))
     }
@@ -105,7 +105,7 @@ impl ShapeTemplate {
     /// The same down to a level that need not be the finest.
     pub(crate) fn follow_to(&self, field: &GradientField, range: &CaptureRange, from: Pose, last_idx: usize) -> Pose {
         self.levels[last_idx..].iter().rev().fold(from, |pose, level| {
-            let matched = level.matched_level(field, range);
+            let matched = range.matched_level(level, field);
             snap(level, &matched, range, climb(level, &matched, range, pose)).pose
         })
     }
@@ -113,7 +113,7 @@ impl ShapeTemplate {
     /// The best poses of a grid over the capture range, on the coarsest level, no two alike.
     fn grid_candidates(&self, field: &GradientField, range: &CaptureRange) -> Vec<Pose> {
         let level = &self.levels[self.levels.len() - 1];
-        let matched = level.matched_level(field, range);
+        let matched = range.matched_level(level, field);
         let units = step_units(level, &matched, &range.start).map(|unit| GRID_STEP * unit);
         let counts = [0, 1, 2, 3].map(|k| (range.limits[k] / units[k]).ceil() as i32);
         let mut scored: Vec<(f64, [i32; 4])> = Vec::new();

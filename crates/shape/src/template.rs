@@ -5,7 +5,6 @@ use nalgebra::Point2;
 use sdg_geometry::{PlanarSimilarity, Polygon};
 
 use crate::alignment::PointLanes;
-use crate::capture_range::CaptureRange;
 use crate::config::{MIN_POINTS, ShapeConfig, check_config};
 use crate::edge_points::{EdgePoint, EdgeSelection, rms_radius, select_edge_points};
 use crate::error::ShapeError;
@@ -139,7 +138,7 @@ impl ShapeTemplate {
 
     pub(crate) fn agreement_at(&self, field: &GradientField, pose: &Pose) -> f64 {
         let level = &self.levels[self.agreement_level_idx];
-        let matched = level.matched_level(field, &CaptureRange::at(*pose));
+        let matched = level.matched_level(field, pose, [0.0; 4]);
         matched.mean_alignment(level, pose, LevelSampling::Bilinear).max(0.0)
     }
 }
@@ -159,9 +158,14 @@ pub(crate) struct MatchedLevel<'a> {
 }
 
 impl TemplateLevel {
-    /// The level of the picture that shows edges at the size that they have at the start of a range, to be read at all its poses.
-    pub(crate) fn matched_level<'a>(&self, field: &'a GradientField, range: &CaptureRange) -> MatchedLevel<'a> {
-        let CaptureRange { start, limits } = range;
+    /// The level of the picture that shows edges at the size that they have at a pose, to be read at all poses that differ by at most
+    /// `limits` (px, px, rad, ln scale).
+    pub(crate) fn matched_level<'a>(
+        &self,
+        field: &'a GradientField,
+        start: &Pose,
+        limits: [f64; 4],
+    ) -> MatchedLevel<'a> {
         let idx = field.level_idx_for(self.pixel_size * start.log_scale.exp());
         let image_pixel_size = (1u32 << idx) as f64;
         let shift = limits[0].hypot(limits[1]);

@@ -6,6 +6,7 @@
 mod calibrating;
 mod corrections;
 mod drawn;
+mod film;
 mod keyboard;
 mod live;
 pub(crate) mod page;

@@ -13,8 +13,8 @@
 
 use std::sync::OnceLock;
 
+use super::level::{GradientLevel, floor_of, quiet_energy};
 use super::tensors::{Planes, structure_tensors, tensors_of_part};
-use super::{GradientLevel, floor_of, quiet_energy};
 use crate::config::GradientConfig;
 use crate::parallel;
 
