@@ -6,7 +6,7 @@
 //! A slope is how far a line of sight goes sideways for a metre downwards: two of 0.12 m apart at 0.27 m differ by 0.44. The relief is what no picture
 //! tells: walls, feet and rims are edges, too, so a part is seen a little above or below its marks, the same way each time.
 //!
-//! Sizes in both pictures say which of several parts is the same, and nothing more: they err by more (docs/robot.md).
+//! Sizes in both pictures say which of several parts is the same, and nothing more: they err by more (docs/robot-evidence.md).
 
 use super::sighting::Sighting;
 
