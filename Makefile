@@ -5,7 +5,7 @@ CARGO ?= cargo
 PROFILE := --release
 
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo web edge wheel test-python test test-compile test-browser film walk acceptance test-v4l test-peers test-ros2 test-slurm slurm-image deb tarball hardening network-grasps placing heights test-wgpu test-ndarray test-torch package lint base-weights bench bench-search bench-browser bench-planning clean
+.PHONY: help setup build demo web edge wheel test-python test test-compile test-browser film walk acceptance test-v4l test-peers test-ros2 test-slurm slurm-image deb tarball image test-arm64 hardening network-grasps placing heights test-wgpu test-ndarray test-torch package lint base-weights bench bench-search bench-browser bench-planning clean
 
 help: ## Lists the targets
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
@@ -87,11 +87,18 @@ test-slurm: build ## An evaluation as Slurm's job arrays beside the serial one: 
 slurm-image: build ## An OCI image of sdg by mmdebstrap and umoci, run without network where namespaces are allowed (root)
 	@scripts/slurm/image.sh
 
-deb: setup ## A Debian package of sdg, in target/packages/deb (TRY=1: installed, used and removed in a clean root; root)
-	@scripts/packages/deb.sh
+# PROFILE=release is built in a quarter of the time, for trying.
+deb: setup ## A Debian package of sdg, in target/packages/deb (ARCH=arm64: for it; TRY=1: installed, used and removed in a clean root; root)
+	@ARCH="$(ARCH)" TRY="$(TRY)" scripts/packages/deb.sh
 
-tarball: setup ## One directory of sdg that runs from glibc 2.31 on, in target/packages/tarball (TRY=1: used in Debian 11; root)
-	@scripts/packages/tarball.sh
+tarball: setup ## One directory of sdg that runs from glibc 2.31 on, in target/packages/tarball (ARCH=arm64; TRY=1: used in Debian 11; root)
+	@ARCH="$(ARCH)" TRY="$(TRY)" scripts/packages/tarball.sh
+
+test-arm64: setup ## Unit tests that need no simulator, compiled for arm64, under qemu (burn is compiled once more)
+	@scripts/packages/test_arm64.sh
+
+image: setup ## An OCI image for users, in target/packages/image, used without network where namespaces are allowed (root)
+	@scripts/packages/image.sh
 
 hardening: setup ## Hostile input for every reader of strangers' files and messages, resumed where it ended (EXECUTIONS=1000000, TARGETS="png jpeg")
 	@scripts/build.sh --bin hardening

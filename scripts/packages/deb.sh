@@ -1,14 +1,15 @@
 #!/usr/bin/env bash
-# A Debian package, target/packages/deb/single-demo-grasp_VERSION_amd64.deb; `make deb`. With TRY=1 it is then installed, used and
+# A Debian package, target/packages/deb/single-demo-grasp_VERSION_ARCH.deb; `make deb`. With TRY=1 it is then installed, used and
 # removed in a clean Debian root without network (root, mmdebstrap).
 set -euo pipefail
 cd "$(dirname "$0")/../.."
+source scripts/packages/arch.sh
 
 scripts/install.sh dpkg
 scripts/packages/program.sh
-version=$(target/packages/program/sdg --version | cut -d ' ' -f 2)
+version=$("${emulated[@]}" "$program/sdg" --version | cut -d ' ' -f 2)
 out=target/packages/deb
-root=$out/root
+root=$out/root-$arch
 rm -rf "$root"
 scripts/packages/lay_out.sh "$root/usr"
 install -d "$root/DEBIAN"
@@ -26,7 +27,7 @@ Package: single-demo-grasp
 Version: $version
 Section: science
 Priority: optional
-Architecture: amd64
+Architecture: $arch
 Depends: libc6 (>= 2.31), libgcc-s1
 Recommends: libmujoco2.2.2, libegl1, libgl1-mesa-dri
 Installed-Size: $(du -k -s "$root/usr" | cut -f 1)
@@ -39,9 +40,11 @@ Description: teach a robot a grasp from one photo
  The recommended packages are for the simulated robot; nothing else needs them.
 END
 find "$root" -exec touch --no-dereference --date "@$(git log -1 --format=%ct)" {} +
-deb=$out/single-demo-grasp_${version}_amd64.deb
+deb=$out/single-demo-grasp_${version}_$arch.deb
 SOURCE_DATE_EPOCH=$(git log -1 --format=%ct) dpkg-deb --root-owner-group -Zxz --build "$root" "$deb.new" >/dev/null
 mv "$deb.new" "$deb"
 rm -rf "$root"
 echo "deb: $deb, $(stat -c %s "$deb") bytes"
-[ -z "${TRY:-}" ] || scripts/packages/try_deb.sh "$deb"
+try=try_deb
+[ "$arch" = amd64 ] || try=try_$arch
+[ -z "${TRY:-}" ] || scripts/packages/$try.sh "$deb"

@@ -3,12 +3,13 @@
 # licences. Usage: lay_out.sh PREFIX
 set -euo pipefail
 cd "$(dirname "$0")/../.."
+source scripts/packages/arch.sh
 
 prefix=$1
-sdg=target/packages/program/sdg
-install -D -m 755 "$sdg" "$prefix/bin/sdg"
+sdg=("${emulated[@]}" "$program/sdg")
+install -D -m 755 "$program/sdg" "$prefix/bin/sdg"
 install -d "$prefix/share/man/man1"
-"$sdg" man --out "$prefix/share/man/man1" >/dev/null
+"${sdg[@]}" man --out "$prefix/share/man/man1" >/dev/null
 gzip -9n "$prefix/share/man/man1"/*
 for shell in bash zsh fish; do
     case $shell in
@@ -17,7 +18,7 @@ for shell in bash zsh fish; do
         fish) file=fish/vendor_completions.d/sdg.fish ;;
     esac
     install -d "$(dirname "$prefix/share/$file")"
-    "$sdg" completions "$shell" >"$prefix/share/$file"
+    "${sdg[@]}" completions "$shell" >"$prefix/share/$file"
 done
 for part in datasets/demonstrations/*/; do
     install -D -m 644 -t "$prefix/share/single-demo-grasp/$(basename "$part")" "$part"image.png "$part"annotation.json

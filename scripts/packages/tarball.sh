@@ -1,14 +1,15 @@
 #!/usr/bin/env bash
-# One directory that runs from glibc 2.31 on, target/packages/tarball/single-demo-grasp-VERSION-x86_64-linux.tar.xz;
+# One directory that runs from glibc 2.31 on, target/packages/tarball/single-demo-grasp-VERSION-MACHINE-linux.tar.xz;
 # `make tarball`. With TRY=1 it is then used in Debian 11, the oldest root that has that library (root, mmdebstrap).
 set -euo pipefail
 cd "$(dirname "$0")/../.."
+source scripts/packages/arch.sh
 
 scripts/install.sh xz-utils
 scripts/packages/program.sh
-version=$(target/packages/program/sdg --version | cut -d ' ' -f 2)
+version=$("${emulated[@]}" "$program/sdg" --version | cut -d ' ' -f 2)
 out=target/packages/tarball
-name=single-demo-grasp-$version-x86_64-linux
+name=single-demo-grasp-$version-$machine-linux
 rm -rf "${out:?}/$name"
 scripts/packages/lay_out.sh "$out/$name"
 tarball=$out/$name.tar.xz
@@ -17,4 +18,6 @@ tar --create --xz --file "$tarball.new" --directory "$out" --sort=name --owner=0
 mv "$tarball.new" "$tarball"
 rm -rf "${out:?}/$name"
 echo "tarball: $tarball, $(stat -c %s "$tarball") bytes"
-[ -z "${TRY:-}" ] || scripts/packages/try_tarball.sh "$tarball"
+try=try_tarball
+[ "$arch" = amd64 ] || try=try_$arch
+[ -z "${TRY:-}" ] || scripts/packages/$try.sh "$tarball"

@@ -1,28 +1,20 @@
 #!/usr/bin/env bash
-# An OCI image with sdg and the Debian packages that it runs on: mmdebstrap makes the system, umoci the image; no daemon.
+# An OCI image with sdg and the Debian packages that it runs on (scripts/oci_system.sh).
 # It lies in target/oci (a layout) and, for Apptainer and others, in target/oci.tar. Then the program is run from the unpacked
 # image in namespaces without network; where those are not allowed, that is said and left out.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
-scripts/install.sh mmdebstrap umoci
 target=$(realpath -m "${CARGO_TARGET_DIR:-target}")
 sdg=$(realpath "${SDG:-$target/release/sdg}")
 work=$target/oci-work
 layout=$target/oci
-rm -rf "$work" "$layout" "$layout.tar"
+rm -rf "$work"
 mkdir -p "$work/layer/usr/local/bin"
 
-# As Debian of this machine has it, with its sources; packages' documentation and manual pages are left out.
-mmdebstrap --quiet --variant=minbase --include=libmujoco2.2.2,libegl1,libgl1-mesa-dri,ca-certificates \
-    --dpkgopt='path-exclude=/usr/share/doc/*' --dpkgopt='path-exclude=/usr/share/man/*' --dpkgopt='path-exclude=/usr/share/locale/*' \
-    --aptopt='APT::Install-Recommends "false"' bookworm "$work/system.tar"
+scripts/oci_system.sh "$layout" sdg "$work"
 cp "$sdg" "$work/layer/usr/local/bin/sdg"
 tar --create --owner=0 --group=0 --file "$work/sdg.tar" -C "$work/layer" usr
-
-umoci init --layout "$layout"
-umoci new --image "$layout:sdg"
-umoci raw add-layer --image "$layout:sdg" "$work/system.tar"
 umoci raw add-layer --image "$layout:sdg" "$work/sdg.tar"
 umoci config --image "$layout:sdg" --config.entrypoint /usr/local/bin/sdg --config.cmd --help
 tar --create --file "$layout.tar" -C "$layout" .

@@ -10,6 +10,7 @@ mod calibration;
 mod camera;
 mod devices;
 mod half_precision;
+mod kept_models;
 mod labelled_pictures;
 mod live_detection;
 mod live_pictures;

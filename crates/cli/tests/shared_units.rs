@@ -167,6 +167,26 @@ fn units_done_by_several_processes_make_the_tables_of_one() {
     damaged_results_are_refused(&shared);
 }
 
+#[test]
+fn a_missing_simulator_is_told_once_and_before_anything_is_done() {
+    let (libraries, folder) = (Folder::new(), Folder::new());
+    // Found before the installed one, and no library.
+    for name in ["libmujoco.so.2.2.2", "libmujoco.so"] {
+        File::create(libraries.path(name)).unwrap();
+    }
+    let out = folder.path("run");
+    let without_mujoco = |units: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_sdg"));
+        command.env("LD_LIBRARY_PATH", libraries.path("")).args(arguments(&out, &[&["--unit"], units].concat()));
+        command.output().unwrap()
+    };
+    let error = refused(&without_mujoco(&[TEACH, LOOK, GRASP]), 1, &["MuJoCo could not be loaded", "libmujoco2.2.2"]);
+    assert_eq!(error.lines().count(), 1, "{error}");
+    assert!(!Path::new(&out).exists());
+    // Teachings need none.
+    assert_eq!(json(&without_mujoco(&[TEACH]))["units"][0]["ended"], "done");
+}
+
 /// Everything that can be wrong with a folder in which all units are done.
 fn damaged_results_are_refused(shared: &str) {
     let at = |name: &str| Path::new(shared).join(name);

@@ -84,18 +84,20 @@ fn sum(isa: Isa, values: &[f32]) -> f32 {
         Isa::Avx512 => sum_by_16(isa, values),
         #[cfg(target_arch = "x86_64")]
         Isa::Avx2 => sum_by_8(isa, values),
-        #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
-        Isa::Simd128 => sum_by_4(isa, values),
+        #[cfg(any(target_arch = "aarch64", all(target_arch = "wasm32", target_feature = "simd128")))]
+        Isa::Quads => sum_by_4(isa, values),
         Isa::Portable => sum_by_4(isa, values),
     }
 }
 
+#[cfg(target_arch = "x86_64")]
 widest! {
     fn sum_by_16(values: &[f32]) -> f32 {
         sum_by::<16>(values)
     }
 }
 
+#[cfg(target_arch = "x86_64")]
 widest! {
     fn sum_by_8(values: &[f32]) -> f32 {
         sum_by::<8>(values)

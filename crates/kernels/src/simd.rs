@@ -2,6 +2,8 @@
 
 mod isa;
 pub(crate) mod lanes;
+#[cfg(any(target_arch = "aarch64", all(target_arch = "wasm32", target_feature = "simd128")))]
+pub(crate) mod quads;
 mod transpose;
 
 pub(crate) use isa::Isa;
@@ -36,8 +38,8 @@ macro_rules! widest {
                 #[cfg(target_arch = "x86_64")]
                 // SAFETY: the machine has AVX2 (`Isa::available`).
                 $crate::simd::Isa::Avx2 => unsafe { avx2($($arg),*) },
-                #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
-                $crate::simd::Isa::Simd128 => plain($($arg),*),
+                #[cfg(any(target_arch = "aarch64", all(target_arch = "wasm32", target_feature = "simd128")))]
+                $crate::simd::Isa::Quads => plain($($arg),*),
                 $crate::simd::Isa::Portable => plain($($arg),*),
             }
         }
@@ -77,8 +79,8 @@ macro_rules! lanes_kernel {
                     $crate::simd::Isa::Avx512 => avx512($($arg),*),
                     #[cfg(target_arch = "x86_64")]
                     $crate::simd::Isa::Avx2 => avx2($($arg),*),
-                    #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
-                    $crate::simd::Isa::Simd128 => $generic::<$crate::simd::lanes::V128x4>($($arg),*),
+                    #[cfg(any(target_arch = "aarch64", all(target_arch = "wasm32", target_feature = "simd128")))]
+                    $crate::simd::Isa::Quads => $generic::<$crate::simd::quads::Quads>($($arg),*),
                     $crate::simd::Isa::Portable => $generic::<$crate::simd::lanes::Plain>($($arg),*),
                 }
             }

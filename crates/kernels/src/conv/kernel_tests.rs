@@ -335,3 +335,24 @@ fn a_shape_knows_its_transpose() {
     assert_eq!(transposed.input(), [3, 5, 28, 28]);
     assert_eq!(transposed, ConvShape::forward([3, 5, 28, 28], [8, 5, 4, 4], params));
 }
+
+/// A convolution of 32 channels, as often as `SDG_COUNTED` says: `vectors|portable|loops direct|any ROUNDS`.
+#[test]
+#[ignore = "its instructions are counted under qemu: scripts/packages/count_arm64.sh"]
+fn counted() {
+    let told = std::env::var("SDG_COUNTED").unwrap();
+    let [lanes, way, rounds] = told.split(' ').collect::<Vec<_>>().try_into().unwrap();
+    let shape = ConvShape::forward([1, 32, 16, 16], [32, 32, 3, 3], Conv2dParams { stride: [1, 1], padding: [1, 1] });
+    let x = random_values(shape.input().iter().product(), 1);
+    let weight = random_values(shape.weight().iter().product(), 2);
+    let isa = if lanes == "vectors" { Isa::detect() } else { Isa::Portable };
+    let filters = |winograd| Filters::new(isa, &weight, &shape, Direction::Forward, winograd && way == "any");
+    let standing = to_last(&x, shape.input());
+    for _ in 0..rounds.parse::<usize>().unwrap() {
+        let found = match lanes {
+            "loops" => conv_forward(&x, &weight, &[0.0; 32], &shape),
+            _ => convolve(isa, Direction::Forward, &standing, &filters, Epilogue::default(), &shape),
+        };
+        std::hint::black_box(found);
+    }
+}

@@ -9,9 +9,9 @@ pub(crate) enum Isa {
     Avx512,
     #[cfg(target_arch = "x86_64")]
     Avx2,
-    /// WebAssembly's: a module has them or not when it is compiled, because a page cannot ask inside it.
-    #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
-    Simd128,
+    /// NEON, which every aarch64 has, and WebAssembly's: a module has them or not when it is compiled, because a page cannot ask inside it.
+    #[cfg(any(target_arch = "aarch64", all(target_arch = "wasm32", target_feature = "simd128")))]
+    Quads,
     Portable,
 }
 
@@ -35,8 +35,8 @@ impl Isa {
                 available.push(Self::Avx2);
             }
         }
-        #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
-        available.push(Self::Simd128);
+        #[cfg(any(target_arch = "aarch64", all(target_arch = "wasm32", target_feature = "simd128")))]
+        available.push(Self::Quads);
         available.push(Self::Portable);
         available
     }

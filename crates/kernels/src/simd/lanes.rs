@@ -1,11 +1,9 @@
-//! Sixteen floats at a time, as one AVX-512 register, two AVX2 registers, four of WebAssembly's, or an array.
+//! Sixteen floats at a time, as one AVX-512 register, two AVX2 registers, four of NEON's or WebAssembly's (quads.rs), or an array.
 //!
 //! Kernels are written once over [`Lanes`] and compiled for every instruction set by
 //! [`lanes_kernel!`](super::lanes_kernel), inside functions that have the instructions switched on: only
 //! there do these methods become single instructions.
 
-#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
-use std::arch::wasm32::*;
 #[cfg(target_arch = "x86_64")]
 use std::arch::x86_64::*;
 
@@ -199,74 +197,6 @@ impl Lanes for Ymm2 {
         // SAFETY: the caller promises AVX2 and FMA; no memory is touched.
         let zeros = unsafe { [_mm256_setzero_ps(); 2] };
         halves!(_mm256_max_ps, zeros, self.0)
-    }
-}
-
-/// Four of WebAssembly's vectors.
-///
-/// A browser maps them onto sixteen registers of 128 bits (fifteen are its own to use on x86). A tile of two rows has
-/// eight sums, the four vectors that they share, a factor and a product: fourteen. A third row would spill.
-#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
-#[derive(Clone, Copy)]
-pub(crate) struct V128x4([v128; 4]);
-
-/// An intrinsic on all four.
-#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
-macro_rules! quarters {
-    ($intrinsic:ident, $a:expr, $b:expr) => {
-        V128x4([$intrinsic($a[0], $b[0]), $intrinsic($a[1], $b[1]), $intrinsic($a[2], $b[2]), $intrinsic($a[3], $b[3])])
-    };
-}
-
-#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
-impl Lanes for V128x4 {
-    const ROWS: usize = 2;
-    const VECTORS: usize = 1;
-
-    #[inline(always)]
-    unsafe fn splat(value: f32) -> Self {
-        Self([f32x4_splat(value); 4])
-    }
-    #[inline(always)]
-    unsafe fn load(from: *const f32) -> Self {
-        // SAFETY: good for 16 floats by the caller's promise; the instruction needs no alignment.
-        unsafe {
-            Self([
-                v128_load(from.cast()),
-                v128_load(from.add(4).cast()),
-                v128_load(from.add(8).cast()),
-                v128_load(from.add(12).cast()),
-            ])
-        }
-    }
-    #[inline(always)]
-    unsafe fn store(self, to: *mut f32) {
-        for (idx, vector) in self.0.into_iter().enumerate() {
-            // SAFETY: good for 16 floats by the caller's promise; the instruction needs no alignment.
-            unsafe { v128_store(to.add(4 * idx).cast(), vector) };
-        }
-    }
-    #[inline(always)]
-    unsafe fn add(self, other: Self) -> Self {
-        quarters!(f32x4_add, self.0, other.0)
-    }
-    #[inline(always)]
-    unsafe fn sub(self, other: Self) -> Self {
-        quarters!(f32x4_sub, self.0, other.0)
-    }
-    #[inline(always)]
-    unsafe fn mul(self, other: Self) -> Self {
-        quarters!(f32x4_mul, self.0, other.0)
-    }
-    #[inline(always)]
-    unsafe fn mul_add(self, factor: Self, summand: Self) -> Self {
-        let product = quarters!(f32x4_mul, self.0, factor.0);
-        quarters!(f32x4_add, product.0, summand.0)
-    }
-    #[inline(always)]
-    unsafe fn relu(self) -> Self {
-        // `if a < b { b } else { a }`, one instruction where `f32x4_max` is many: a NaN stays one.
-        quarters!(f32x4_pmax, self.0, [f32x4_splat(0.0); 4])
     }
 }
 

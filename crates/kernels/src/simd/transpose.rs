@@ -33,12 +33,12 @@ pub(crate) fn transpose(
             );
             (block_rows, block_columns)
         },
-        #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
-        Isa::Simd128 => {
+        #[cfg(any(target_arch = "aarch64", all(target_arch = "wasm32", target_feature = "simd128")))]
+        Isa::Quads => {
             let (block_rows, block_columns) = (rows / 4 * 4, columns / 4 * 4);
             let (from, to) = (source.as_ptr(), target.as_mut_ptr());
             // SAFETY: bounds were asserted above.
-            unsafe { transpose_blocks_simd128(from, source_step, to, target_step, block_rows, block_columns) };
+            unsafe { super::quads::transpose_blocks(from, source_step, to, target_step, block_rows, block_columns) };
             (block_rows, block_columns)
         }
     };
@@ -107,46 +107,6 @@ unsafe fn transpose_blocks_avx(
                     let second = halves::<0x31>(q[idx], q[idx + 4]);
                     _mm256_storeu_ps(to.add(idx * target_step), first);
                     _mm256_storeu_ps(to.add((idx + 4) * target_step), second);
-                }
-            }
-        }
-    }
-}
-
-/// # Safety
-/// `rows` and `columns` are multiples of 4 and within both buffers.
-#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
-unsafe fn transpose_blocks_simd128(
-    source: *const f32,
-    source_step: usize,
-    target: *mut f32,
-    target_step: usize,
-    rows: usize,
-    columns: usize,
-) {
-    use std::arch::wasm32::{i32x4_shuffle as shuffle, v128_load, v128_store};
-    for column in (0..columns).step_by(4) {
-        for row in (0..rows).step_by(4) {
-            // SAFETY: the block lies inside both buffers by the caller's promise.
-            unsafe {
-                let from = source.add(row * source_step + column);
-                let r: [_; 4] = std::array::from_fn(|idx| v128_load(from.add(idx * source_step).cast()));
-                // Pairs of rows, then quadruples.
-                let p = [
-                    shuffle::<0, 4, 1, 5>(r[0], r[1]),
-                    shuffle::<2, 6, 3, 7>(r[0], r[1]),
-                    shuffle::<0, 4, 1, 5>(r[2], r[3]),
-                    shuffle::<2, 6, 3, 7>(r[2], r[3]),
-                ];
-                let q = [
-                    shuffle::<0, 1, 4, 5>(p[0], p[2]),
-                    shuffle::<2, 3, 6, 7>(p[0], p[2]),
-                    shuffle::<0, 1, 4, 5>(p[1], p[3]),
-                    shuffle::<2, 3, 6, 7>(p[1], p[3]),
-                ];
-                let to = target.add(column * target_step + row);
-                for (idx, column) in q.into_iter().enumerate() {
-                    v128_store(to.add(idx * target_step).cast(), column);
                 }
             }
         }

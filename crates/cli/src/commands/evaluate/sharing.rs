@@ -8,8 +8,8 @@ use std::time::Duration;
 use anyhow::{Context, Result, anyhow, bail};
 use sdg_evaluation::Progress;
 use sdg_evaluation::sharing::{
-    Collecting, Ended, ListedUnit, SlurmJob, UnitFolder, UnitList, Watch, all_units, cores, faults, near_names,
-    own_sha256, submit_script,
+    Collecting, Ended, ListedUnit, SlurmJob, UnitFolder, UnitKind, UnitList, Watch, all_units, cores, faults,
+    near_names, own_sha256, submit_script,
 };
 use sdg_evaluation::{Evaluation, Settings, Store};
 use sdg_grasp::{ModelKind, Preset};
@@ -116,6 +116,10 @@ fn do_units(asked: &Asked, args: &EvaluateArgs) -> Result<Outcome> {
         })
     });
     let named = named.collect::<Result<Vec<_>, _>>()?;
+    // A missing simulator is told once, before anything is done or written.
+    if named.iter().any(|unit| UnitKind::of(&unit.name).is_some_and(UnitKind::is_simulated)) {
+        sdg_simulation::load()?;
+    }
     let store = asked.open(&args.out)?;
     UnitList::new(&units).save(&args.out)?;
     let (evaluation, interrupt) = (asked.evaluation(&store), Interrupt::watch());

@@ -39,6 +39,11 @@ impl UnitKind {
         }
     }
 
+    /// Whether its units render pictures: all but teachings do, which take shipped photos.
+    pub fn is_simulated(self) -> bool {
+        self != Self::Teach
+    }
+
     /// The kind that a unit's name begins with.
     pub fn of(unit: &str) -> Option<Self> {
         let first = unit.split('-').next()?;

@@ -1,0 +1,24 @@
+//! Model files that earlier versions wrote (datasets/models): this one reads them, and gives the grasps that they gave.
+
+use crate::support::{shipped, stdout};
+use serde_json::Value;
+
+/// The file, the grasp's place in pixels and its angle in degrees on the part's shipped photo, as its writer found them.
+const KEPT: [(&str, [f64; 3]); 1] = [("pendulum-shape-format-3", [320.024685, 220.452129, -141.544785])];
+/// Pixels and degrees: far above what instruction sets differ by, far below what a grasp notices.
+const TOLERANCE: f64 = 0.01;
+
+#[test]
+fn kept_models_give_the_grasps_that_they_gave() {
+    for (name, expected) in KEPT {
+        let model = format!("{}/../../datasets/models/{name}.sdg", env!("CARGO_MANIFEST_DIR"));
+        let photo = shipped("pendulum", "image.png").display().to_string();
+        let line: Value =
+            serde_json::from_str(&stdout(&["detect", "--grasp-model", &model, "--json", &photo])).unwrap();
+        let grasp = &line["detections"][0]["grasp"];
+        for (field, expected) in ["x", "y", "angle_deg"].into_iter().zip(expected) {
+            let found = grasp[field].as_f64().unwrap();
+            assert!((found - expected).abs() < TOLERANCE, "{name}: {field} {found}, expected {expected}");
+        }
+    }
+}

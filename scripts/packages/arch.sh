@@ -1,0 +1,22 @@
+# What packages are called for ARCH (amd64 without one, or arm64), and how a program for it runs here; to be sourced.
+#   arch      Debian's name          machine  the kernel's
+#   triple    Rust's                 program  the folder of the program that packages hold
+#   emulated  a command before the program: qemu's, where this machine is another
+
+arch=${ARCH:-amd64}
+case $arch in
+    amd64) machine=x86_64 ;;
+    arm64) machine=aarch64 ;;
+    *)
+        echo "packages: expected ARCH=amd64 or ARCH=arm64, found ARCH=$arch" >&2
+        exit 2
+        ;;
+esac
+triple=$machine-unknown-linux-gnu
+program=target/packages/program/$arch
+emulated=()
+if [ "$(uname -m)" != "$machine" ]; then
+    # The C library of that machine, where nothing else is told (QEMU_LD_PREFIX).
+    scripts/install.sh qemu-user-static "libc6-$arch-cross"
+    emulated=(env "QEMU_LD_PREFIX=${QEMU_LD_PREFIX:-/usr/$machine-linux-gnu}" "qemu-$machine-static")
+fi

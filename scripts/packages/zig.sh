@@ -1,0 +1,29 @@
+# Cargo with zig's linker for the machine that arch.sh has chosen, with glibc 2.31 or later (Debian 11, Ubuntu 20.04), whose symbols zig
+# has, and those of other machines; to be sourced after arch.sh.
+#   zig_cargo zigbuild|test ARGUMENTS    in the profile of what goes to other machines; PROFILE=release, which `make build` has, takes a
+#                                        quarter of the time, for trying
+#   built                                the folder of what it compiles
+
+source scripts/other_target.sh
+
+GLIBC=2.31
+profile=${PROFILE:-ship}
+tools=target/packages/tools
+scripts/install.sh python3-venv
+if [ ! -x "$tools/bin/cargo-zigbuild" ]; then
+    python3 -m venv "$tools"
+    "$tools/bin/pip" --quiet --disable-pip-version-check install 'cargo-zigbuild==0.24.1' 'ziglang==0.17.1'
+fi
+choose_compiler "$triple"
+# A target directory of its own: it is another linker's and another profile's.
+zig_target=target/packages/target
+[ "$compiled_by" = rustup ] || zig_target=$zig_target-$compiled_by
+built=$zig_target/$triple/$profile
+
+zig_cargo() {
+    local command=$1
+    shift
+    env PATH="$PWD/$tools/bin:$PATH" CARGO="$cargo_for_target" CARGO_TARGET_DIR="$zig_target" \
+        "CARGO_TARGET_$(tr a-z- A-Z_ <<<"$triple")_RUNNER=${emulated[*]}" \
+        cargo-zigbuild "$command" --locked --profile "$profile" --target "$triple.$GLIBC" "${standard_library[@]}" "$@"
+}
