@@ -5,7 +5,7 @@ CARGO ?= cargo
 PROFILE := --release
 
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo web edge wheel test-python test test-compile test-browser film walk acceptance test-v4l test-peers test-ros2 test-slurm slurm-image deb tarball image test-arm64 hardening network-grasps placing heights test-wgpu test-ndarray test-torch package lint base-weights bench bench-search bench-browser bench-planning clean
+.PHONY: help setup build demo web edge wheel capi test-python test-c test test-compile test-browser film walk acceptance test-v4l test-peers test-ros2 test-slurm slurm-image deb tarball image test-arm64 hardening network-grasps placing heights test-wgpu test-ndarray test-torch package lint base-weights bench bench-search bench-browser bench-planning clean
 
 help: ## Lists the targets
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
@@ -30,6 +30,12 @@ wheel: setup ## Builds the Python package's wheel into target/wheels (maturin fr
 
 test-python: wheel ## Tests the wheel in a clean environment: the same grasps as Rust's, wrong input, the guide (PYTEST="-k equal": some)
 	@scripts/python/test.sh $(PYTEST)
+
+capi: setup ## Builds the C library into target/capi: lib, include, pkg-config's and CMake's files
+	@scripts/c/install.sh target/capi
+
+test-c: wheel capi ## Tests the C library: programs in C and C++ under valgrind, the same grasps as Rust's, wrong input, the guide (PYTEST="-k equal": some)
+	@scripts/c/test.sh $(PYTEST)
 
 # Without examples, which cargo would compile along: `make lint` checks those.
 TESTS_ALONE = --lib --bins --tests

@@ -119,6 +119,8 @@ def test_cameras(models: dict[str, Path], shape_model: sdg.GraspModel) -> None:
     for wrong in ("", "image_width: 640\n", text.replace("table:", "floor:")):
         with pytest.raises(sdg.CameraError):
             sdg.Camera.from_yaml(wrong)
+    with pytest.raises(sdg.CameraError, match="image.png"):
+        sdg.Camera.load(made_pictures.PHOTO)
     photo = sdg.read_picture(made_pictures.PHOTO, camera)
     # Taught without a camera, so in pixels alone.
     with pytest.raises(sdg.CameraError):

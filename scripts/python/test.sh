@@ -4,7 +4,6 @@ set -euo pipefail
 cd "$(dirname "$0")/../.."
 
 scripts/build.sh --bin sdg --example reference
-scripts/python/venv.sh target/python/test numpy pytest mypy
-target/python/test/bin/pip install --quiet --disable-pip-version-check --no-deps --force-reinstall target/wheels/single_demo_grasp-*.whl
+scripts/python/test_venv.sh
 # Prints what was measured. By pytest's own command, which adds neither this folder nor python/ to the path: the wheel's files are tested.
 PYTHONDONTWRITEBYTECODE=1 target/python/test/bin/pytest -p no:cacheprovider -rP python/tests "$@"

@@ -20,9 +20,12 @@ impl Camera {
     /// # Errors
     /// A file that cannot be read, and one without the camera's pose.
     pub fn read(path: &Path) -> Result<Self> {
-        let (camera, _) = camera_files::read(path)?;
-        camera_over_table(&camera).with_context(|| path.display().to_string())?;
-        Ok(Self(Arc::new(camera)))
+        let read = || {
+            let (camera, _) = camera_files::read(path)?;
+            camera_over_table(&camera).with_context(|| path.display().to_string())?;
+            Ok(Self(Arc::new(camera)))
+        };
+        read().map_err(Fault::of_kind_or(FaultKind::Camera))
     }
 
     /// The same from the file's text.

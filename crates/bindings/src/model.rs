@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use image::RgbImage;
-use sdg_cell::{FoundRecord, Perception};
+use sdg_cell::{DEFAULT_MIN_SCORE, FoundRecord, Perception};
 use sdg_grasp::{Device, GraspModel, SearchRegion, Verification};
 use sdg_inputs::check_replaces_a_model;
 use serde::Serialize;
@@ -71,11 +71,13 @@ pub struct Detections {
 
 /// A record of `sdg detect --json`, without advice, whose words are the command line's.
 #[derive(Debug, Clone, Serialize)]
-struct Record {
+pub struct Record {
+    /// In pixels, and in metres with a camera.
     #[serde(flatten)]
-    found: FoundRecord,
+    pub found: FoundRecord,
+    /// The part's size over its nominal size; absent with a camera.
     #[serde(skip_serializing_if = "Option::is_none")]
-    size: Option<f64>,
+    pub size: Option<f64>,
 }
 
 impl Model {
@@ -159,6 +161,28 @@ impl Detections {
     pub fn to_json(&self) -> String {
         // Numbers and names alone, whose serialisation cannot fail.
         serde_json::to_string(self).unwrap_or_default()
+    }
+
+    /// The detection of this number, the best being 0.
+    pub fn get(&self, idx: usize) -> Option<&Record> {
+        self.records.get(idx)
+    }
+
+    /// The best of those that are accepted.
+    ///
+    /// # Errors
+    /// No detection, and none that is accepted.
+    pub fn best(&self) -> Result<&Record> {
+        let nothing = |text: String| Err(Fault::new(FaultKind::NothingToGrasp, text));
+        let Some(first) = self.get(0) else {
+            return nothing("expected a part to grasp, found nothing that resembles it".to_owned());
+        };
+        let detection = &first.found.detection;
+        if detection.score >= DEFAULT_MIN_SCORE {
+            return Ok(first);
+        }
+        let why = detection.refused.map(|why| format!(": {why}")).unwrap_or_default();
+        nothing(format!("expected a part to grasp, found none: the best place scores {:.2}{why}", detection.score))
     }
 
     /// How many there are.

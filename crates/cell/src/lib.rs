@@ -30,7 +30,7 @@ pub use live_tracker::{LiveTracker, SearchTime};
 pub use mounted_camera::MountedCamera;
 pub use part_shape::part_shape;
 pub use perception::{Found, Perception, camera_over_table};
-pub use record::FoundRecord;
+pub use record::{FoundRecord, PoseRecord};
 pub use sdg_robot::CameraPose;
 pub use sequence_run::{Ended, run_sequence};
 pub use workcell_map::WorkcellMap;

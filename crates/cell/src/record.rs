@@ -9,22 +9,30 @@ use crate::perception::{Found, Perception};
 /// A detection and, with a camera, its pose.
 #[derive(Debug, Clone, Serialize)]
 pub struct FoundRecord {
+    /// In pixels.
     #[serde(flatten)]
-    detection: DetectionRecord,
+    pub detection: DetectionRecord,
+    /// In metres; absent without a calibrated camera.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pose: Option<PoseRecord>,
+    pub pose: Option<PoseRecord>,
 }
 
 /// Where the gripper is to close; metres and degrees, the turn about the frame's z. The position lies within `sigma_mm` and
 /// the turn within `sigma_deg` with a probability of 68 % each.
 #[derive(Debug, Clone, Serialize)]
-struct PoseRecord {
-    frame: Frame,
-    p_m: [f64; 3],
-    yaw_deg: f64,
-    opening_m: f64,
-    sigma_mm: f64,
-    sigma_deg: f64,
+pub struct PoseRecord {
+    /// The frame that the camera's file places the camera in.
+    pub frame: Frame,
+    /// Grasp point in that frame, in metres.
+    pub p_m: [f64; 3],
+    /// Turn about the frame's z, right-handed.
+    pub yaw_deg: f64,
+    /// Distance between the jaws for the part's width, in metres.
+    pub opening_m: f64,
+    /// Standard deviation of the position.
+    pub sigma_mm: f64,
+    /// Standard deviation of the turn.
+    pub sigma_deg: f64,
 }
 
 impl FoundRecord {

@@ -1,0 +1,6 @@
+//! The shared library's name for the loader: its number is `SDG_ABI_VERSION`.
+
+fn main() {
+    println!("cargo:rerun-if-changed=build.rs");
+    println!("cargo:rustc-link-arg=-Wl,-soname,libsdg.so.1");
+}

@@ -1,0 +1,105 @@
+//! Objects under numbers, each of which is given once in a process.
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use sdg_bindings::{Camera, Detections, Fault, FaultKind, Model, Result};
+
+use crate::types::sdg_handle;
+
+/// The object of a handle. Another thread may free it during a call, which then still holds it.
+#[derive(Debug, Clone)]
+pub enum Object {
+    Model(Arc<Model>),
+    Camera(Camera),
+    Detections(Arc<Detections>),
+}
+
+struct Table {
+    objects: Option<HashMap<sdg_handle, Object>>,
+    last: sdg_handle,
+}
+
+static TABLE: Mutex<Table> = Mutex::new(Table { objects: None, last: 0 });
+
+fn with_table<T>(work: impl FnOnce(&mut Table) -> T) -> T {
+    work(&mut TABLE.lock().unwrap_or_else(PoisonError::into_inner))
+}
+
+impl Object {
+    fn name(&self) -> &'static str {
+        match self {
+            Self::Model(_) => "a model",
+            Self::Camera(_) => "a camera",
+            Self::Detections(_) => "detections",
+        }
+    }
+
+    /// Keeps it; its handle.
+    pub fn keep(self) -> sdg_handle {
+        with_table(|table| {
+            table.last += 1;
+            table.objects.get_or_insert_default().insert(table.last, self);
+            table.last
+        })
+    }
+}
+
+/// The object of a handle; `expected` is named in the error.
+fn object(handle: sdg_handle, expected: &str) -> Result<Object> {
+    with_table(|table| match table.objects.as_ref().and_then(|objects| objects.get(&handle)) {
+        Some(object) => Ok(object.clone()),
+        None => Err(table.unknown(handle, expected)),
+    })
+}
+
+impl Table {
+    fn unknown(&self, handle: sdg_handle, expected: &str) -> Fault {
+        let found = match handle {
+            0 => "0, which is none".to_owned(),
+            _ if handle <= self.last => format!("{handle}, which was freed"),
+            _ => format!("{handle}, which was never given"),
+        };
+        Fault::new(FaultKind::Closed, format!("expected the handle of {expected}, found {found}"))
+    }
+}
+
+fn other(object: &Object, handle: sdg_handle, expected: &str) -> Fault {
+    let text = format!("expected the handle of {expected}, found {handle}, which is that of {}", object.name());
+    Fault::new(FaultKind::Closed, text)
+}
+
+/// The model of a handle.
+pub fn model(handle: sdg_handle) -> Result<Arc<Model>> {
+    match object(handle, "a model")? {
+        Object::Model(model) => Ok(model),
+        found => Err(other(&found, handle, "a model")),
+    }
+}
+
+/// The camera of a handle.
+pub fn camera(handle: sdg_handle) -> Result<Camera> {
+    match object(handle, "a camera")? {
+        Object::Camera(camera) => Ok(camera),
+        found => Err(other(&found, handle, "a camera")),
+    }
+}
+
+/// The detections of a handle.
+pub fn detections(handle: sdg_handle) -> Result<Arc<Detections>> {
+    match object(handle, "detections")? {
+        Object::Detections(detections) => Ok(detections),
+        found => Err(other(&found, handle, "detections")),
+    }
+}
+
+/// Frees the object of a handle.
+pub fn free(handle: sdg_handle) -> Result<()> {
+    let freed = with_table(|table| match table.objects.as_mut().and_then(|objects| objects.remove(&handle)) {
+        Some(object) => Ok(object),
+        None => Err(table.unknown(handle, "an object")),
+    })?;
+    // After the table's lock is released: a model takes a while.
+    drop(freed);
+    Ok(())
+}

@@ -1,0 +1,21 @@
+#!/usr/bin/env bash
+# Builds the C library and lays it out as it is installed: lib, include, pkg-config's and CMake's files, all of which find each other
+# from wherever the folder is moved to. `make capi`: target/capi. Usage: install.sh FOLDER
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+
+scripts/build.sh --example sdg
+folder=$1
+version=$(sed -n '/^\[workspace.package\]/,/^\[/s/^version = "\(.*\)"/\1/p' Cargo.toml)
+abi=$(sed -n 's/^#define SDG_ABI_VERSION \([0-9]*\)u$/\1/p' crates/capi/include/sdg.h)
+: "${version:?}" "${abi:?}"
+
+rm -rf "$folder"
+mkdir -p "$folder"/{lib/pkgconfig,lib/cmake/sdg,include}
+cp crates/capi/include/sdg.h "$folder/include/"
+cp target/release/examples/libsdg.so "$folder/lib/libsdg.so.$abi"
+ln -s "libsdg.so.$abi" "$folder/lib/libsdg.so"
+for file in pkgconfig/sdg.pc cmake/sdg/sdg-config.cmake cmake/sdg/sdg-config-version.cmake; do
+    sed -e "s/@VERSION@/$version/" -e "s/@ABI@/$abi/" "crates/capi/installed/${file##*/}" >"$folder/lib/$file"
+done
+echo "C library $version (ABI $abi): $folder, $(stat -c %s "$folder/lib/libsdg.so.$abi") bytes"
