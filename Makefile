@@ -5,7 +5,7 @@ CARGO ?= cargo
 PROFILE := --release
 
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo web edge wheel capi test-python test-c test test-compile test-browser film walk acceptance test-v4l test-peers test-ros2 test-slurm slurm-image deb tarball image test-arm64 hardening network-grasps placing heights test-wgpu test-ndarray test-torch package lint base-weights bench bench-search bench-browser bench-planning clean
+.PHONY: help setup build demo web edge wheel capi test-python test-c test test-compile test-browser film walk acceptance test-v4l test-peers test-ros2 test-slurm slurm-image deb tarball image windows test-arm64 release hardening network-grasps placing heights test-wgpu test-ndarray test-torch package lint base-weights bench bench-search bench-browser bench-planning clean
 
 help: ## Lists the targets
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
@@ -105,6 +105,12 @@ test-arm64: setup ## Unit tests that need no simulator, compiled for arm64, unde
 
 image: setup ## An OCI image for users, in target/packages/image, used without network where namespaces are allowed (root)
 	@scripts/packages/image.sh
+
+windows: setup ## sdg.exe without simulator, as a zip in target/packages/windows (TRY=1: used under Wine)
+	@TRY="$(TRY)" scripts/packages/windows.sh
+
+release: setup ## All packages with checksums, lists of what is in them, and the check of the libraries' interfaces, in target/packages/release
+	@scripts/packages/release.sh
 
 hardening: setup ## Hostile input for every reader of strangers' files and messages, resumed where it ended (EXECUTIONS=1000000, TARGETS="png jpeg")
 	@scripts/build.sh --bin hardening

@@ -2,6 +2,7 @@
 # has, and those of other machines; to be sourced after arch.sh.
 #   zig_cargo zigbuild|test ARGUMENTS    in the profile of what goes to other machines; PROFILE=release, which `make build` has, takes a
 #                                        quarter of the time, for trying
+#                                        AUDITABLE=1 writes the list of its crates into the program (cargo auditable)
 #   built                                the folder of what it compiles
 
 source scripts/other_target.sh
@@ -19,6 +20,14 @@ choose_compiler "$triple"
 zig_target=target/packages/target
 [ "$compiled_by" = rustup ] || zig_target=$zig_target-$compiled_by
 built=$zig_target/$triple/$profile
+
+if [ -n "${AUDITABLE:-}" ]; then
+    [ -x "$tools/bin/cargo-auditable" ] || cargo install --quiet --debug --locked --root "$tools" cargo-auditable@0.7.7
+    # zigbuild calls one program as cargo.
+    printf '#!/bin/sh\nexec "%s" auditable "$@"\n' "$cargo_for_target" >"$tools/auditable-cargo"
+    chmod +x "$tools/auditable-cargo"
+    cargo_for_target=$PWD/$tools/auditable-cargo
+fi
 
 zig_cargo() {
     local command=$1
