@@ -154,7 +154,7 @@ package: ## Packages the libraries that other programs can use, into target/pack
 
 # Every feature of every crate, so that what CI does not run compiles; then the program of small machines, which has none. CUDA's
 # build fetches LLVM unless it is told that only documents are made; a check does not need it.
-FEATURES = sdg-cli/ndarray,sdg-cli/wgpu,sdg-cli/cuda,sdg-cli/ros2,sdg-base-weights/wgpu,sdg-base-weights/cuda,sdg-web/webgpu
+FEATURES = sdg-cli/ndarray,sdg-cli/wgpu,sdg-cli/cuda,sdg-cli/ros2,sdg-base-weights/wgpu,sdg-base-weights/cuda,sdg-web/webgpu,sdg-python/extension
 
 lint: setup ## Formatting and lints, with every feature, as CI denies them
 	$(CARGO) fmt --all --check

@@ -118,7 +118,8 @@ def test_a_mat_of_opencv_has_the_same_pixels(
     assert [json.loads(line) for line in lines] == records_by_python(models["S"], pictures)
 
 
-@pytest.mark.parametrize("name", NAMES)
+# The first model without and the last with a camera: a network takes minutes there.
+@pytest.mark.parametrize("name", [NAMES[0], NAMES[-1]])
 def test_valgrind_finds_no_error_and_no_leak(
     name: str, programs: Path, models: dict[str, Path], pixels: dict[str, Path]
 ) -> None:

@@ -19,6 +19,13 @@ mod sequence_run;
 mod surface;
 mod workcell_map;
 
+// The crates whose types the functions here take and give: a program that depends on this crate needs no other of them.
+pub use image;
+pub use sdg_calibration as calibration;
+pub use sdg_demonstration as demonstration;
+pub use sdg_geometry as geometry;
+pub use sdg_grasp as grasp;
+
 pub use drawing::DEFAULT_MIN_SCORE;
 pub use dry_run::DryRun;
 pub use error::{CellError, Result};
