@@ -264,14 +264,13 @@ export function adjustGripper({ turn = 0, open = 0 }) {
   commit();
 }
 
-/** Turns the gripper about its middle to where it closes over the least of the part, and opens it so far. */
+/** Turns the gripper to where it closes over the least of the part, moves its middle across to that of the part there, and opens it so far. */
 export function turnToFit() {
   const { grasp } = marks();
   const part = region();
   if (!grasp || !part) return;
   const gripper = gripperOf(grasp);
-  const { angle, width } = placedAt(gripper.center, part, gripper.length);
-  setGripper({ ...gripper, angle, width });
+  setGripper({ ...gripper, ...placedAt(gripper.center, part, gripper.length) });
   commit();
 }
 

@@ -4,7 +4,7 @@ import { api } from "./api.js";
 import { button } from "./buttons.js";
 import { adopt } from "./editing.js";
 import { changed, isLive, state } from "./store.js";
-import { openImage } from "./strip.js";
+import { openImage, openTrialPicture } from "./strip.js";
 import { openTab } from "./tabs.js";
 import { toast } from "./toast.js";
 
@@ -44,10 +44,15 @@ const takePhoto = (id) => take(async () => {
   dialog.close();
 });
 
-const takeTrial = async (id) => {
-  const view = await api.addOtherTrial(id);
-  state.trialPictures.push({ ...view, detections: null });
-};
+/** Takes pictures to try, and shows the first of them. */
+const takeTrials = (ids) => take(async () => {
+  const first = state.trialPictures.length;
+  try {
+    for (const id of ids) state.trialPictures.push({ ...(await api.addOtherTrial(id)), detections: null });
+  } finally {
+    openTrialPicture(first);
+  }
+});
 
 /** A photo from elsewhere, which is copied beside the others. */
 export const uploadPhoto = (file) => take(async () => {
@@ -69,7 +74,7 @@ function render() {
   by("folder-choose").hidden = !isPhoto;
   by("folder-list").replaceChildren(...state.others.map(({ id, name }) => {
     const item = document.createElement("li");
-    const choose = button("", () => (isPhoto ? takePhoto(id) : take(() => takeTrial(id))));
+    const choose = button("", () => (isPhoto ? takePhoto(id) : takeTrials([id])));
     const picture = Object.assign(document.createElement("img"), { alt: "", loading: "lazy", src: api.otherUrl(id) });
     choose.append(picture, Object.assign(document.createElement("span"), { textContent: name }));
     item.append(choose);
@@ -84,10 +89,10 @@ export async function openFolder(as) {
   dialog.showModal();
 }
 
-by("folder-all").addEventListener("click", () => take(async () => {
-  for (const { id } of state.others) await takeTrial(id);
+by("folder-all").addEventListener("click", () => {
   dialog.close();
-}));
+  takeTrials(state.others.map(({ id }) => id));
+});
 by("folder-choose").addEventListener("click", () => by("photo-input").click());
 by("photo-input").addEventListener("change", () => {
   const [file] = by("photo-input").files;

@@ -179,7 +179,7 @@ export function touchText(detection, detections, listed) {
   const touched = isFound(detection) ? touchedBy(detection, detections) : [];
   if (!touched.length) return "";
   const numbers = touched.map((other) => listed.indexOf(other) + 1).sort((a, b) => a - b).map((n) => (n ? `${n}` : "another"));
-  return `Warning: the jaws would touch part ${new Intl.ListFormat("en").format(numbers)}.`;
+  return `Warning: the jaws would touch part${numbers.length > 1 ? "s" : ""} ${new Intl.ListFormat("en").format(numbers)}.`;
 }
 
 /** A grasp over the table, in words. */

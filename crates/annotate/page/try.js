@@ -272,7 +272,7 @@ function renderJudge() {
   const ofLive = state.camera ? `; with --from also --every-frame` : "";
   const beyond = state.minScore === 0.5 ? "" : ` For “sdg detect”: --min-score ${least}${ofLive}.`;
   const words = looked.length
-    ? `Found ${places.filter(isFound).length} of ${places.length} at ${least}, in ${inPictures} of ${looked.length} pictures${looked.length < state.trialPictures.length ? ` (${state.trialPictures.length - looked.length} are still looked at)` : ""}.${beyond}`
+    ? `Found ${places.filter(isFound).length} of ${places.length} candidates at ${least}, in ${inPictures} of ${looked.length} pictures${looked.length < state.trialPictures.length ? ` (${state.trialPictures.length - looked.length} are still looked at)` : ""}.${beyond}`
     : beyond.trim();
   if (by("least-score-count").textContent !== words) by("least-score-count").textContent = words;
   const all = state.trialPictures.length;
