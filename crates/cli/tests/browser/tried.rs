@@ -170,3 +170,22 @@ fn two_hundred_pictures_are_tried_and_saved() {
     assert!(off < MAX_OFF_PX, "{off} px");
     page.assert_quiet();
 }
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn pictures_of_the_folder_are_shown_once_they_are_taken_in() {
+    let page = Page::open();
+    for k in 0..2 {
+        std::fs::copy(shipped_photo(), page.folder.path().join(format!("other{k}.png"))).unwrap();
+    }
+    page.click("#tab-try");
+    page.browser.run("document.getElementById('add-others').click()", &[]).unwrap();
+    page.wait_for("the list", "return document.querySelectorAll('#folder-list button').length === 2");
+    page.click("#folder-all");
+    let is_shown = "const photo = document.getElementById('photo');
+        return !photo.hidden && photo.naturalWidth === 640 && photo.alt === 'Photo other0.png'";
+    page.wait_for("the first of them", is_shown);
+    assert_eq!(page.browser.run("return document.querySelectorAll('#strip button').length", &[]).unwrap(), json!(2));
+    assert!(page.browser.run("return document.getElementById('empty').hidden", &[]).unwrap().as_bool().unwrap());
+    page.assert_quiet();
+}
