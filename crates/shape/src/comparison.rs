@@ -159,7 +159,7 @@ impl Comparison<'_> {
             return *pose;
         }
         if let Some(profile) = self.profile {
-            return profile.placed(self.picture.field, pose, scales);
+            return profile.placed(self.picture.field, self.template, pose, scales);
         }
         let turned = self.turned.and_then(|turned| turned.better_turn(self.picture.image, self.picture.field, pose));
         turned.filter(|turned| scales.contains(&turned.scale)).unwrap_or(*pose)

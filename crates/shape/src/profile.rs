@@ -64,9 +64,13 @@ impl Profile {
     }
 
     /// `pose`, or one along the axis or the other way round at which the profile agrees better. Scales stay in `scales`.
+    ///
+    /// `all_edges` of the part may agree worse there by no more than the profile must gain: the edge of a hard shadow has the same
+    /// profile, and nothing of what lies inside it.
     pub(crate) fn placed(
         &self,
         field: &GradientField,
+        all_edges: &ShapeTemplate,
         pose: &PlanarSimilarity,
         scales: &RangeInclusive<f64>,
     ) -> PlanarSimilarity {
@@ -83,7 +87,12 @@ impl Profile {
             .map(|placed| (placed, self.agreement(field, &placed)))
             .max_by(|a, b| a.1.total_cmp(&b.1));
         match placed {
-            Some((placed, gained)) if gained >= self.agreement(field, pose) + MIN_GAIN => placed,
+            Some((placed, gained))
+                if gained >= self.agreement(field, pose) + MIN_GAIN
+                    && all_edges.agreement(field, &placed) >= all_edges.agreement(field, pose) - MIN_GAIN =>
+            {
+                placed
+            }
             _ => *pose,
         }
     }
@@ -122,17 +131,22 @@ mod tests {
         (image, outline)
     }
 
+    fn taught(photo: &RgbImage, outline: &Polygon) -> (Profile, ShapeTemplate) {
+        let config = ShapeConfig::DEFAULT;
+        (Profile::of(photo, outline, &config).unwrap(), ShapeTemplate::new(photo, outline, &config).unwrap())
+    }
+
     #[test]
     fn a_pose_that_follows_the_thread_goes_back_to_the_ends() {
         let (photo, outline) = screw(0.0);
-        let profile = Profile::of(&photo, &outline, &ShapeConfig::DEFAULT).unwrap();
+        let (profile, all_edges) = taught(&photo, &outline);
         let (rolled, _) = screw(7.0);
         let field = GradientField::new(&rolled);
         let moved = PlanarSimilarity { tx: 7.0, ..PlanarSimilarity::IDENTITY };
         let middle = profile.middle;
         let turned = PlanarSimilarity::about(middle, middle, Angle::from_radians(std::f64::consts::PI), 1.0);
         for start in [moved, turned.compose(&moved)] {
-            let placed = profile.placed(&field, &start, &(0.8..=1.25));
+            let placed = profile.placed(&field, &all_edges, &start, &(0.8..=1.25));
             let off = (placed.apply(&middle) - middle).norm();
             assert!(off < 1.5 && placed.angle.radians().abs() < 0.05, "{start:?} → {placed:?}");
         }
@@ -156,8 +170,34 @@ mod tests {
     #[test]
     fn a_pose_that_fits_stays() {
         let (photo, outline) = screw(0.0);
-        let profile = Profile::of(&photo, &outline, &ShapeConfig::DEFAULT).unwrap();
+        let (profile, all_edges) = taught(&photo, &outline);
         let field = GradientField::new(&photo);
-        assert_eq!(profile.placed(&field, &PlanarSimilarity::IDENTITY, &(0.8..=1.25)), PlanarSimilarity::IDENTITY);
+        let placed = profile.placed(&field, &all_edges, &PlanarSimilarity::IDENTITY, &(0.8..=1.25));
+        assert_eq!(placed, PlanarSimilarity::IDENTITY);
+    }
+
+    #[test]
+    fn a_pose_does_not_go_to_the_shadow() {
+        let (photo, outline) = screw(0.0);
+        // On a table as bright as the part's sides, which are lost in it; the shadow is seen whole.
+        let is_bright = |at: Point2<f64>| outline.contains(&Point2::new(at.x, 60.0 + (at.y - 60.0) / 0.6));
+        let picture = |shadow: Vector2<f64>| {
+            RgbImage::from_fn(photo.width(), photo.height(), |x, y| {
+                let at = Point2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
+                match (is_bright(at), outline.contains(&(at - shadow))) {
+                    (true, _) => *photo.get_pixel(x, y),
+                    (false, true) => Rgb([20; 3]),
+                    (false, false) => Rgb([140; 3]),
+                }
+            })
+        };
+        let (profile, all_edges) = taught(&photo, &outline);
+        let shadow = Vector2::new(-6.0, 2.0);
+        let field = GradientField::new(&picture(shadow));
+        let seen = |pose: &PlanarSimilarity| profile.agreement(&field, pose);
+        let at_shadow = PlanarSimilarity::IDENTITY.shifted(shadow);
+        assert!(seen(&at_shadow) > seen(&PlanarSimilarity::IDENTITY) + MIN_GAIN, "the shadow's outline agrees better");
+        let placed = profile.placed(&field, &all_edges, &PlanarSimilarity::IDENTITY, &(0.8..=1.25));
+        assert_eq!(placed, PlanarSimilarity::IDENTITY);
     }
 }
