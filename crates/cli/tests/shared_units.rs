@@ -265,7 +265,7 @@ fn failures_are_recorded_and_told() {
     assert!(teach["tries"] == 2 && teach["why"].as_str().unwrap().contains("teaching.json"), "{teach}");
     // Twice is the last time, and nothing else can begin: the watch ends.
     let ended = sdg(&["evaluate", "--watch", &out]);
-    refused(&ended, 1, &["4 of 4 units came to nothing"]);
+    refused(&ended, 1, &["4 of 4 units have no result"]);
     assert!(String::from_utf8(ended.stdout).unwrap().contains("\nfailed:\n  teach-S-rod_end  2 times, last on "));
 
     // A unit at work, and one whose process went away without a word.

@@ -121,7 +121,7 @@ pub fn mounted(camera: &CalibratedCamera, workcell: &Workcell, path: &Path) -> R
 pub fn read(path: &Path) -> Result<(CalibratedCamera, String)> {
     let bytes = sdg_files::read(path, MAX_BYTES)?;
     let Ok(text) = String::from_utf8(bytes) else {
-        bail!("{}: expected YAML, found bytes that are no text", path.display());
+        bail!("{}: expected YAML, found bytes that are not text", path.display());
     };
     let camera = CalibratedCamera::from_yaml(&text).with_context(|| path.display().to_string())?;
     Ok((camera, text))

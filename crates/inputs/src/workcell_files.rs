@@ -14,7 +14,7 @@ const MAX_BYTES: u64 = 1 << 20;
 /// A file that cannot be read, with the line.
 pub fn read_workcell(path: &Path) -> Result<(Workcell, Option<PathBuf>)> {
     let Ok(text) = String::from_utf8(sdg_files::read(path, MAX_BYTES)?) else {
-        bail!("{}: expected TOML, found bytes that are no text", path.display());
+        bail!("{}: expected TOML, found bytes that are not text", path.display());
     };
     let workcell = Workcell::from_toml(&text).with_context(|| path.display().to_string())?;
     let folder = path.parent().unwrap_or(Path::new(""));
