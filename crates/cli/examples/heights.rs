@@ -2,13 +2,11 @@
 //! accuracy of the measured heights, and number of grasps that hold. Model S, taught from the shipped photos.
 //!
 //! ```text
-//! heights grasp [ATTEMPTS [SEED [PART]…]]   10 1: ten of each part; odd seeds with a table 0 to 40 mm too high, even
-//! ones
-//!                                           with a block 5 to 30 mm high
+//! heights grasp [ATTEMPTS [SEED [PART]…]]   10 1: ten of each part; with odd seeds the table is 0 to 40 mm too high,
+//!                                           with even ones the part is on a block 5 to 30 mm high
 //! heights measure …                         the same; each attempt ends once the height is measured
 //! heights raw …                             also prints the measurements in the pictures, as JSON lines
-//! heights told …                            the same scenes with their true heights given and nothing measured, for
-//! comparison
+//! heights told …                            for comparison: the same scenes with true heights given, nothing measured
 //! ```
 //! Fails if the median error is above 0.7 mm, fewer than 95 of 100 errors are within 2 mm, or fewer than 116 of 120
 //! grasps hold.
