@@ -52,7 +52,7 @@ async function send(method, path, body, options = {}) {
     throw new RequestError("sdg annotate was started again.", true);
   }
   if (response.ok) return options.isPicture ? response.blob() : response.json();
-  if (response.status === 413) throw new RequestError("That is too large to be taken.");
+  if (response.status === 413) throw new RequestError("That is too large.");
   const text = await response.text();
   let message = text.trim() || `The server answered ${response.status}.`;
   try {

@@ -127,7 +127,7 @@ export function closeOutline(points) {
 export function strokeOutline(points, isInside) {
   const target = image();
   const box = target.marks.box ?? (target.marks.outline && boundsOf(target.marks.outline));
-  if (!box) return toast("Draw a box around the part first: the outline is looked for in it.");
+  if (!box) return toast("Draw a box around the part first: the outline is detected inside it.");
   target.strokes = [...(target.strokes ?? []), { points, isInside }];
   // What lies outside the box and belongs to the part makes the box larger.
   const grown = boundsOf([box.slice(0, 2), box.slice(2), ...points]);
@@ -158,7 +158,7 @@ export async function proposeOutline({ quietly = false, strokes = null } = {}) {
   const box = drawn ? boundsOf([drawn, target.marks.box].flatMap((b) => [b.slice(0, 2), b.slice(2)])) : target.marks.box ?? (target.marks.outline && boundsOf(target.marks.outline));
   if (!box) {
     setTool("box");
-    return toast("Draw a box around the part first: the outline is looked for in it.");
+    return toast("Draw a box around the part first: the outline is detected inside it.");
   }
   if (!strokes) Object.assign(target, { strokes: null, drawnBox: null });
   state.proposing = true;
@@ -169,7 +169,7 @@ export async function proposeOutline({ quietly = false, strokes = null } = {}) {
     // Whoever has drawn on meanwhile is not overruled.
     const waited = target === image() && !(quietly && target.marks.outline);
     if (waited && !outline) {
-      if (!quietly) toast("Nothing in the box stands out from what is around it. Draw the outline by hand.");
+      if (!quietly) toast("Nothing in the box differs from its surroundings. Draw the outline by hand.");
     } else if (waited) {
       const before = target.marks.outline;
       target.marks.outline = outline;
@@ -184,11 +184,11 @@ export async function proposeOutline({ quietly = false, strokes = null } = {}) {
       const middle = last?.points[Math.floor(last.points.length / 2)];
       if (!strokes) toast("Found an outline. Where it is wrong, draw “In” or “Out”.");
       else if (!last.isInside && isWithin(middle, outline)) {
-        toast("That place has the part all around it. An outline is one line around the part and has no holes; a hole does no harm.");
+        toast("This place is inside the part. An outline is a single line without holes; a hole does no harm.");
       } else if (last.isInside && !isWithin(middle, outline)) {
-        toast("That place does not hang together with the part. Draw from there to the part, too, or draw the outline by hand.");
+        toast("This place is not connected with the part. Draw from there to the part as well, or draw the outline by hand.");
       } else if (!last.isInside && before && areaOf(outline) < MUCH_LEFT * areaOf(before)) {
-        toast("“Out” took much of the outline.", { text: "Undo", run: undo });
+        toast("“Out” removed much of the outline.", { text: "Undo", run: undo });
       }
     }
   } catch (error) {

@@ -196,7 +196,7 @@ function renderState() {
   const kind = isPaused() ? "paused" : live.fault ? live.fault.kind : live.url ? "live" : "waiting";
   by("live-state").dataset.kind = live.fault && !isPaused() ? (live.isUsable ? "ended" : "fault") : kind;
   setText(by("live-word"), { paused: "Paused", live: "Live", waiting: "Waiting" }[kind] ?? FAULTS[kind]);
-  const why = { paused: "", live: state.camera, waiting: state.camera, gone: `${live.fault?.text}. It is tried again and again.` }[kind];
+  const why = { paused: "", live: state.camera, waiting: state.camera, gone: `${live.fault?.text}. Connecting is retried.` }[kind];
   setText(by("live-why"), why ?? live.fault.text);
 }
 
@@ -231,7 +231,7 @@ function renderTrying() {
   const isAnswered = state.tryingLive && live.isUsable && live.detections && !live.failed;
   by("live-error").hidden = !state.tryingLive || !live.failed;
   setText(by("live-error"), live.failed ?? "");
-  const time = isAnswered ? `Looked for ${Math.max(1, Math.round(live.seconds * 1000))} ms.` : state.hasModel ? "Looking…" : "Teach a model first: it then looks for the part here.";
+  const time = isAnswered ? `Search took ${Math.max(1, Math.round(live.seconds * 1000))} ms.` : state.hasModel ? "Looking…" : "Teach a model first: it then looks for the part here.";
   setText(by("live-time"), live.failed || !state.tryingLive || (live.fault && !live.isUsable) ? "" : time);
   const told = isAnswered ? cards(live.detections) : [];
   const text = JSON.stringify(told);

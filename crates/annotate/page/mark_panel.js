@@ -109,7 +109,7 @@ function renderTodo() {
   offBecause(by("turn-to-fit"), noBox);
   offBecause(document.querySelector("#panel-mark [data-next=samples]"), noBox);
   by("grasp-numbers").hidden = !grasp;
-  offBecause(by("propose"), state.proposing ? "The outline is looked for" : noBox);
+  offBecause(by("propose"), state.proposing ? "The outline is being detected" : noBox);
   by("propose").lastChild.textContent = state.proposing ? "Looking…" : outline ? "Find it anew" : "Find it";
   if (!grasp) return;
   const { angle, width, length } = gripperOf(grasp);
@@ -170,15 +170,15 @@ function renderAdvice({ advice }) {
 
 function hint() {
   const { box, grasp, outline } = marks();
-  if (state.proposing) return "Looking for the outline…";
+  if (state.proposing) return "Detecting the outline…";
   if (state.tool === "box") return "Drag a box around the whole part";
-  if (state.tool === "grasp") return "Click the part where the gripper is to hold it";
+  if (state.tool === "grasp") return "Click the part where the gripper should hold it";
   if (state.tool === "outline") {
     const count = state.draft?.points?.length ?? 0;
     return count > 2 ? "Click the first point, or press Enter, to close" : "Click around the part, point by point";
   }
-  if (state.tool === "in") return "Click, or draw over, what belongs to the part and is left out";
-  if (state.tool === "out") return "Click, or draw over, what does not belong to the part: a shadow, the table";
+  if (state.tool === "in") return "Click or draw over missing areas of the part";
+  if (state.tool === "out") return "Click or draw over areas outside the part: a shadow, the table";
   if (state.selected === "grasp" && grasp) return "Drag between the jaws to move, a jaw to open, an end to turn";
   if (state.selected === "outline" && outline) return "Drag a point, or the line to add one; Del deletes";
   return box || grasp || outline ? "" : "Choose Box to begin";

@@ -116,12 +116,12 @@ export function renderRegion() {
   by("region-all").hidden = !region;
   const isOther = region?.picture && String(region.picture) !== String(size);
   by("region-text").textContent = isDrawing
-    ? "Drag over the part of the picture where parts are to be looked for."
+    ? "Drag over the region of the picture to be searched."
     : isOther
       ? `It is for pictures of ${region.picture.join(" × ")} pixels; this one has ${size.join(" × ")}.`
       : region
-        ? "Parts whose grasp and at least half of which lie in the frame are found. What is taught next searches there, too."
-        : "All of the picture is searched. A part of it is quicker, and nothing beside it is found.";
+        ? "Parts are found if their grasp and at least half of the part are in the frame. Models taught later search there, too."
+        : "The whole picture is searched. A smaller region is faster, but parts outside it are not found.";
   for (const id of ["region-draw", "region-all", "region-set"]) {
     offBecause(by(id), ["running", "stopping"].includes(state.teaching.status) && "A model is being taught");
   }

@@ -81,7 +81,7 @@ async function meetAgain() {
   belongTo(session);
   setLost(false);
   api.teaching().then((teaching) => Object.assign(state, { teaching }), () => null).then(changed);
-  if (gone.length) toast(`Not there any more: ${gone.join(", ")}.`);
+  if (gone.length) toast(`No longer there: ${gone.join(", ")}.`);
   if (state.images[state.current] !== shown || state.trialPictures[state.trial] !== tried) showCurrent();
   changed();
 }

@@ -48,7 +48,7 @@ async function remove(entries, target, { takeOut, putBack, open }) {
       }
     };
     const stays = entries === state.images ? " and its marks stay" : " stays";
-    toast(`${target.name} is taken out. Its file${stays} in the folder.`, { text: "Put it back", run: back });
+    toast(`${target.name} is removed. Its file${stays} in the folder.`, { text: "Put it back", run: back });
   } catch (error) {
     toast(error.message);
   }

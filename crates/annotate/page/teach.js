@@ -130,7 +130,7 @@ function renderProgress(news) {
   by("progress").hidden = news.status === "idle" || news.model === "S" && !isRunning();
   by("progress-title").textContent = {
     running: `Teaching ${news.of || `model ${news.model}`}`,
-    stopping: "Stopping, with what there is…",
+    stopping: "Stopping; the result so far is kept…",
     done: `Taught model ${news.model}`,
     failed: "Not taught",
   }[news.status] ?? "";
@@ -144,7 +144,7 @@ function renderProgress(news) {
   by("teach-stop").hidden = !isRunning();
   // Before anything was found there is nothing to keep.
   const keeps = news.validations.some(([, share]) => share >= 0.5);
-  by("teach-stop").textContent = keeps ? "Stop, and keep what there is" : "Stop; nothing is kept yet";
+  by("teach-stop").textContent = keeps ? "Stop and keep the result so far" : "Stop; nothing is kept yet";
   by("teach-stop").disabled = news.status === "stopping";
   renderCurve(news.losses);
   by("validations").replaceChildren(...news.validations.map(([step, share]) => {

@@ -130,7 +130,7 @@ function renderLearnt() {
   const again = state.trialPictures.filter(({ before, detections }) => typeof before === "number" && detections);
   const known = state.trialPictures.filter(({ before }) => typeof before === "number");
   let text = "";
-  if (isRunning() && state.tab === "try") text = "It learns from what you said…";
+  if (isRunning() && state.tab === "try") text = "It learns from your answers…";
   else if (known.length && again.length < known.length) text = `The new model looks at the pictures again: ${again.length} of ${known.length}…`;
   else if (known.length) {
     const count = (trial) => trial.detections.filter(isFound).length;
@@ -191,7 +191,7 @@ function card(detection, i, listed, shown) {
   item.append(text("p", placeText(detection), "pose"));
   const touching = touchText(detection, shown.detections, listed);
   if (touching) item.append(text("p", touching, "warning"));
-  if (!isFound(detection) && !refusal) item.append(text("p", "Why: it scores less than you ask for.", "why"));
+  if (!isFound(detection) && !refusal) item.append(text("p", "Why: its score is below the minimum.", "why"));
   if (refusal) {
     item.append(text("p", `Why: ${refusal.reason}.`, "why"));
     if (refusal.remedy) item.append(text("p", `What would help: ${refusal.remedy}.`));
@@ -220,7 +220,7 @@ function renderFound() {
   if (!shown.detections) return found.append(text("p", "Looking…"));
   const accepted = shown.detections.filter(isFound);
   const refused = shown.detections.length - accepted.length;
-  const time = `Looked for ${Math.max(1, Math.round(shown.seconds * 1000))} ms. `;
+  const time = `Search took ${Math.max(1, Math.round(shown.seconds * 1000))} ms. `;
   found.append(text("p", time + (accepted.length ? "" : "Nothing is accepted.")));
   if (shown.is_absent) {
     found.append(text("p", "You said that the part is not here: the next teaching uses this picture.", "note"),
@@ -230,7 +230,7 @@ function renderFound() {
   listed.forEach((detection, i) => found.append(card(detection, i, listed, shown)));
   if (shown.became !== null) {
     const index = state.images.findIndex((image) => image.id === shown.became);
-    found.append(text("p", `A demonstration now: ${state.images[index]?.name}.`), button("Look at its marks", () => {
+    found.append(text("p", `Now a demonstration: ${state.images[index]?.name}.`), button("Look at its marks", () => {
       openTab("mark");
       openImage(index);
     }), button("Teach again", teachAgain, "primary"));
@@ -242,10 +242,10 @@ function renderFound() {
     found.append(text("p", "If the part is there, mark it: it then learns from this picture, too."), button("Mark it by hand…", () => accept(nothing, { correct: true })));
   }
   if (shown.is_absent) found.append(button("Teach again", teachAgain, "primary"));
-  found.append(button("Take this picture out", () => removeTrialPicture(shown), "plain"));
+  found.append(button("Remove this picture", () => removeTrialPicture(shown), "plain"));
   const more = shown.detections.filter((d) => !isFound(d) && (state.showRefused || !isShown(d, shown))).length;
   if (refused && (more || state.showRefused)) {
-    const words = state.showRefused ? "Hide what was refused" : `Show what was refused (${more})`;
+    const words = state.showRefused ? "Hide refused parts" : `Show refused parts (${more})`;
     found.append(button(words, () => {
       state.showRefused = !state.showRefused;
       changed();

@@ -42,7 +42,7 @@ async function use(id) {
     const session = await api.useModel(id);
     Object.assign(state, { models: session.models, region: session.region, hasModel: true });
     for (const trial of [...state.trialPictures, state.live]) trial.detections = null;
-    toast("This version is used now, and stands under the model’s name.");
+    toast("This version is now in use, under the model’s name.");
   } catch (error) {
     toast(error.message);
   }

@@ -1,7 +1,8 @@
 //! Requests and their answers: JSON in, JSON out, errors as `{"error": "one line"}`.
 //!
-//! Pictures are known by numbers, which hold for one session. A request with the header `Sdg-Session` is answered only where that
-//! is the id in `GET /api/session`, with 412 otherwise: a page that outlived its server must not change another picture.
+//! Pictures have numbers, which are valid for one session. A request with the header `Sdg-Session` is answered only if
+//! its value is the id in `GET /api/session`, otherwise with 412: a page of an earlier server must not change another
+//! picture.
 //!
 //! | request | does |
 //! |---|---|
@@ -57,19 +58,19 @@ use crate::picture::MAX_PICTURE_BYTES;
 use crate::session::Session;
 use crate::views::SessionView;
 
-/// More than the marks of any hand; bounds what a request may make the server hold.
+/// Maximum size of a JSON body; bounds the memory that a request can use.
 const MAX_JSON_BYTES: usize = 1 << 20;
 
-/// Names the session that the numbers in a request belong to.
+/// Header with the session to which the numbers in a request belong.
 const SESSION_HEADER: &str = "sdg-session";
 
-/// How long the body of a request to `path` may be.
+/// Maximum size of the body of a request to `path`.
 pub fn max_body_bytes(path: &str) -> usize {
     let takes_picture = ["/api/trial-pictures", "/api/images", "/api/projects"].contains(&path);
     if takes_picture { MAX_PICTURE_BYTES as usize } else { MAX_JSON_BYTES }
 }
 
-/// Answers a request that the guard has let pass.
+/// Answers a request that has passed the guard.
 pub fn answer(desk: &Desk, request: &Request) -> Response {
     let head = &request.head;
     let session = desk.session();
