@@ -1,4 +1,4 @@
-// The first step's panel: what to mark next, in numbers too, what looks odd, and what it is enough for.
+// The first step's panel: the next mark, its numbers, problems, and the models that the marks suffice for.
 
 import { api } from "./api.js";
 import { offBecause } from "./buttons.js";
@@ -33,12 +33,12 @@ for (const button of document.querySelectorAll("[data-draw]")) {
 for (const button of document.querySelectorAll("[data-clear]")) {
   button.addEventListener("click", () => {
     clear(button.dataset.clear);
-    // The button goes with the mark; left alone, the focus would stay on it until the next frame, and take Enter.
+    // The button disappears with the mark; otherwise the focus would stay on it until the next frame and receive Enter.
     by("overlay").focus({ preventScroll: true });
   });
 }
 for (const kind of ["box", "grasp", "outline"]) {
-  // The way to a mark that lies under another one.
+  // Selects a mark that is under another one.
   by(`do-${kind}`).addEventListener("click", (event) => {
     if (event.target.closest("button, input") || !marks()[kind] || state.draft) return;
     Object.assign(state, { selected: kind, vertex: null, tool: "select" });
