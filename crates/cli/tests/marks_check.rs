@@ -111,7 +111,7 @@ fn other_objects_without_a_grasp_are_passed_over_in_teaching() {
     let marks = folder.text("marks.json", &file.to_string());
     let demonstration = format!("{}:{marks}", shipped("pendulum", "image.png").display());
     let (code, told) = run(&["teach", "--model", "S", "--demo", &demonstration, "--out", &folder.path("o.sdg")]);
-    assert!(code == Some(0) && told.contains("passed over `screw`, which has no grasp"), "{told}");
+    assert!(code == Some(0) && told.contains("skipped `screw`, which has no grasp"), "{told}");
 }
 
 #[test]
