@@ -88,7 +88,7 @@ pub struct ModelFinder<P> {
     camera: MountedCamera,
     perception: Perception,
     taken: Option<Instant>,
-    /// Whether detections are compared with the demonstration.
+    /// Whether detections are checked against the demonstration.
     verification: Verification,
     /// The last picture, and its detections, best first.
     last: Option<(RgbImage, Vec<Found>)>,
@@ -149,7 +149,7 @@ impl<P> ModelFinder<P> {
         }
     }
 
-    /// Sets whether detections are compared with the demonstration.
+    /// Sets whether detections are checked against the demonstration.
     pub fn with_verification(self, verification: Verification) -> Self {
         Self { verification, ..self }
     }

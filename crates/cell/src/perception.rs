@@ -205,7 +205,7 @@ impl Perception {
     }
 
     /// The part's size in a picture relative to its size in the photo; `None` if that is meaningless: with a calibrated
-    /// camera, or without the comparison.
+    /// camera, or without the check.
     pub fn size_of(&self, detection: &GraspDetection, picture_size: [u32; 2]) -> Option<f64> {
         match &self.view {
             View::AnyCamera(model) => model.size_of(detection, picture_size),

@@ -238,7 +238,7 @@ fn damaged_results_are_refused(shared: &str) {
     drop(lock);
     let lock = File::open(at(".lock")).unwrap();
     lock.lock().unwrap();
-    is_refused(&["another evaluation is at work in this folder"]);
+    is_refused(&["another evaluation is running in this folder"]);
     drop(lock);
     json(&evaluate(shared, &["--collect"]));
 }

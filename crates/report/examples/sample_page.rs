@@ -58,7 +58,7 @@ fn report() -> Result<Report, sdg_report::ReportError> {
         )
         .section(
             Section::new("This run")
-                .lead("Everything needed to see the same numbers again.")
+                .lead("Settings for reproducing the numbers.")
                 .facts([
                     ("object", "pendulum"),
                     ("grasp model", "C, 12 keypoints"),
@@ -95,7 +95,7 @@ fn demonstration() -> Section {
         Figure::photo(sample).alt(format!("augmented sample {idx}"))
     });
     Section::new("Demonstration")
-        .lead("What the person gave: a photograph, a box, an outline, and a line along which to grasp.")
+        .lead("Input from the person: a photograph, a box, an outline, and a line along which to grasp.")
         .gallery(
             GallerySize::Large,
             vec![

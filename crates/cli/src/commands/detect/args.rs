@@ -31,7 +31,7 @@ pub struct DetectArgs {
     /// Device for the network
     #[command(flatten)]
     pub compute: ComputeArgs,
-    /// Skip the comparison with the demonstration: the network alone decides and gives the poses
+    /// Skip the check against the demonstration: the network alone decides and gives the poses
     #[arg(long)]
     pub no_verify: bool,
     /// Maximum number of parts per image, highest scores first

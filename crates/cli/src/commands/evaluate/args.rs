@@ -54,7 +54,7 @@ pub struct EvaluateArgs {
     /// The grasp model to test, written by `sdg teach`
     #[arg(long, value_name = "FILE", requires = "pictures", help_heading = PICTURES)]
     pub grasp_model: Option<PathBuf>,
-    /// Skip the comparison with the demonstration: the network alone decides and gives the poses
+    /// Skip the check against the demonstration: the network alone decides and gives the poses
     #[arg(long, requires = "pictures", help_heading = PICTURES)]
     pub no_verify: bool,
     /// The calibrated camera that took the pictures, for a model taught with a camera: errors are also given in
@@ -99,7 +99,7 @@ pub struct EvaluateArgs {
     /// Number of pictures without the part for each part, for false alarms
     #[arg(long, default_value_t = 25, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub scenes: u32,
-    /// Also run every grasp without the comparison with the demonstration: this doubles the attempts
+    /// Also run every grasp without the check against the demonstration: this doubles the attempts
     #[arg(long)]
     pub unverified: bool,
     /// Evaluate pictures whose difficulty is raised along one axis at a time (height, tilt, covered, dark, blur, tint,

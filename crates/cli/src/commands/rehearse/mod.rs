@@ -45,7 +45,7 @@ pub struct RehearseArgs {
     /// The workcell's file, with places and obstacles
     #[arg(long, value_name = "FILE", requires = "place")]
     pub workcell: Option<PathBuf>,
-    /// Skip the comparison with the demonstration
+    /// Skip the check against the demonstration
     #[arg(long)]
     pub no_verify: bool,
     /// Folder for the report
