@@ -139,7 +139,7 @@ pub fn demonstration(model: &GraspModel, demonstrations: &[Demonstration], seed:
     let as_seen = match model.facts().lengths {
         None => "As the camera saw it.",
         Some(_) => {
-            "What the camera saw, as seen straight from above: turned so that x of the camera's frame points to the right."
+            "The camera's picture in the plan view: turned so that x of the camera's frame points to the right."
         }
     };
     let mut pictures = Vec::new();
@@ -168,8 +168,8 @@ pub fn demonstration(model: &GraspModel, demonstrations: &[Demonstration], seed:
                 "Samples that the network learnt from, all made from that photo: other backgrounds, light, blur, noise, \
                  things in the way. Scenes without a box lack the part, so that the model learns to reject."
             } else {
-                "What a network would learn from, all made from that photo: other backgrounds, light, blur, noise, \
-                 things in the way. Model S has none; it looks for the photo's part itself."
+                "Samples that a network would learn from, all made from that photo: other backgrounds, light, blur, noise, \
+                 things in the way. Model S has no network; it searches for the photo's part itself."
             },
         ))
 }
@@ -230,7 +230,7 @@ pub fn teaching(history: &History) -> Section {
             )
             .with_markers(),
         )
-        .caption("The network alone: what is left of its false alarms, the demonstration refuses.");
+        .caption("The network alone: its remaining false alarms are refused by the check against the demonstration.");
     Section::new("Teaching")
         .lead(format!(
             "{} steps in {:.0} s; the network with the best validation was kept.",

@@ -12,8 +12,8 @@ use crate::simulated::tables::{Titled, this_run};
 /// The shares at a glance, then all tables; `more` are additional tables.
 pub fn page(summary: &AxesSummary, more: Vec<Titled>, facts: &[(&str, String)], command: &str) -> Report {
     let mut report = Report::new("Axes and grasps under errors").kicker("Evaluation in simulation").lead(
-        "What the models find where one thing is harder than when they were taught, one axis at a time, and what they \
-         grasp where the robot is told something wrong. The paper's parts and the held-out ones stand apart.",
+        "Detections of the models in pictures with one difficulty at a time, and grasps with one error in the robot's settings. \
+         The paper's parts and the held-out ones are listed separately.",
     );
     for group in &summary.groups {
         for (model, figures) in worst_axes(group) {
