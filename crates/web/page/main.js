@@ -39,10 +39,10 @@ function wire() {
   element("refused").onchange = showCurrent;
   element("download").onclick = download;
   element("webgpu").onchange = changeDevice;
-  element("webgpu-choice").hidden = !navigator.gpu; // To pages served by https or from this very machine only.
+  element("webgpu-choice").hidden = !navigator.gpu; // Only for pages served by https or from this machine.
   watchWidth(element("stage"), showCurrent);
 
-  // Dropped anywhere: a model is told from a picture by its name.
+  // Dropped anywhere: models and pictures are distinguished by name.
   let depth = 0;
   const dropping = (change) => element("stage").classList.toggle("dropping", (depth += change) > 0);
   addEventListener("dragenter", () => dropping(1));
@@ -80,7 +80,7 @@ async function changeDevice() {
     complain("This browser provides no graphics card to the page; the processor is used.");
     return;
   }
-  generation += 1; // What the old worker still has to say is of no use.
+  generation += 1; // Results of the old worker are ignored.
   pictures.forEach(({ small }) => (small.textContent = "waiting"));
   const opened = modelOpen ? modelFile : null;
   modelOpen = false;

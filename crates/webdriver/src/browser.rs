@@ -149,7 +149,7 @@ impl Browser {
     /// The first element that matches a CSS selector.
     ///
     /// # Errors
-    /// It failed; there is no model.
+    /// No element matches.
     pub fn find(&self, selector: &str) -> Result<Element<'_>> {
         let found = self.post("/element", &json!({"using": "css selector", "value": selector}))?;
         Ok(Element { browser: self, id: text(&found[ELEMENT], "/element")? })
