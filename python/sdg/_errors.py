@@ -30,7 +30,7 @@ class RegionError(SdgError, ValueError):
 
 
 class TeachingError(SdgError, ValueError):
-    """A photo and marks that cannot be taught, or labels that cannot be used for an evaluation."""
+    """A photo or marks unsuitable for teaching, or labels that cannot be used for an evaluation."""
 
 
 class NothingToGrasp(SdgError, LookupError):

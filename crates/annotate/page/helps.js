@@ -45,7 +45,7 @@ async function ask({ key, candidates, refused }) {
       if (!scores) break;
       answers.push({ candidate, scores: scores.map(([, score]) => score) });
     } catch {
-      // Marks that cannot be taught: this candidate is skipped.
+      // Marks unsuitable for teaching: this candidate is skipped.
     }
     if (performance.now() - start > MAX_MS || question()?.key !== key) break;
   }

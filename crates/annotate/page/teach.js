@@ -179,7 +179,7 @@ function renderOutcome(news) {
 
 const chosen = (name) => document.querySelector(`[name=${name}]:checked`);
 
-/** A closed section shows its content in its title; the symmetry question is opened when the outline raises it. */
+/** A closed section shows its content in its title; the symmetry question is opened if the outline looks symmetric. */
 let [measured, turns, asked] = [null, 1, 1];
 function renderFolds() {
   const model = MODELS.find(([letter]) => letter === chosen("model").value);

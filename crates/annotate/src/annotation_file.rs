@@ -126,7 +126,7 @@ fn is_ours(bytes: &[u8]) -> bool {
 /// Writes the marks atomically. If nothing is marked and no file exists, no file is created.
 ///
 /// # Errors
-/// The marks cannot be taught, or the file cannot be written. Returns `Ok(false)` if there was nothing to write.
+/// The marks are unsuitable for teaching, or the file cannot be written. Returns `Ok(false)` if there was nothing to write.
 pub fn save(path: &Path, marks: &Marks, label: &str, picture: &str, size: [u32; 2]) -> Result<bool> {
     if !marks.has_object() && !path.exists() {
         return Ok(false);

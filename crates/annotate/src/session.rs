@@ -306,7 +306,7 @@ impl Session {
     /// A picture with its marks, in the form for teaching.
     ///
     /// # Errors
-    /// Unknown picture, no marks, or marks that cannot be taught.
+    /// Unknown picture, no marks, or marks unsuitable for teaching.
     pub fn demonstration(&self, id: usize) -> Result<Demonstration> {
         let (label, marked) = {
             let state = self.state();
@@ -318,7 +318,7 @@ impl Session {
     /// Sample `index` of `seed` of a marked picture as JPEG, with the transformed grasp drawn on it.
     ///
     /// # Errors
-    /// Unknown picture, or marks that cannot be taught.
+    /// Unknown picture, or marks unsuitable for teaching.
     pub fn sample(&self, id: usize, seed: u64, index: u64) -> Result<Vec<u8>> {
         let (label, marked) = {
             let state = self.state();

@@ -242,7 +242,7 @@ impl MarkedPicture {
     /// The picture with its marks, in the form for teaching.
     ///
     /// # Errors
-    /// No marks, or marks that cannot be taught.
+    /// No marks, or marks unsuitable for teaching.
     pub fn demonstration(&self, label: &str) -> Result<Demonstration> {
         let Self { picture, marks, .. } = self;
         let [width, height] = picture.size;

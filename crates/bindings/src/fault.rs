@@ -27,7 +27,7 @@ pub enum FaultKind {
     Camera = 5,
     /// A region that cannot be searched.
     Region = 6,
-    /// A photo and marks that cannot be taught.
+    /// A photo or marks unsuitable for teaching.
     Teaching = 7,
     /// No part to grasp.
     NothingToGrasp = 8,

@@ -37,7 +37,7 @@ pub struct Teaching {
 /// are rounded.
 ///
 /// # Errors
-/// Files cannot be read, photos and marks cannot be taught, or the teaching was ended before there was a model.
+/// Files cannot be read, photos or marks are unsuitable for teaching, or the teaching was ended before there was a model.
 pub fn teach(
     from: &Teaching,
     mut options: TeachOptions,

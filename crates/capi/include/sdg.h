@@ -53,7 +53,7 @@ typedef int32_t sdg_status;
 /* A region that is not inside the picture. */
 #define SDG_ERROR_REGION 6
 
-/* A photo and marks that cannot be taught. */
+/* A photo or marks unsuitable for teaching. */
 #define SDG_ERROR_TEACHING 7
 
 /* No part in the picture; only from sdg_detections_best. */

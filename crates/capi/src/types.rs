@@ -26,7 +26,7 @@ pub const SDG_ERROR_PICTURE: sdg_status = 4;
 pub const SDG_ERROR_CAMERA: sdg_status = 5;
 /// A region that is not inside the picture.
 pub const SDG_ERROR_REGION: sdg_status = 6;
-/// A photo and marks that cannot be taught.
+/// A photo or marks unsuitable for teaching.
 pub const SDG_ERROR_TEACHING: sdg_status = 7;
 /// No part in the picture; only from sdg_detections_best.
 pub const SDG_ERROR_NOTHING_TO_GRASP: sdg_status = 8;

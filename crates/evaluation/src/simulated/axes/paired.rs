@@ -9,7 +9,7 @@ const Z_TWO_SIDED_5_PERCENT: f64 = 1.959_963_984_540_054;
 /// 80 % quantile of the normal distribution.
 const Z_POWER_80_PERCENT: f64 = 0.841_621_233_572_914;
 
-/// Outcomes of cases tried by two: four counts.
+/// Outcomes of cases tried by two models: four counts.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct PairedCounts {
     /// Cases solved by both.
