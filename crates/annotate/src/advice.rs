@@ -143,7 +143,8 @@ fn about_grasp(marks: &Marks, max_opening_px: f64, remarks: &mut Vec<Remark>) {
         ));
     } else if marks.outline.is_some() && reach.left.max(reach.right) > half + JAW_SLACK_PX {
         if fitting > MAX_OPENING * gripper.narrowest(&part) {
-            let text = "The gripper lies along the part and would have to open more than twice as wide. Turn it across.";
+            let text =
+                "The gripper lies along the part and would have to open more than twice as wide. Turn it across.";
             remarks.push(remark("gripper_along", text, None));
             return;
         }

@@ -138,9 +138,7 @@ impl TeachingPage<'_> {
 pub fn demonstration(model: &GraspModel, demonstrations: &[Demonstration], seed: u64) -> Result<Section> {
     let as_seen = match model.facts().lengths {
         None => "As the camera saw it.",
-        Some(_) => {
-            "The camera's picture in the plan view: turned so that x of the camera's frame points to the right."
-        }
+        Some(_) => "The camera's picture in the plan view: turned so that x of the camera's frame points to the right.",
     };
     let mut pictures = Vec::new();
     for (at, Demonstration { image, annotation }) in demonstrations.iter().enumerate() {

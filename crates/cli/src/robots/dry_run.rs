@@ -33,7 +33,9 @@ pub(crate) fn print_plan(plan: &DryRun, is_seen: bool) -> Result<()> {
     match &plan.failed {
         None => eprintln!("  {:.0} s in all", plan.arm.duration_secs()),
         Some(_) if !is_seen => {
-            eprintln!("  the part is not visible from the arm's current posture: only the way to the look-out poses is planned");
+            eprintln!(
+                "  the part is not visible from the arm's current posture: only the way to the look-out poses is planned"
+            );
         }
         Some((step, why)) => return Err(anyhow!("{step}: {why}")),
     }
