@@ -100,7 +100,7 @@ function renderTodo() {
     item.classList.toggle("selected", kind === state.selected);
     item.querySelector(`[data-clear]`).hidden = !marks()[kind];
     const draw = item.querySelector(`[data-draw]`);
-    if (kind !== "outline") draw.textContent = marks()[kind] ? "Draw anew" : kind === "box" ? "Draw" : "Place";
+    if (kind !== "outline") draw.textContent = marks()[kind] ? "Draw again" : kind === "box" ? "Draw" : "Place";
   }
   by("turn-around").hidden = by("turn-to-fit").hidden = !grasp;
   by("remove-photo").hidden = state.images.length < 2;
@@ -110,7 +110,7 @@ function renderTodo() {
   offBecause(document.querySelector("#panel-mark [data-next=samples]"), noBox);
   by("grasp-numbers").hidden = !grasp;
   offBecause(by("propose"), state.proposing ? "The outline is being detected" : noBox);
-  by("propose").lastChild.textContent = state.proposing ? "Looking…" : outline ? "Find it anew" : "Find it";
+  by("propose").lastChild.textContent = state.proposing ? "Looking…" : outline ? "Find it again" : "Find it";
   if (!grasp) return;
   const { angle, width, length } = gripperOf(grasp);
   const numbers = { angle: (angle * 180) / Math.PI, width, length };

@@ -182,7 +182,7 @@ function card(detection, i, listed, shown) {
   title.append(text("span", `score ${detection.score.toFixed(2)}`, "score"));
   const row = text("div", "", "row");
   if (shown.became === null) {
-    const words = isFound(detection) ? "Right: learn from it" : "Right all the same: learn from it";
+    const words = isFound(detection) ? "Right: learn from it" : "Right after all: learn from it";
     row.append(button(words, () => accept(detection.marks, { correct: false })));
     row.append(button("Correct it…", () => accept(detection.marks, { correct: true }), "plain"));
   }

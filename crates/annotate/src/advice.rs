@@ -155,7 +155,7 @@ fn about_grasp(marks: &Marks, max_opening_px: f64, remarks: &mut Vec<Remark>) {
         let text = "The gripper is too narrow: a jaw would come down on the part. Open it.";
         remarks.push(remark("gripper_narrow", text, Some(Fix::JawWidth(fitting))));
     } else if marks.outline.is_some() && grasp.jaw_width > fitting * (1.0 + MAX_CLEARANCE) {
-        let text = "The jaws stand far from the part. Close them until they almost touch it.";
+        let text = "The jaws are far from the part. Close them until they almost touch it.";
         remarks.push(remark("gripper_wide", text, Some(Fix::JawWidth(fitting))));
     } else if grasp.jaw_width > max_opening_px {
         // With an outline the required opening is known; the box is wider than a part in an oblique direction.

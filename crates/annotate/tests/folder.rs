@@ -88,7 +88,7 @@ fn what_is_not_there_for_a_while_stays_in_the_project() {
     let served = Served::of_photo(folder, "rod.png");
     let without = session(&served);
     assert_eq!((names(&without["images"]), &without["trial_pictures"]), (vec!["rod.png"], &json!([])));
-    assert!(without["notes"][0].as_str().unwrap().starts_with("found.png is not there now"), "{}", without["notes"]);
+    assert!(without["notes"][0].as_str().unwrap().starts_with("found.png does not exist now"), "{}", without["notes"]);
     served.ask("PUT", "/api/label", b"{\"label\": \"rod\"}");
     let folder = served.end();
     std::fs::rename(&away, &there).unwrap();

@@ -148,7 +148,7 @@ fn a_picture_that_is_gone_is_told_and_the_rest_opens() {
     let folder = served.end();
     std::fs::remove_file(folder.path().join("tried/table.png")).unwrap();
     let again = get(&Served::of_project(folder));
-    assert_eq!(again["notes"], json!(["tried/table.png is not there now; the project goes on naming it."]));
+    assert_eq!(again["notes"], json!(["tried/table.png does not exist now; the project still names it."]));
     assert_eq!(again["images"].as_array().unwrap().len(), 1);
 }
 

@@ -157,7 +157,7 @@ fn the_header_says_what_the_library_exports() {
     let line = expected.lines().zip(found.lines()).find(|(expected, found)| expected != found);
     assert!(
         expected == found,
-        "include/sdg.h is not what the sources say, first at {line:?}: run this test with SDG_WRITE_HEADER=1"
+        "include/sdg.h differs from the sources, first at {line:?}: run this test with SDG_WRITE_HEADER=1"
     );
 }
 

@@ -75,7 +75,7 @@ fn a_batch_goes_on_past_what_cannot_be_read() {
         assert_eq!(line["detections"], lines[2]["detections"]);
     }
     let stderr = String::from_utf8(output.stderr).unwrap();
-    assert!(stderr.contains("skipped what is no picture: notes.txt"), "{stderr}");
+    assert!(stderr.contains("skipped files that are not pictures: notes.txt"), "{stderr}");
     assert!(stderr.contains("3 of 6 pictures could not be used"), "{stderr}");
     let summary = stderr.lines().find(|line| line.starts_with("found ")).expect("a summary");
     assert!(summary.ends_with(" of 3 pictures"), "{summary}");

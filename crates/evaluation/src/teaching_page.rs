@@ -212,7 +212,7 @@ pub fn teaching(history: &History) -> Section {
     let place = Chart::new("Held-back samples: place", Axis::new("step"), Axis::new("error").unit("px").from_zero())
         .series(Series::new("median", curve(|r| r.validation.median_error_px)).with_markers())
         .moment(kept, "kept")
-        .caption("The network alone, in pixels of the photo; before the demonstration is laid over.");
+        .caption("The network alone, in pixels of the photo; before the check against the demonstration.");
     let angle = Chart::new("Held-back samples: angle", Axis::new("step"), Axis::new("error").unit("°").from_zero())
         .series(Series::new("median", curve(|r| r.validation.median_error_degrees)).with_markers())
         .moment(kept, "kept");

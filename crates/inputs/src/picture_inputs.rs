@@ -91,7 +91,7 @@ pub fn pictures_of_argument(argument: &Path) -> Result<PictureInputs> {
         if others.len() > MAX_NAMED {
             names.push(format!("{} more", others.len() - MAX_NAMED));
         }
-        format!("{}: skipped what is no picture: {}", argument.display(), names.join(", "))
+        format!("{}: skipped files that are not pictures: {}", argument.display(), names.join(", "))
     });
     Ok(PictureInputs { pictures: pictures.into_iter().map(PictureInput::File).collect(), skipped })
 }
@@ -112,7 +112,7 @@ mod tests {
         let names: Vec<String> = inputs.pictures.iter().map(|input| input.drawn_name(&mut BTreeSet::new())).collect();
         assert_eq!(names, ["a.png", "b.png", "c.png", "phone.png"]);
         let skipped = inputs.skipped.unwrap();
-        assert!(skipped.ends_with("skipped what is no picture: a.json, more"), "{skipped}");
+        assert!(skipped.ends_with("skipped files that are not pictures: a.json, more"), "{skipped}");
         let empty = pictures_of_argument(&folder.path().join("more")).unwrap_err().to_string();
         assert!(empty.contains("expected pictures") && empty.contains("found 0 other"), "{empty}");
     }

@@ -36,7 +36,7 @@ pub fn check_is_not_turned(photo: &Path) -> Result<()> {
     if is_turned_by_exif(&read(photo, MAX_IMAGE_BYTES)?) {
         bail!(
             "{}: expected a photo of the calibrated camera that no Exif orientation turns, found one: a calibration knows the \
-             sensor's pixels; take the tag out (exiftool -Orientation= FILE), look whether the marks still fit, and mark it anew if not",
+             sensor's pixels; remove the tag (exiftool -Orientation= FILE), check whether the marks still fit, and mark it again if not",
             photo.display()
         );
     }

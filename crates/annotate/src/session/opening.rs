@@ -32,7 +32,7 @@ impl Session {
             None => (ProjectFile::default(), Gone::default()),
         };
         let mut notes: Vec<String> =
-            gone.names().map(|name| format!("{name} is not there now; the project goes on naming it.")).collect();
+            gone.names().map(|name| format!("{name} does not exist now; the project still names it.")).collect();
         let folder = place.as_ref().map_or(Path::new(""), |place| &place.folder).to_owned();
         let mut photos = options.images.clone();
         for name in &project.photos {

@@ -38,5 +38,5 @@ pub(crate) fn open(
     _options: &crate::OpenOptions,
 ) -> Result<Box<dyn crate::source::Source>, crate::CameraError> {
     let address = crate::Address::V4l(name.clone()).to_string();
-    Err(crate::CameraError::Open { address, why: "expected Linux, which alone has V4L2".to_owned() })
+    Err(crate::CameraError::Open { address, why: "expected Linux: V4L2 exists only there".to_owned() })
 }

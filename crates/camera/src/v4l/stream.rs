@@ -91,7 +91,7 @@ fn set_controls(device: &mut Device, options: &OpenOptions, address: &str) -> Re
         for (control, value) in values {
             let range = device.controls().map_while(Result::ok).find(|known| known.id() == control);
             let refused = |found: String| CameraError::Setting { address: address.to_owned(), setting, found };
-            let range = range.ok_or_else(|| refused(format!("none of V4L2's name {control:?}")))?;
+            let range = range.ok_or_else(|| refused(format!("no V4L2 control {control:?}")))?;
             if !(range.minimum()..=range.maximum()).contains(&value) {
                 let found = format!(
                     "that {} goes from {} to {}, not to {value}",

@@ -163,7 +163,7 @@ fn a_refused_one_says_why_and_is_learnt_from() {
     page.settle_frames();
     let found = page.text("#found");
     assert!(found.contains("Refused") && found.contains("Why:"), "{found}");
-    assert!(found.contains("Right all the same: learn from it") && found.contains("The part is not here"), "{found}");
+    assert!(found.contains("Right after all: learn from it") && found.contains("The part is not here"), "{found}");
     let dots = "return document.querySelectorAll('#overlay .differs path').length";
     assert!(page.browser.run(dots, &[]).unwrap().as_u64().unwrap() > 0, "where it differs is shown");
     page.screenshot("project-1-refused");

@@ -49,7 +49,7 @@ pub fn run(args: &AnnotateArgs) -> Result<Outcome> {
     let server = if args.images.is_empty() && args.from.is_none() {
         if args.out.is_some() || !args.trial_pictures.is_empty() {
             return Err(Usage(
-                "expected IMAGE or DIR with --out and --try, found none (without them, sdg annotate alone offers the projects)".into(),
+                "expected IMAGE or DIR with --out and --try, found none (without these options, sdg annotate lists the projects)".into(),
             )
             .into());
         }

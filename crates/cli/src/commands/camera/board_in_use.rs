@@ -56,7 +56,7 @@ impl BoardInUse {
 /// Parses `9x6`.
 pub fn squares(text: &str) -> Result<[u32; 2], String> {
     let sides = text.split_once('x').and_then(|(columns, rows)| Some([columns.parse().ok()?, rows.parse().ok()?]));
-    sides.ok_or_else(|| format!("expected squares across and up, such as 9x6, found {text}"))
+    sides.ok_or_else(|| format!("expected squares horizontally and vertically, such as 9x6, found {text}"))
 }
 
 /// The picture in grey, the input of board detection.

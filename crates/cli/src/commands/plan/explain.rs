@@ -56,7 +56,7 @@ impl Explained {
         let mut line = |what: String| writeln!(text, "  {what}").expect("writing to a string cannot fail");
         let (secs, num_motions) = (self.secs, self.num_motions);
         let motions = match num_motions {
-            0 => "the arm is there already, a motion".to_owned(),
+            0 => "the arm is at the goal already, a motion".to_owned(),
             1 => "one motion".to_owned(),
             _ => format!("{num_motions} motions"),
         };

@@ -84,7 +84,7 @@ pub fn markdown(summary: &CamerasSummary, facts: &[(&str, String)], command: &st
 /// The tables as a page.
 pub fn page(summary: &CamerasSummary, facts: &[(&str, String)], command: &str) -> Report {
     let mut report = Report::new("Calibrated cameras").kicker("Evaluation in simulation").lead(
-        "A part taught with one camera, found with others: what is found, and how exact its place is in millimetres.",
+        "A part taught with one camera, detected with others: detection rates, and position errors in millimetres.",
     );
     for row in summary.sets.iter().filter(|row| row.found.of > 0).take(3) {
         if let Some(errors) = row.errors {
