@@ -1,8 +1,8 @@
 //! `sdg camera calibrate --from`: takes pictures of the board automatically; a page shows which view is needed next.
 //!
 //! ```text
-//! camera ─ frame ─ find_board ─ PictureTaker: at rest, and new? ─ PNG in --taken ─ calibrate ─ what is lacking
-//!            └──────── corners, views, empty parts and words drawn on it ─ the page on 127.0.0.1
+//! camera ─ frame ─ find_board ─ PictureTaker: at rest, and new? ─ PNG in --taken ─ calibrate ─ what is missing
+//!            └──────── corners, views, empty parts and text drawn on it ─ the page on 127.0.0.1
 //! ```
 
 use std::path::{Path, PathBuf};
