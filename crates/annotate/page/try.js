@@ -162,7 +162,7 @@ async function setAbsent(target, absent) {
   try {
     Object.assign(target, await api.setAbsent(target.id, absent));
     state.models = (await api.session()).models;
-    toast(absent ? "Kept as a picture without the part. Teach again to learn from it." : "It is no picture without the part any more.");
+    toast(absent ? "Kept as a picture without the part. Teach again to learn from it." : "No longer used as a picture without the part.");
   } catch (error) {
     toast(error.message);
   }

@@ -113,7 +113,7 @@ fn about_outline(marks: &Marks, remarks: &mut Vec<Remark>) {
             } else {
                 let both =
                     [around.x1.min(bbox.x1), around.y1.min(bbox.y1), around.x2.max(bbox.x2), around.y2.max(bbox.y2)];
-                ("The outline reaches out of the box.", Some(Fix::Box(both)))
+                ("The outline extends beyond the box.", Some(Fix::Box(both)))
             };
             remarks.push(remark("outline_misses_box", text, fix));
         }

@@ -170,7 +170,7 @@ impl Teaching {
             let mut observe = |step| teaching.record(step, start, &mut pace);
             let taught = catch_unwind(AssertUnwindSafe(|| teacher.teach(&material, &request, &mut observe)));
             // Reported as an error, because a page that waits for the result would otherwise wait for ever.
-            let taught = taught.unwrap_or_else(|_| Err("teaching broke off inside; the terminal says more".into()));
+            let taught = taught.unwrap_or_else(|_| Err("teaching failed internally; the terminal says more".into()));
             let outcome = taught.map_err(Error::Teacher).and_then(|model| {
                 let written_to = keep(&*model)?;
                 let summary = model.summary();

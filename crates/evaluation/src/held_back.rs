@@ -191,7 +191,8 @@ impl HeldBackFigures {
         let errors = self.median_distance().zip(self.median_errors());
         let errors = errors.map(|((off, unit), [_, deg])| format!("; median {off:.1} {unit} and {deg:.1}°"));
         let others = self.others_in_photo;
-        let others = (others > 0).then(|| format!("; {others} further instances found in the photo were removed from the samples"));
+        let others = (others > 0)
+            .then(|| format!("; {others} further instances found in the photo were removed from the samples"));
         format!(
             "on {} held-back samples it finds {found} parts ({}), {} wrong; false alarms in {false_alarms} without the part ({}){}{}",
             self.samples,

@@ -20,7 +20,7 @@ pub fn read<T: DeserializeOwned>(what: &'static str, body: &[u8]) -> Result<T> {
 
 /// The response to an internal error.
 pub fn broken() -> Response {
-    Response::new(500, JSON, json!({"error": "this failed inside; the terminal says more"}).to_string().into_bytes())
+    Response::new(500, JSON, json!({"error": "internal error; the terminal says more"}).to_string().into_bytes())
 }
 
 pub fn json_of<T: Serialize>(outcome: Result<T>) -> Response {

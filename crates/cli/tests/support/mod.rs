@@ -69,7 +69,7 @@ pub fn taught_pendulum(out: impl AsRef<Path>, camera: Option<&Path>) {
     fs::copy(&model, out).unwrap();
 }
 
-/// The pendulum's photo with a second copy of the part, cut out along its marked outline and shifted by [dx, dy]
+/// The pendulum's photo with a second copy of the part, cut out along its marked outline and shifted by `[dx, dy]`
 /// pixels.
 pub fn pendulum_twice([dx, dy]: [i64; 2]) -> RgbImage {
     let mut picture = image::open(shipped("pendulum", "image.png")).unwrap().into_rgb8();
