@@ -1,6 +1,6 @@
 //! The table of crates in ARCHITECTURE.md.
 
-/// A row of the table: a crate, and those of the workspace's crates that it says the crate sees.
+/// A row of the table: a crate, and the workspace's crates that it depends on.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CrateRow {
     /// The crate's name without the prefix `sdg-`.
@@ -9,7 +9,7 @@ pub struct CrateRow {
     pub sees: Vec<String>,
 }
 
-/// The rows of the table whose head is `| crate | holds | sees |`, in their order.
+/// The rows of the table with the header `| crate | holds | sees |`, in order.
 pub fn crate_rows(document: &str) -> Vec<CrateRow> {
     let mut lines = document.lines().skip_while(|line| cells(line) != ["crate", "holds", "sees"]);
     lines.next();
@@ -25,7 +25,7 @@ fn cells(line: &str) -> Vec<&str> {
     line.trim().trim_matches('|').split('|').map(str::trim).collect()
 }
 
-/// What stands between backticks.
+/// The texts between backticks.
 pub fn names_in_code(text: &str) -> Vec<String> {
     text.split('`').skip(1).step_by(2).map(str::to_owned).collect()
 }

@@ -1,6 +1,6 @@
-//! Links, headings and named paths of a Markdown document.
+//! Links, headings and paths in a Markdown document.
 
-/// The targets of the links and pictures of a document, without titles; what stands in code is none.
+/// The targets of a document's links and pictures, without titles; code is skipped.
 pub fn links(document: &str) -> Vec<String> {
     let mut targets = Vec::new();
     for line in lines_outside_code(document) {
@@ -16,8 +16,8 @@ pub fn links(document: &str) -> Vec<String> {
     targets
 }
 
-/// The anchors of a document's headings, as GitHub and GitLab form them: lower case, spaces as hyphens, only letters, digits,
-/// hyphens and underscores.
+/// The anchors of a document's headings in the form of GitHub and GitLab: lower case, spaces as hyphens, only letters,
+/// digits, hyphens and underscores.
 pub fn headings(document: &str) -> Vec<String> {
     let slug = |title: &str| {
         let kept = title.trim().chars().filter(|c| c.is_alphanumeric() || matches!(c, ' ' | '-' | '_'));
@@ -29,7 +29,7 @@ pub fn headings(document: &str) -> Vec<String> {
         .collect()
 }
 
-/// Words of a document that begin with one of `folders` and a slash: paths from the repository's root. Those with a
+/// Words of a document that begin with one of `folders` and a slash: paths from the repository's root. Paths with a
 /// placeholder (`*`, `…`, `<`) are left out.
 pub fn named_files(document: &str, folders: &[&str]) -> Vec<String> {
     let is_end = |c: char| c.is_whitespace() || matches!(c, '`' | '(' | ')' | '[' | ']' | '|' | '"' | ',' | ';');

@@ -1,4 +1,4 @@
-//! Which file of a crate imports from which.
+//! The imports between the files of a crate.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -10,8 +10,9 @@ use crate::source_text::{code_of, modules_for_tests};
 /// A module's path from the crate's root, which is empty.
 type ModulePath = Vec<String>;
 
-/// Files of one crate and what they import, without those that are compiled for tests only. A module's `pub use` of its own child is no import, unless the module also uses
-/// that name itself. What another file takes through such a re-export, it imports from where it is defined.
+/// The files of one crate and their imports, without files compiled only for tests. A module's `pub use` of its own
+/// child is not an import, unless the module also uses that name itself. A name imported through such a re-export
+/// counts as imported from its definition.
 #[derive(Debug, Default)]
 pub struct ModuleGraph {
     files: BTreeMap<ModulePath, String>,
@@ -22,7 +23,7 @@ impl ModuleGraph {
     /// The graph of all `.rs` files below a crate's `src`.
     ///
     /// # Errors
-    /// A folder or file that cannot be read.
+    /// A folder or file cannot be read.
     pub fn read(src: &Path) -> io::Result<Self> {
         let mut sources = Vec::new();
         let mut folders = vec![src.to_owned()];
@@ -40,10 +41,10 @@ impl ModuleGraph {
         Ok(Self::new(sources.iter().map(|(name, source)| (name.as_str(), source.as_str()))))
     }
 
-    /// The graph of an example: its file, those of the folder of its name, and those of folders that are modules.
+    /// The graph of an example: its file, the files in the folder of its name, and those of folders that are modules.
     ///
     /// # Errors
-    /// A folder or file that cannot be read.
+    /// A folder or file cannot be read.
     pub fn read_example(file: &Path) -> io::Result<Self> {
         let mut sources = vec![("main.rs".to_owned(), fs::read_to_string(file)?)];
         let mut add = |folder: &Path, prefix: &str| -> io::Result<()> {
@@ -57,7 +58,7 @@ impl ModuleGraph {
             Ok(())
         };
         add(&file.with_extension(""), "")?;
-        // Modules that several examples have.
+        // Modules shared by several examples.
         for entry in fs::read_dir(file.parent().unwrap_or(file))? {
             let path = entry?.path();
             if path.join("mod.rs").is_file() {
@@ -67,7 +68,7 @@ impl ModuleGraph {
         Ok(Self::new(sources.iter().map(|(name, source)| (name.as_str(), source.as_str()))))
     }
 
-    /// The graph of sources given with their paths below `src`, with `/` between folders.
+    /// The graph of sources given with their paths below `src`, with `/` as separator.
     pub fn new<'a>(sources: impl IntoIterator<Item = (&'a str, &'a str)>) -> Self {
         let mut files = BTreeMap::new();
         let mut codes = BTreeMap::new();
@@ -112,7 +113,7 @@ impl ModuleGraph {
         graph
     }
 
-    /// The path from the crate's root of what `module` calls `segments`; `None` for what is not of this crate.
+    /// The path from the crate's root of `segments` in `module`; `None` if it is not in this crate.
     fn absolute(&self, module: &ModulePath, segments: &[String]) -> Option<ModulePath> {
         let mut base = module.clone();
         let mut rest = segments;
@@ -142,9 +143,9 @@ impl ModuleGraph {
         Some(base)
     }
 
-    /// The module that defines what `path` names, through re-exports.
+    /// The module that defines the item at `path`, followed through re-exports.
     fn home_of(&self, mut path: ModulePath, exports: &BTreeMap<(ModulePath, String), ModulePath>) -> ModulePath {
-        // As many re-exports in a row as there can be without going round.
+        // The maximum number of consecutive re-exports without a cycle.
         for _ in 0..=exports.len() {
             let depth =
                 (0..=path.len()).rev().find(|&depth| self.files.contains_key(&path[..depth])).unwrap_or_default();
@@ -158,8 +159,8 @@ impl ModuleGraph {
         path
     }
 
-    /// Groups of files each of which imports, directly or through others, from every other of its group. The files of a
-    /// group, and the groups, are sorted.
+    /// Groups of files in which each file imports, directly or indirectly, from every other one. The files of a group,
+    /// and the groups, are sorted.
     pub fn cycles(&self) -> Vec<Vec<String>> {
         let reached: BTreeMap<&ModulePath, BTreeSet<&ModulePath>> =
             self.files.keys().map(|module| (module, self.reached_from(module))).collect();
@@ -183,8 +184,9 @@ impl ModuleGraph {
         groups
     }
 
-    /// Groups of a folder's direct entries, files or folders, that import from each other: a folder stands for all files in it, so that two
-    /// folders are seen to form a circle though no two files do. Each group is sorted and written with the folder's path.
+    /// Groups of a folder's direct entries, files or folders, that import from each other. A folder represents all
+    /// files in it, so two folders may form a cycle even if no two files do. Each group is sorted and written with the
+    /// folder's path.
     pub fn folder_cycles(&self) -> Vec<Vec<String>> {
         let folders: BTreeSet<&[String]> =
             self.files.keys().flat_map(|module| (0..module.len()).map(|depth| &module[..depth])).collect();
@@ -207,7 +209,7 @@ impl ModuleGraph {
         groups
     }
 
-    /// The imports among entries of one group of [`Self::folder_cycles`], a line each.
+    /// The imports among the entries of a group of [`Self::folder_cycles`], one per line.
     pub fn imports_between(&self, group: &[String]) -> String {
         let entry = |module: &ModulePath| {
             group.iter().find(|entry| {
@@ -226,7 +228,7 @@ impl ModuleGraph {
         lines
     }
 
-    /// The imports among the files of one group, a line each.
+    /// The imports among the files of a group, one per line.
     pub fn imports_within(&self, group: &[String]) -> String {
         let mut lines = String::new();
         for (module, imported) in &self.imports {

@@ -1,21 +1,21 @@
-//! The paths that a Rust source names: those of its `use` declarations, and those written out in its code.
+//! The paths in a Rust source: those of its `use` declarations, and those in its code.
 
-/// A path that a file names.
+/// A path in a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NamedPath {
-    /// Its segments, as written: the first may be `crate`, `super`, `self`, a module or a crate.
+    /// Its segments as written: the first may be `crate`, `super`, `self`, a module or a crate.
     pub segments: Vec<String>,
-    /// The name that a `pub use` gives it; `None` for other uses.
+    /// The name under which a `pub use` exports it; `None` for other uses.
     pub exported_as: Option<String>,
 }
 
-/// All paths of `code`, which has neither comments nor strings.
+/// All paths in `code`, from which comments and strings were removed.
 pub fn named_paths(code: &str) -> Vec<NamedPath> {
     let tokens = tokens(code);
     let mut paths = Vec::new();
     let mut i = 0;
     while i < tokens.len() {
-        // `use<'a>` says what a type captures.
+        // `use<'a>` lists captured lifetimes.
         if tokens[i] == "use" && tokens.get(i + 1) != Some(&"<") {
             let is_public = is_public(&tokens[..i]);
             i = read_use_tree(&tokens, i + 1, &[], is_public, &mut paths);
@@ -36,7 +36,7 @@ pub fn named_paths(code: &str) -> Vec<NamedPath> {
     paths
 }
 
-/// Whether `word` stands in `code` outside declarations of uses and modules.
+/// Whether `word` occurs in `code` outside declarations of uses and modules.
 pub fn mentions(code: &str, word: &str) -> bool {
     let mut is_declaration = false;
     tokens(code).into_iter().any(|token| {
@@ -60,7 +60,7 @@ fn is_public(before: &[&str]) -> bool {
     }
 }
 
-/// Reads one tree of a `use` from `start`; returns where it ends.
+/// Reads one tree of a `use` from `start`; returns its end.
 fn read_use_tree(
     tokens: &[&str],
     start: usize,

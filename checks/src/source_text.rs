@@ -1,13 +1,13 @@
-//! Rust source without what is no code: comments, strings, and items under `#[cfg(test)]`.
+//! Rust source without comments, contents of strings, and items under `#[cfg(test)]`.
 
 use std::collections::BTreeSet;
 
-/// `source` without comments, contents of strings and characters, and items that are compiled for tests only.
+/// `source` without comments, contents of strings and characters, and items compiled only for tests.
 pub fn code_of(source: &str) -> String {
     without_test_items(&without_comments_and_strings(source))
 }
 
-/// The modules with files of their own that `source` declares for tests only.
+/// The modules with their own files that `source` declares only for tests.
 pub fn modules_for_tests(source: &str) -> BTreeSet<String> {
     let code = without_comments_and_strings(source);
     let declared = code.split(TEST_MARK).skip(1).filter_map(|item| {
@@ -18,7 +18,7 @@ pub fn modules_for_tests(source: &str) -> BTreeSet<String> {
     declared.collect()
 }
 
-/// What marks an item that is compiled for tests only.
+/// The attribute of items that are compiled only for tests.
 const TEST_MARK: &str = "#[cfg(test)]";
 
 fn without_comments_and_strings(source: &str) -> String {
@@ -47,7 +47,7 @@ fn without_comments_and_strings(source: &str) -> String {
                 i += 1;
                 code.push_str("\"\"");
             }
-            // A character; otherwise it is a lifetime.
+            // A character literal; otherwise it is a lifetime.
             ('\'', '\\') => {
                 i += 3;
                 i += text[i.min(text.len())..].iter().take_while(|&&c| c != '\'').count() + 1;
@@ -78,7 +78,7 @@ fn end_of_block_comment(text: &[char], start: usize) -> usize {
     i
 }
 
-/// The number of `#` if a raw string begins at `start`, where an `r` stands.
+/// The number of `#` if a raw string begins at `start`, the position of an `r`.
 fn raw_string_hashes(text: &[char], start: usize) -> Option<usize> {
     let hashes = text[start + 1..].iter().take_while(|&&c| c == '#').count();
     (text.get(start + 1 + hashes) == Some(&'"')).then_some(hashes)
@@ -96,7 +96,7 @@ fn without_test_items(code: &str) -> String {
     kept
 }
 
-/// The length of the item that `code` begins with: up to a `;` outside braces or to the brace that closes the first.
+/// The length of the first item in `code`: up to a `;` outside braces, or to the brace that closes the first one.
 fn item_length(code: &str) -> usize {
     let mut depth = 0_usize;
     for (i, character) in code.char_indices() {

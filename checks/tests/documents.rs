@@ -1,4 +1,5 @@
-//! Links of documents lead somewhere, files that they name exist, no merge has left its marks, and ARCHITECTURE.md's table says what cargo says.
+//! Links and named files in documents exist, no merge conflict markers remain, and ARCHITECTURE.md's table agrees with
+//! cargo.
 #![allow(missing_docs, clippy::unwrap_used)]
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -8,7 +9,7 @@ use std::process::Command;
 
 use sdg_checks::{crate_rows, headings, links, named_files, names_in_code};
 
-/// Folders of the repository whose files documents name by their path.
+/// Folders of the repository whose files are named by path in documents.
 const FOLDERS: [&str; 11] = [
     "benches",
     "checks",
@@ -27,7 +28,7 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..").canonicalize().unwrap()
 }
 
-/// What git tracks of a kind, as paths from the root.
+/// The tracked files that match a pattern, as paths from the root.
 fn tracked(pattern: &str) -> Vec<String> {
     let output = Command::new("git")
         .args(["ls-files", "--cached", "--others", "--exclude-standard", "--", pattern])
@@ -41,7 +42,7 @@ fn tracked(pattern: &str) -> Vec<String> {
     files.into_iter().filter(|file| root().join(file).exists()).collect()
 }
 
-/// Documents and scripts with such lines still pass what compiles and runs.
+/// Conflict markers in documents and scripts are not found by compiling and running.
 #[test]
 fn no_merge_has_left_its_marks() {
     let marks = ["<", ">"].map(|mark| format!("{} ", mark.repeat(7)));
@@ -49,7 +50,7 @@ fn no_merge_has_left_its_marks() {
     for file in
         ["*.md", "*.rs", "*.toml", "*.py", "*.sh", "*.html", "*.css", "*.js"].iter().flat_map(|kind| tracked(kind))
     {
-        // What is not UTF-8 is no text that is merged by lines.
+        // Files that are not UTF-8 are not merged by lines.
         let Ok(text) = fs::read_to_string(root().join(&file)) else { continue };
         let lines =
             text.lines().enumerate().filter(|(_, line)| marks.iter().any(|mark| line.starts_with(mark.as_str())));
@@ -89,7 +90,7 @@ fn files_that_documents_name_exist() {
     for document in tracked("*.md") {
         let path = root().join(&document);
         for file in named_files(&fs::read_to_string(&path).unwrap(), &FOLDERS) {
-            // From the repository's root, or from the document's own folder.
+            // Relative to the repository's root, or to the document's own folder.
             if !root().join(&file).exists() && !path.with_file_name(&file).exists() {
                 faults.push(format!("{document}: no file {file}"));
             }
@@ -98,7 +99,7 @@ fn files_that_documents_name_exist() {
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
-/// Dependencies by crate, without those of tests and builds; names without `sdg-`.
+/// Dependencies by crate, without those for tests and builds; names without `sdg-`.
 fn dependencies() -> BTreeMap<String, BTreeSet<String>> {
     let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".to_owned());
     let arguments = ["metadata", "--no-deps", "--offline", "--format-version", "1"];

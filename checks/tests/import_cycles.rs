@@ -1,4 +1,5 @@
-//! No file of a crate imports from another that imports from it, directly or through others; nor does any folder.
+//! No file of a crate imports from another one that imports from it, directly or indirectly; the same holds for
+//! folders.
 #![allow(missing_docs, clippy::unwrap_used)]
 
 use std::fs;

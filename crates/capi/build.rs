@@ -1,4 +1,4 @@
-//! The shared library's name for the loader: its number is `SDG_ABI_VERSION`.
+//! Sets the soname of the shared library; its number is `SDG_ABI_VERSION`.
 
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");

@@ -1,11 +1,11 @@
-"""Teach a robot a grasp from one photo; find it in pictures, in pixels and in metres.
+"""Teach a robot a grasp from one photo, and detect it in pictures, in pixels and in metres.
 
     model = sdg.teach("part.png", "part.json", model="S")
     best = model.detect(sdg.read_picture("table.png")).best
     print(best.grasp.x, best.grasp.y, best.grasp.angle_deg)
 
-Arrays are numpy's, uint8, of shape (height, width, 3), or (height, width) for grey, with any strides; they are copied once, and Python's
-other threads run while something is computed. Lengths are metres and angles degrees where names say so.
+Arrays are numpy arrays of dtype uint8 and shape (height, width, 3), or (height, width) for grey, with any strides. They are
+copied once, and the GIL is released during computations. Units are in the names: metres (`_m`), degrees (`_deg`).
 """
 
 import json
@@ -87,7 +87,7 @@ class Camera:
 
     @classmethod
     def load(cls, path: _Path) -> "Camera":
-        """Reads ROS's camera_info YAML with the camera's pose (`table:`), as `sdg camera calibrate` and `sdg camera table` write it.
+        """Reads ROS camera_info YAML with the camera's pose (`table:`), written by `sdg camera calibrate` and `sdg camera table`.
 
         Raises FileError and CameraError.
         """
@@ -95,7 +95,7 @@ class Camera:
 
     @classmethod
     def from_yaml(cls, text: str) -> "Camera":
-        """The same from the file's text. Raises CameraError."""
+        """The same from the text of a file. Raises CameraError."""
         return cls(_native.Camera.from_yaml(text))
 
     @property
@@ -110,7 +110,7 @@ class Camera:
 
 
 class GraspModel:
-    """A taught part. Threads may share it."""
+    """A model of a taught part. It can be shared between threads."""
 
     def __init__(self, native: _native.Model) -> None:
         self._native = native
@@ -121,7 +121,7 @@ class GraspModel:
         return cls(_native.Model.load(path))
 
     def save(self, path: _Path) -> None:
-        """Writes the model's file, whole or not at all, over a grasp model or nothing. Raises FileError."""
+        """Writes the model's file atomically; it replaces only an existing grasp model. Raises FileError."""
         self._native.save(path)
 
     @property
@@ -143,17 +143,17 @@ class GraspModel:
         threads: Optional[int] = None,
         min_score: float = 0.5,
     ) -> Detections:
-        """Finds the part in a picture.
+        """Detects the part in a picture.
 
         array: uint8 of shape (height, width, 3), or (height, width) for grey; any strides.
-        channels: "rgb", or "bgr" for OpenCV's arrays.
+        channels: "rgb", or "bgr" for arrays of OpenCV.
         camera: the calibrated camera that took it, for poses in metres; the model must have been taught with one.
-        region: (left, upper, width, height) in pixels, "all", or None for the one that the model was taught with.
-        threads: threads that compute; None for as many as there are cores.
-        min_score: detections that score less are in `.refused` of what is returned.
+        region: (left, upper, width, height) in pixels, "all", or None for the region that the model was taught with.
+        threads: number of threads; None for one per core.
+        min_score: minimum score of accepted detections; the others are in `.refused` of the result.
 
-        Raises PictureError, CameraError, RegionError and ArgumentError. A picture without the part gives an empty list, whose `.best` raises
-        NothingToGrasp.
+        Raises PictureError, CameraError, RegionError and ArgumentError. For a picture without the part, the list is empty, and
+        its `.best` raises NothingToGrasp.
         """
         if not 0 <= min_score <= 1:
             raise ArgumentError(f"expected min_score from 0 to 1, found {min_score}")
@@ -167,7 +167,7 @@ class GraspModel:
 
 
 class Tracker:
-    """Follows parts from frame to frame; searches run on a thread of their own. A context manager, which closes it."""
+    """Tracks parts from frame to frame; searches run on a separate thread. As a context manager it closes itself."""
 
     def __init__(
         self,
@@ -179,8 +179,8 @@ class Tracker:
     ) -> None:
         """camera, region and threads are those of `GraspModel.detect`.
 
-        search_frames: what a search found is known so many frames later, for results that are the same on every machine; None for as
-        soon as it has ended.
+        search_frames: number of frames after which the result of a search is used, for results that are the same on every
+        machine; None to use it as soon as the search has ended.
         """
         if search_frames is not None:
             search_frames = _whole("search_frames", search_frames, 0, _MAX_SEARCH_FRAMES)
@@ -189,17 +189,17 @@ class Tracker:
         )
 
     def frame(self, array: _Array, captured_s: float, channels: str = "rgb") -> list[TrackedPart]:
-        """The parts in the next frame, lost ones too.
+        """The parts in the next frame, including lost ones.
 
-        array, channels: as in `GraspModel.detect`; captured_s: seconds since any moment that is the same for all frames.
+        array, channels: as in `GraspModel.detect`; captured_s: seconds since any fixed time.
 
-        Raises ClosedError after `close`, and what `GraspModel.detect` raises.
+        Raises ClosedError after `close`, and the exceptions of `GraspModel.detect`.
         """
         records = json.loads(self._native.frame(_checked(array), channels, captured_s))
         return [TrackedPart.of(record) for record in records]
 
     def close(self) -> None:
-        """Ends it; waits for a search that is running."""
+        """Closes the tracker; waits for a running search."""
         self._native.close()
 
     def __enter__(self) -> "Tracker":
@@ -210,9 +210,9 @@ class Tracker:
 
 
 def read_picture(path: _Path, camera: Optional[Camera] = None) -> _Array:
-    """Reads PNG, JPEG, WebP, BMP or TIFF as the program does: uint8 of shape (height, width, 3), red first.
+    """Reads PNG, JPEG, WebP, BMP or TIFF like the program: uint8 of shape (height, width, 3), red first.
 
-    camera: where a calibrated camera took it, pixels stay as its sensor has them; else the picture is turned upright (Exif).
+    camera: the calibrated camera that took the picture, which keeps the sensor's orientation; None: upright (Exif).
 
     Raises FileError and PictureError.
     """
@@ -237,17 +237,18 @@ def teach(
     grasp_height_mm: Optional[float] = None,
     negatives: Sequence[_Path] = (),
 ) -> GraspModel:
-    """Teaches a model from one photo, with the defaults of `sdg teach`. Ctrl-C ends it.
+    """Teaches a model from one photo, with the defaults of `sdg teach`. Ctrl-C ends the teaching.
 
-    photo: a picture's file.
-    marks: a file of marks (COCO, LabelMe, YOLO-pose), or what such a JSON file holds, as a dictionary.
-    model: S, ready in seconds, or A, B, C or D, which have a network and take minutes.
-    steps, time_budget_s: bounds of the network's training.
-    symmetry: how often the part looks the same in a whole turn, or "full".
-    size_tolerance: smallest and largest size in a picture over that in the photo.
+    photo: the file of the photo.
+    marks: a file of marks (COCO, LabelMe, YOLO-pose), or the contents of such a JSON file as a dictionary.
+    model: S, which takes seconds, or A, B, C or D, which have a network and take minutes.
+    steps, time_budget_s: maximum steps and seconds of the network's training.
+    symmetry: number of turns, within a full rotation, in which the part looks the same, or "full".
+    size_tolerance: smallest and largest size of the part in a picture, relative to its size in the photo.
     region: (left, upper, width, height) in pixels of the photo.
-    camera: the file of the calibrated camera that took the photo, for grasps in metres; then mark_height_mm is the height of the marks over
-    the table and grasp_height_mm that of the grasp, half of it without.
+    camera: the file of the calibrated camera that took the photo, for grasps in metres.
+    mark_height_mm, grasp_height_mm: heights over the table of the marks and of the grasp, with a camera; grasp_height_mm defaults
+    to half of mark_height_mm.
     negatives: files of pictures without the part.
 
     Raises FileError, PictureError, TeachingError, CameraError, RegionError and ArgumentError.
@@ -311,11 +312,11 @@ def evaluate(
     min_score: float = 0.5,
     report: Optional[_Path] = None,
 ) -> dict[str, Any]:
-    """Counts a model on a folder of labelled pictures: the figures of `sdg evaluate --pictures --json`.
+    """Evaluates a model on a folder of labelled pictures: the figures of `sdg evaluate --pictures --json`.
 
-    report: a folder for a page with every picture; none is kept without.
+    report: a folder for a page with every picture; None for no page.
 
-    Raises TeachingError for labels that cannot be counted on, and what `GraspModel.detect` raises.
+    Raises TeachingError for invalid labels, and the exceptions of `GraspModel.detect`.
     """
     with tempfile.TemporaryDirectory() as unkept:
         figures: dict[str, Any] = json.loads(
@@ -340,14 +341,14 @@ def _native_of(camera: Optional[Camera]) -> Optional[_native.Camera]:
 
 
 def _checked(array: Any) -> _Array:
-    """A numpy array of numpy's own class, without a copy."""
+    """The array as exactly numpy.ndarray, without a copy."""
     if not isinstance(array, np.ndarray):
         raise PictureError(f"expected a numpy.ndarray, found {type(array).__name__}")
     return np.asarray(array)
 
 
 def _checked_region(region: _Region) -> Any:
-    """None, True for all of a picture, or four numbers."""
+    """None, True for the whole picture, or four numbers."""
     if region is None:
         return None
     if isinstance(region, str):
@@ -372,7 +373,7 @@ def _checked_threads(threads: Optional[int]) -> Optional[int]:
 
 
 def _whole(name: str, value: int, least: int, most: int) -> int:
-    """A whole number of any of Python's or numpy's types, within bounds."""
+    """An integer of any type of Python or numpy, within bounds."""
     try:
         number = index(value)
     except TypeError:

@@ -7,7 +7,7 @@ from . import _native
 
 
 def main() -> int:
-    """Runs `sdg` with this process's arguments; its exit code."""
-    # Ctrl-C ends the program as it ends any other; Python would wait for its own code to go on.
+    """Runs `sdg` with this process's arguments and returns its exit code."""
+    # Ctrl-C ends the program like any other; Python would only react when its own code continues.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     return _native.run_command(["sdg", *sys.argv[1:]])

@@ -1,4 +1,4 @@
-"""What is found in a picture, under the names of `sdg detect --json`."""
+"""Detections in a picture, with the field names of `sdg detect --json`."""
 
 from dataclasses import dataclass, field
 from typing import Any, Optional
@@ -8,7 +8,7 @@ from ._errors import NothingToGrasp
 
 @dataclass(frozen=True)
 class Grasp:
-    """Where the gripper closes, in pixels of the picture: x right, y down, the middle of the first pixel at (0.5, 0.5)."""
+    """Position of the grasp, in pixels of the picture: x right, y down, the centre of the first pixel at (0.5, 0.5)."""
 
     x: float
     y: float
@@ -20,38 +20,38 @@ class Grasp:
 
 @dataclass(frozen=True)
 class Pose:
-    """Where the gripper closes, in metres and degrees of the camera's frame."""
+    """Pose of the grasp in the frame of the camera's file, in metres and degrees."""
 
     frame: str
-    """"table" or "base", as the camera's file says."""
+    """"table" or "base", as given in the camera's file."""
     p_m: tuple[float, float, float]
     yaw_deg: float
-    """Turn about the frame's z, right-handed."""
+    """Rotation about the frame's z, right-handed."""
     opening_m: float
     sigma_mm: float
-    """The position lies within this with a probability of 68 %."""
+    """The position is within this distance with a probability of 68 %."""
     sigma_deg: float
 
 
 @dataclass(frozen=True)
 class Detection:
-    """A place where the part may lie."""
+    """A candidate position of the part."""
 
     score: float
-    """From 0 to 1, calibrated: from 0.5 on it is accepted."""
+    """Calibrated, from 0 to 1; accepted from 0.5."""
     grasp: Grasp
     pose: Optional[Pose]
     """None without a camera."""
     evidence: dict[str, float]
-    """What the score is made of, in log-odds."""
+    """The components of the score, in log-odds."""
     refused: Optional[str]
-    """What speaks against it; None where it is accepted."""
+    """Why it is refused; None if it is accepted."""
     box: tuple[float, float, float, float]
     """Left, upper, right and lower edge, in pixels."""
     polygon: list[tuple[float, float]]
     """The outline's corners, in pixels."""
     record: dict[str, Any] = field(repr=False)
-    """All of it as `sdg detect --json` has it, with every digit."""
+    """The complete record of `sdg detect --json`, with all digits."""
 
     @classmethod
     def of(cls, record: dict[str, Any]) -> "Detection":
@@ -61,10 +61,10 @@ class Detection:
 
 @dataclass(frozen=True)
 class TrackedPart(Detection):
-    """A part that is followed."""
+    """A tracked part."""
 
     track: int
-    """Stays the same while the part is followed, and when it is found again."""
+    """Number of the track; it is kept while the part is tracked, and when it is found again."""
     state: str
     """"followed", "found_again" or "lost"."""
     age_s: float
@@ -94,7 +94,7 @@ class Detections(list[Detection]):
     """The accepted detections of a picture, best score first."""
 
     refused: list[Detection]
-    """Those that score less, best first, each with what speaks against it."""
+    """The other detections, best first, each with the reason for its refusal."""
 
     def __init__(self, found: list[Detection], min_score: float) -> None:
         super().__init__(one for one in found if one.score >= min_score)
@@ -102,9 +102,9 @@ class Detections(list[Detection]):
 
     @property
     def best(self) -> Detection:
-        """The best one.
+        """The best accepted detection.
 
-        Raises NothingToGrasp where there is none.
+        Raises NothingToGrasp if there is none.
         """
         if self:
             return self[0]

@@ -1,4 +1,4 @@
-"""Exceptions. Each text says what was expected and what was found, as the program's own messages do."""
+"""Exceptions. Each message gives the expected and the found value, like the messages of the program."""
 
 
 class SdgError(Exception):
@@ -6,23 +6,23 @@ class SdgError(Exception):
 
 
 class ArgumentError(SdgError, ValueError):
-    """A value that a function does not take."""
+    """A value that a function does not accept."""
 
 
 class FileError(SdgError, OSError):
-    """A file that is not there, or that the system does not read or write."""
+    """A file that does not exist, or that the system cannot read or write."""
 
 
 class ModelFileError(SdgError, ValueError):
-    """A file that is no grasp model, a damaged one, or one of another version."""
+    """A file that is not a grasp model, is damaged, or has another version."""
 
 
 class PictureError(SdgError, ValueError):
-    """A picture or an array that cannot be looked at: type, shape, size, channels."""
+    """An invalid picture or array: type, shape, size, channels."""
 
 
 class CameraError(SdgError, ValueError):
-    """A camera's file, a camera without its place, a model that knows no lengths."""
+    """An invalid camera file, a camera without a pose, or a model without lengths."""
 
 
 class RegionError(SdgError, ValueError):
@@ -30,11 +30,11 @@ class RegionError(SdgError, ValueError):
 
 
 class TeachingError(SdgError, ValueError):
-    """A photo and marks that nothing can be taught from, and labels that nothing can be counted on."""
+    """A photo or marks unsuitable for teaching, or labels that cannot be used for an evaluation."""
 
 
 class NothingToGrasp(SdgError, LookupError):
-    """No part was found in a picture, where one was asked for."""
+    """No part was found in a picture, but one was requested."""
 
 
 class ClosedError(SdgError, RuntimeError):
@@ -46,4 +46,4 @@ class ForkedError(SdgError, RuntimeError):
 
 
 class VersionError(SdgError, ImportError):
-    """The package's Python files and its native part are of two versions."""
+    """The package's Python files and its native part have different versions."""

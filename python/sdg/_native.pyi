@@ -1,4 +1,4 @@
-"""The native part: what it takes was checked by the package's Python, and records are JSON."""
+"""The native part: its arguments are checked by the package's Python code, and records are JSON."""
 
 from os import PathLike
 from typing import Literal, Optional, Union, final
@@ -9,7 +9,7 @@ import numpy.typing as npt
 _Path = Union[str, PathLike[str]]
 _Array = npt.NDArray[np.uint8]
 _Bounds = tuple[int, int, int, int]
-# True is all of the picture.
+# True is the whole picture.
 _Region = Optional[Union[_Bounds, Literal[True]]]
 
 __all__ = ["Camera", "Model", "Tracker", "VERSION", "evaluate", "read_picture", "run_command", "teach"]

@@ -1,4 +1,5 @@
-//! numpy's arrays as pictures, by the dictionary `__array_interface__`: Python's buffers are no part of its stable interface before 3.11.
+//! Converts numpy arrays to pictures through the dictionary `__array_interface__`: Python's buffer protocol is not in
+//! its stable interface before 3.11.
 
 use image::RgbImage;
 use pyo3::prelude::*;
@@ -7,10 +8,10 @@ use sdg_bindings::{Fault, FaultKind, PixelOrder, PixelShape};
 
 use crate::errors::exception;
 
-/// Copies an array of bytes with any strides; Python's lock is held.
+/// Copies an array of bytes with any strides; the GIL is held.
 ///
 /// # Errors
-/// What is no `numpy.ndarray`, another type of elements, another shape, unknown channels.
+/// Not a `numpy.ndarray`, another element type, another shape, or unknown channels.
 pub fn picture(array: &Bound<'_, PyAny>, channels: &str) -> PyResult<RgbImage> {
     let py = array.py();
     let fault = |kind, text: String| exception(py, Fault::new(kind, text));
@@ -22,7 +23,7 @@ pub fn picture(array: &Bound<'_, PyAny>, channels: &str) -> PyResult<RgbImage> {
             return Err(fault(FaultKind::Argument, text));
         }
     };
-    // Of the very class: a subclass could tell another address.
+    // Exactly this class: a subclass could return another address.
     let class = array.get_type();
     if !class.is(&py.import("numpy")?.getattr("ndarray")?) {
         let text = format!("expected a numpy.ndarray, found {}", class.name()?);
@@ -42,11 +43,11 @@ pub fn picture(array: &Bound<'_, PyAny>, channels: &str) -> PyResult<RgbImage> {
     let stride_of = |axis: usize| strides.get(axis).copied().unwrap_or(0);
     let [down, right, deeper] = [stride_of(0), stride_of(1), stride_of(2)];
     Ok(checked.copy(order, |row, column, channel| {
-        // In bounds of the array, so of its memory, whose size fits isize.
+        // Inside the array, so inside its memory, whose size fits isize.
         let offset = row as isize * down + column as isize * right + channel as isize * deeper;
-        // SAFETY: numpy tells the address of the first element and the strides of an array of bytes, whose elements exist at every
-        // index within its shape; row, column and channel are. `array` keeps the memory, and while Python's lock is held no Python code
-        // resizes it.
+        // SAFETY: numpy gives the address of the first element and the strides of an array of bytes, whose elements
+        // exist at every index within its shape; row, column and channel are within it. `array` keeps the memory alive,
+        // and while the GIL is held no Python code resizes it.
         unsafe { first.offset(offset).read() }
     }))
 }

@@ -1,4 +1,4 @@
-//! Faults as exceptions, whose classes stand in sdg/_errors.py.
+//! Converts faults to the exceptions in sdg/_errors.py.
 
 use pyo3::prelude::*;
 use pyo3::types::PyType;

@@ -14,7 +14,7 @@ use sdg_grasp::{SearchRegion, TeachOptions};
 use crate::array::picture;
 use crate::errors::exception;
 
-/// Teaching and detection, without Python's lock.
+/// Teaching and detection, with the GIL released.
 #[pymodule]
 mod _native {
     #[pymodule_export]
@@ -28,7 +28,7 @@ mod _native {
     }
 }
 
-/// Works without Python's lock.
+/// Runs work with the GIL released.
 fn detached<T: Send>(py: Python<'_>, work: impl FnOnce() -> sdg_bindings::Result<T> + Send) -> PyResult<T> {
     py.detach(work).map_err(|fault| exception(py, fault))
 }
@@ -60,7 +60,7 @@ impl Camera {
     }
 }
 
-/// A region as Python's side checked it: four numbers, or True for all of the picture.
+/// A region checked by the Python code: four numbers, or True for the whole picture.
 #[derive(FromPyObject)]
 enum Region {
     Part((u32, u32, u32, u32)),
@@ -117,7 +117,7 @@ impl Model {
     }
 }
 
-/// Parts followed from frame to frame.
+/// Parts tracked from frame to frame.
 #[pyclass(frozen)]
 struct Tracker(Mutex<Option<sdg_bindings::Tracker>>);
 
@@ -146,7 +146,7 @@ impl Tracker {
         })
     }
 
-    /// Waits for a search that is running.
+    /// Waits for a running search.
     fn close(&self, py: Python<'_>) {
         py.detach(|| *self.tracker() = None);
     }
@@ -158,7 +158,7 @@ impl Tracker {
     }
 }
 
-/// Teaches as `sdg teach`; lengths in metres, a symmetry of 0 is a full one.
+/// Teaches like `sdg teach`; lengths in metres; symmetry 0 means full.
 #[pyfunction]
 #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
 fn teach(
@@ -194,7 +194,7 @@ fn teach(
     let mut signal = None;
     let taught = py.detach(|| {
         sdg_bindings::teach(&from, options, &mut |_| {
-            // Ctrl-C is an exception of Python's, which nothing else would look for meanwhile.
+            // Ctrl-C is a Python exception, which no other code checks for meanwhile.
             match Python::attach(|py| py.check_signals()) {
                 Ok(()) => ControlFlow::Continue(()),
                 Err(raised) => {
@@ -228,7 +228,7 @@ fn evaluate(
     detached(py, || sdg_bindings::evaluate(&model.0, &folder, &view, label.as_deref(), min_score, &report))
 }
 
-/// A picture's height, width and bytes.
+/// The height, width and bytes of a picture.
 #[pyfunction]
 fn read_picture<'py>(
     py: Python<'py>,
@@ -240,7 +240,7 @@ fn read_picture<'py>(
     Ok((picture.height(), picture.width(), PyByteArray::new(py, picture.as_raw())))
 }
 
-/// Runs the command `sdg` with these arguments, its own name first; its exit code.
+/// Runs the command `sdg` with these arguments, its own name first; returns its exit code.
 #[pyfunction]
 fn run_command(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
     py.detach(|| sdg_cli::run(&sdg_cli::parse_args(arguments)))

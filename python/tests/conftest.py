@@ -1,4 +1,4 @@
-"""What the tests share: programs of `make test-python`, models that were taught once, pictures as files."""
+"""Shared fixtures: programs of `make test-python`, models that are taught once, pictures as files."""
 
 import os
 from pathlib import Path
@@ -9,9 +9,9 @@ import made_pictures
 import sdg
 
 ROOT = Path(__file__).resolve().parents[2]
-# Of the pendulum's marks and grasp over the table: datasets/objects/pendulum.
+# Heights over the table of the pendulum's marks and grasp: datasets/objects/pendulum.
 MARK_HEIGHT_MM = 16.0
-# C's network is taught for as many steps as show that it takes part: what it learns is tested in Rust.
+# Enough steps to show that C's network is used; what it learns is tested in Rust.
 STEPS = 10
 
 
@@ -30,7 +30,7 @@ def sdg_program() -> Path:
 
 @pytest.fixture(scope="session")
 def reference() -> Path:
-    """crates/bindings/examples/reference.rs, which uses none of the bindings."""
+    """crates/bindings/examples/reference.rs, which does not use the bindings."""
     return program("SDG_REFERENCE", "examples/reference")
 
 
@@ -62,7 +62,7 @@ def shape_model(models: dict[str, Path]) -> sdg.GraspModel:
 
 @pytest.fixture(scope="session")
 def pictures(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """Files of the made pictures."""
+    """Files of the test pictures."""
     folder = tmp_path_factory.mktemp("pictures")
     files = {}
     for name, picture in made_pictures.pictures_of_part().items():

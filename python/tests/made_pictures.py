@@ -1,4 +1,4 @@
-"""Pictures that tests make of the shipped photos, and PNG files of arrays."""
+"""Test pictures made from the shipped photos, and PNG files from arrays."""
 
 import struct
 import zlib
@@ -19,7 +19,7 @@ Picture = npt.NDArray[np.uint8]
 
 
 def write_png(path: Path, picture: Picture) -> None:
-    """Writes 8-bit RGB; numpy alone, so that no other library's reading or writing stands between the programs."""
+    """Writes 8-bit RGB with numpy only, so that no other library affects the comparison of the programs."""
     height, width, _ = picture.shape
     rows = np.concatenate([np.zeros((height, 1), np.uint8), picture.reshape(height, 3 * width)], axis=1)
 
@@ -32,7 +32,7 @@ def write_png(path: Path, picture: Picture) -> None:
 
 
 def pictures_of_part() -> dict[str, Picture]:
-    """Ten pictures by name, of 640 x 480 pixels: with the part, with it twice, partly covered, and with others."""
+    """Ten pictures by name, of 640 x 480 pixels: with one part, two parts, a partly covered part, and other parts."""
     photo = sdg.read_picture(PHOTO)
     noise = np.random.default_rng(1).integers(-12, 13, photo.shape)
     covered = photo.copy()

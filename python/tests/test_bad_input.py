@@ -1,4 +1,4 @@
-"""Wrong input: one exception of its own class, which says what was expected and what was found."""
+"""Wrong input: an exception of a specific class, with the expected and the found value."""
 
 import subprocess
 import sys
@@ -15,7 +15,7 @@ GREY = np.zeros((480, 640, 3), np.uint8)
 
 
 class Subclass(np.ndarray):
-    """Could tell another address than its own."""
+    """Could return an address other than its own."""
 
 
 @pytest.mark.parametrize(
@@ -91,7 +91,7 @@ def test_paths_that_do_not_exist(shape_model: sdg.GraspModel, tmp_path: Path) ->
     for call in calls:
         with pytest.raises(sdg.FileError, match="missing") as raised:
             call()
-        # As any of Python's errors of files.
+        # Like other file errors of Python.
         assert isinstance(raised.value, OSError)
 
 
@@ -122,7 +122,7 @@ def test_cameras(models: dict[str, Path], shape_model: sdg.GraspModel) -> None:
     with pytest.raises(sdg.CameraError, match="image.png"):
         sdg.Camera.load(made_pictures.PHOTO)
     photo = sdg.read_picture(made_pictures.PHOTO, camera)
-    # Taught without a camera, so in pixels alone.
+    # Taught without a camera, so only in pixels.
     with pytest.raises(sdg.CameraError):
         shape_model.detect(photo, camera=camera)
     with pytest.raises(sdg.PictureError, match="640 × 480"):

@@ -1,4 +1,4 @@
-"""The same grasps as Rust's, to the bit, and as `sdg detect --json --all`, to the last digit that it prints."""
+"""The same grasps as from Rust, to the bit, and as from `sdg detect --json --all`, to the last printed digit."""
 
 import json
 import math
@@ -17,7 +17,7 @@ from conftest import MARK_HEIGHT_MM, STEPS
 
 LETTERS = os.environ.get("SDG_MODELS", "S,C").split(",")
 NAMES = [name for letter in LETTERS for name in (letter, f"{letter}-camera")]
-# Records have no more and no fewer fields than the program's, but for its advice, whose words name its options.
+# Records have the same fields as the program's, except for the advice, which names options.
 OF_PROGRAM_ALONE = {"advice"}
 
 
@@ -39,7 +39,7 @@ def output(*arguments: object) -> list[str]:
 
 
 def as_printed(value: Any) -> Any:
-    """With six digits after each point, as the program rounds: half away from zero."""
+    """Rounded to six digits after each point like the program: half away from zero."""
     if isinstance(value, float):
         return math.copysign(math.floor(abs(value) * 1e6 + 0.5) / 1e6, value) + 0.0
     if isinstance(value, list):
@@ -63,7 +63,7 @@ def test_python_equals_rust_and_the_program(
         rust = json.loads(line)
         assert len(rust) == len(records), picture
         for one, other in zip(rust, records):
-            # `size` is the program's own. Both are parsed from the shortest text that gives the very number.
+            # Only the program gives `size`. Both are parsed from the shortest text that represents the number exactly.
             assert one == {key: value for key, value in other.items() if key != "size"}, picture
 
     options = ["--camera", made_pictures.CAMERA] if camera else []
@@ -79,7 +79,7 @@ def test_python_equals_rust_and_the_program(
     num_found = sum(len(records) for records in by_python)
     num_accepted = sum(record["score"] >= 0.5 for records in by_python for record in records)
     print(f"\n{name}: {len(paths)} pictures, {num_found} detections, {num_accepted} of them accepted")
-    # Something was compared, poses too.
+    # At least one detection was compared, including poses.
     assert num_accepted > 0
     assert all(("pose" in record) == camera for records in by_python for record in records if record["score"] >= 0.5)
 
@@ -98,7 +98,7 @@ def test_teaching_writes_the_file_of_the_program(
 
 
 def without_seconds_of_teaching(file: Path) -> tuple[str, bytes]:
-    """The header and the tensors of a model's file, but for the time that its teaching took, which every file has."""
+    """The header and the tensors of a model's file, without the duration of its teaching, which always differs."""
     content = file.read_bytes()
     length = int.from_bytes(content[:8], "little")
     header, num_times = re.subn(r'\\"seconds\\":[0-9.e-]+', "", content[8 : 8 + length].decode())
@@ -161,7 +161,7 @@ def test_evaluation_counts_as_the_program_does(
 ) -> None:
     folder = tmp_path / "labelled"
     folder.mkdir()
-    # Other pixels than the photo's, which would be left out; the marks are the same.
+    # Changed pixels, because the photo itself would be left out; the marks are the same.
     (folder / "noisy.png").write_bytes(pictures["noisy"].read_bytes())
     marks = json.loads(made_pictures.MARKS.read_text())
     marks["imagePath"] = "noisy.png"
@@ -174,7 +174,7 @@ def test_evaluation_counts_as_the_program_does(
     )
     of_program = json.loads(line)
     assert figures["found"] == figures["parts"] == 1
-    # A model of Python's may never have been a file.
+    # A model in Python need not come from a file.
     for key in figures.keys() - {"report", "grasp_model"}:
         assert as_printed(without_seconds(figures[key])) == without_seconds(of_program[key]), key
 

@@ -1,4 +1,4 @@
-"""The notebook's cells run in their order, without Jupyter; its picture has the grasp drawn where the part was moved to."""
+"""The notebook's cells run in order, without Jupyter; its picture has the grasp drawn at the part's new position."""
 
 import json
 import subprocess
@@ -20,7 +20,7 @@ def test_the_notebook_runs_and_draws_the_grasp(tmp_path: Path) -> None:
     cells = json.loads(NOTEBOOK.read_text(encoding="utf-8"))["cells"]
     assert len(cells) == NUM_CELLS
     code = [cell for cell in cells if cell["cell_type"] == "code"]
-    # Outputs would say what some former version did.
+    # Outputs would be those of an earlier version.
     assert all(cell["outputs"] == [] and cell["execution_count"] is None for cell in code)
     drawn = tmp_path / "drawn.png"
     script = tmp_path / "notebook.py"
@@ -33,10 +33,10 @@ def test_the_notebook_runs_and_draws_the_grasp(tmp_path: Path) -> None:
 
     picture = sdg.read_picture(drawn)
     red = np.argwhere((picture == RED).all(axis=2))
-    # The marks' middle, (320, 220.45), moved by 47 to the left and 31 down; pixels' middles are at 0.5.
+    # The marks' middle, (320, 220.45), moved by 47 to the left and 31 down; pixel centres are at 0.5.
     assert np.allclose(red.mean(axis=0) + 0.5, [251.5, 273.0], atol=1.5)
     rows, columns = np.argwhere((picture == OUTLINE).all(axis=2)).T
-    # The marked box, from (259, 168) to (388, 278), moved likewise; lines are three pixels wide.
+    # The marked box, from (259, 168) to (388, 278), moved in the same way; lines are three pixels wide.
     assert np.allclose([columns.min(), columns.max(), rows.min(), rows.max()], [212, 341, 199, 309], atol=4)
     before = np.roll(sdg.read_picture(made_pictures.PHOTO), (31, -47), axis=(0, 1))
     assert (picture == before).all(axis=2).mean() > 0.98

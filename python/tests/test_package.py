@@ -1,4 +1,4 @@
-"""The guide's code runs; the package is typed, documented and as large as it may be; it brings the command."""
+"""The guide's code runs; the package is typed, documented and within its size limit; it contains the command."""
 
 import inspect
 import os
@@ -29,13 +29,13 @@ def test_the_guide_runs_as_written(tmp_path: Path) -> None:
         ("camera.yaml", made_pictures.CAMERA),
     ]:
         shutil.copy(file, tmp_path / name)
-    # The part elsewhere: 31 pixels down, 47 to the left.
+    # The part at another position: 31 pixels down, 47 to the left.
     made_pictures.write_png(tmp_path / "table.png", made_pictures.pictures_of_part()["shifted"])
     (tmp_path / "guide.py").write_text("\n".join(blocks))
     done = subprocess.run([sys.executable, "guide.py"], cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     print("\n" + done.stdout)
-    # The marks' middle in the photo is (320, 220.45); the table is 0.58 m from the camera, 550 pixels a tangent of 1.
+    # The marks' middle in the photo is (320, 220.45); the table is 0.58 m from the camera, with a focal length of 550 pixels.
     x, y = (float(number) for number in re.search(r"in the picture: \((.*), (.*)\) px", done.stdout).groups())
     assert abs(x - 273) < 1 and abs(y - 251.5) < 1
     forward, left, up = (float(number) for number in re.search(r"frame base: \((.*), (.*), (.*)\) m", done.stdout).groups())

@@ -1,4 +1,4 @@
-"""Python's other threads run meanwhile; how fast two detect, and how soon the first grasp is there, is printed."""
+"""Other Python threads run during a detection; prints the speed of two parallel detections, and the time to the first grasp."""
 
 import os
 import subprocess
@@ -34,7 +34,7 @@ def test_other_threads_run_while_something_is_detected(shape_model: sdg.GraspMod
     took = time.perf_counter() - begun
     is_ended.set()
     other.join()
-    # With the lock held, the other would have had its turn between two detections alone.
+    # With the GIL held, the other thread would only run between two detections.
     during = [when for when in ticks if begun < when < begun + took]
     assert len(during) > 20, (len(during), took)
 
@@ -55,7 +55,7 @@ def test_speed_of_two_threads_is_printed(shape_model: sdg.GraspModel) -> None:
             assert shape_model.detect(photo, threads=1)
 
     def seconds_with(threads: int) -> tuple[float, float]:
-        """Seconds by the clock, and of processors' time."""
+        """Wall-clock seconds, and processor seconds."""
         with ThreadPoolExecutor(threads) as pool:
             begun, of_processors = time.perf_counter(), time.process_time()
             for done in [pool.submit(detect, NUM_PICTURES) for _ in range(threads)]:
@@ -63,13 +63,13 @@ def test_speed_of_two_threads_is_printed(shape_model: sdg.GraspModel) -> None:
             return time.perf_counter() - begun, time.process_time() - of_processors
 
     seconds_with(2)
-    # Alternating, so that other work on the machine weighs on both; the best of each is what the machine can do.
+    # Alternating, so that other load on the machine affects both; the best of each is what the machine can do.
     rounds = [(seconds_with(1), seconds_with(2)) for _ in range(5)]
     (one, of_one), (two, of_two) = (min(times) for times in zip(*rounds))
     print(
         f"\ntwo threads detect at {2 * one / two:.2f} times the speed of one; a picture takes "
         f"{1e3 * of_one / NUM_PICTURES:.1f} ms of a processor with one thread, {1e3 * of_two / (2 * NUM_PICTURES):.1f} with two; "
-        # Where others use the machine the ratio says nothing: Linux may share processors out by groups of programs, not by threads.
+        # If others use the machine, the ratio is meaningless: Linux may share processors by groups of programs, not by threads.
         f"one had {of_one / one:.2f} processors, two {of_two / two:.2f}"
     )
 

@@ -1,4 +1,4 @@
-//! A part taught with one calibrated camera and found with others: another place, tilted, with another lens.
+//! A part taught with one calibrated camera and detected with others: other poses, tilts and lenses.
 
 use std::ops::ControlFlow;
 
@@ -13,13 +13,13 @@ use sdg_grasp::{
 use sdg_simulation::objects::{LookAlikeKind, ObjectSpec};
 use sdg_simulation::views::{Axis, AxisView, axis_view, demonstration_view};
 
-/// Seed of the pictures, which no other test and no evaluation uses.
+/// Seed of the pictures, which no other test or evaluation uses.
 const SEED: u64 = 7100;
-/// Low parts: what stands higher than the marks is displaced in the plan view.
+/// Low parts: points above the marks are displaced in the plan view.
 const PARTS: [&str; 3] = ["pendulum", "cranfield_face", "key"];
-/// Pictures of each part and axis.
+/// Number of pictures of each part and axis.
 const NUM_PICTURES: u64 = 4;
-/// Bounds of single errors, with the picture's errors as the evaluation finds them: median below 1 mm, and of the angle below 0.5°.
+/// Maximum error of a single detection; the evaluation measured medians below 1 mm and 0.5°.
 const MAX_ERROR_MM: f64 = 3.0;
 const MAX_ERROR_DEG: f64 = 2.0;
 
@@ -27,7 +27,7 @@ fn over_table(camera: PosedCamera) -> CameraOverTable {
     CameraOverTable { camera, table_height_m: 0.0, workspace: None }
 }
 
-/// The shipped photo with the camera that took it.
+/// The model of a shipped photo with the camera that took it.
 fn taught(part: &ObjectSpec) -> GraspModel {
     let shown = demonstration_view(part).unwrap();
     let marks = part.marks_in_base(&shown.truth.base_from_object);
@@ -37,7 +37,7 @@ fn taught(part: &ObjectSpec) -> GraspModel {
     options.kind = ModelKind::S;
     options.lengths = Some(lengths);
     let model = teach(&seen, &options, &mut |_| ControlFlow::Continue(())).unwrap().model;
-    // What is used from here on is what a file gives back.
+    // From here on, the model read back from its file is used.
     GraspModel::from_bytes(&model.to_bytes().unwrap(), &Device::flex()).unwrap()
 }
 
@@ -48,7 +48,7 @@ fn detect(model: &GraspModel, camera: &PosedCamera, picture: &RgbImage) -> Vec<P
     found
 }
 
-/// Asserts that the best of what was found is the part where it truly is; its error in millimetres.
+/// Asserts that the best detection is the part at its true pose; returns its error in millimetres.
 fn assert_found(shown: &AxisView, camera: &PosedCamera, found: &[PlanViewDetection], about: &str) -> f64 {
     let truth = &shown.truths[0].grasp;
     let best = found.first().unwrap_or_else(|| panic!("{about}: not found"));
@@ -56,7 +56,7 @@ fn assert_found(shown: &AxisView, camera: &PosedCamera, found: &[PlanViewDetecti
     let error_deg = (best.pose.yaw.degrees() - truth.direction_rad.to_degrees() + 180.0).rem_euclid(360.0) - 180.0;
     println!("{about}: {error_mm:.2} mm, {error_deg:.2}°, score {:.2}", best.detection.score);
     assert!(error_mm < MAX_ERROR_MM && error_deg.abs() < MAX_ERROR_DEG, "{about}: {error_mm} mm, {error_deg}°");
-    // In the picture's own pixels it lies there too: where the wrist camera sees the marks, seen by this one.
+    // It is also correct in the picture's own pixels: at the projection of the marks.
     let wrist = shown.view.camera;
     let marks = wrist.intrinsics.unproject(&truth.line.center()).unwrap();
     let expected = camera.intrinsics.project(&marks).unwrap();
@@ -65,7 +65,7 @@ fn assert_found(shown: &AxisView, camera: &PosedCamera, found: &[PlanViewDetecti
     error_mm
 }
 
-/// The picture as a lens with distortion and another focal length shows it.
+/// The picture as taken by a lens with distortion and another focal length.
 fn through_another_lens(shown: &AxisView) -> (PosedCamera, RgbImage) {
     let camera = shown.view.camera;
     let lens = PlumbBob { k1: -0.22, k2: 0.06, p1: 0.002, p2: -0.001, k3: 0.0 };
@@ -83,7 +83,7 @@ fn color_at(image: &RgbImage, at: &Point2<f64>) -> Rgb<u8> {
     image::imageops::interpolate_bilinear(image, x as f32, y as f32).unwrap_or(Rgb([0; 3]))
 }
 
-/// Both checks take the same models, which one of them would teach again in a test of its own.
+/// Both checks use the same models, which separate tests would teach twice.
 #[test]
 fn parts_are_found_in_metres_from_other_places_and_through_other_lenses_and_other_sizes_are_refused() {
     let models = PARTS.map(|name| {
@@ -95,7 +95,7 @@ fn parts_are_found_in_metres_from_other_places_and_through_other_lenses_and_othe
     assert_other_sizes_are_refused(&models);
 }
 
-/// From other places, and through other lenses.
+/// From other positions, and through other lenses.
 fn assert_found_in_metres(models: &[(ObjectSpec, GraspModel)]) {
     let mut errors = Vec::new();
     for (part, model) in models {
@@ -120,7 +120,7 @@ fn assert_found_in_metres(models: &[(ObjectSpec, GraspModel)]) {
 fn assert_other_sizes_are_refused(models: &[(ObjectSpec, GraspModel)]) {
     let mut tried = 0;
     for (part, model) in models {
-        // The kinds take turns; other kinds need not be drawn.
+        // The kinds alternate; some kinds may not be drawable.
         let kinds = part.look_alike_kinds().unwrap();
         let is_scaled = |number: &u64| matches!(kinds[*number as usize % kinds.len()], LookAlikeKind::Scaled { .. });
         for number in (0..12).filter(is_scaled) {

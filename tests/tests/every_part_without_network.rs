@@ -1,4 +1,4 @@
-//! Model S from end to end on every shipped part: one photo, no network, unseen pictures, grasps in MuJoCo.
+//! Model S end to end on every shipped part: one photo, no network, unseen pictures, grasps in MuJoCo.
 
 use std::ops::ControlFlow;
 
@@ -9,23 +9,24 @@ use sdg_geometry::median;
 use sdg_grasp::{Device, GraspModel, ModelKind, TeachOptions, Verification, teach};
 use sdg_simulation::objects::ObjectSpec;
 
-/// Seeds of the pictures: neither those of `sdg evaluate` nor of the other tests.
+/// First seed of the pictures; neither `sdg evaluate` nor other tests use them.
 const VIEWS_SEED: u64 = 7000;
-/// Pictures of each part, with it and without it.
+/// Number of pictures of each part, with and without it.
 const NUM_PRESENT: usize = 6;
 const NUM_ABSENT: usize = 2;
-/// Median distance from the true grasp on the pictures of one part, and on all of them. The evaluation has 0.3 to 1.7 mm, and 0.6.
+/// Maximum median distance from the true grasp on the pictures of one part, and on all of them. The evaluation measured
+/// 0.3 to 1.7 mm, and 0.6.
 const MAX_MEDIAN_OF_PART_MM: f64 = 2.3;
 const MAX_MEDIAN_MM: f64 = 0.9;
-/// Grasps of each part.
+/// Number of grasps of each part.
 const NUM_ATTEMPTS: u32 = 1;
 
-/// Of 6 pictures of one part. The evaluation finds 22 to 25 of 25 (datasets/RESULTS.md); the seeds are fixed, so a bound
-/// that holds keeps holding.
+/// Minimum for the 6 pictures of one part. The evaluation finds 22 to 25 of 25 (datasets/RESULTS.md); the seeds are
+/// fixed, so the result does not vary.
 const MIN_RIGHT_OF_PART: usize = 5;
-/// Of all pictures of all parts: the evaluation's 98 %, less two standard deviations of 72 pictures.
+/// Minimum for all pictures of all parts: the evaluation's 98 %, minus two standard deviations for 72 pictures.
 const MIN_RIGHT_SHARE: f64 = 0.95;
-/// Of all grasps, one of each part: the evaluation holds 80 of 80.
+/// Maximum number of failed grasps, one of each part: in the evaluation 80 of 80 hold.
 const MAX_DROPPED: usize = 1;
 
 fn model_without_network(object: &ObjectSpec) -> GraspModel {
@@ -34,7 +35,7 @@ fn model_without_network(object: &ObjectSpec) -> GraspModel {
     options.symmetry = object.symmetry;
     let demonstration = shipped::demonstration(&object.name).unwrap();
     let taught = teach(&[demonstration], &options, &mut |_| ControlFlow::Continue(())).unwrap();
-    // What is used from here on is what a file gives back.
+    // From here on, the model read back from its file is used.
     GraspModel::from_bytes(&taught.model.to_bytes().unwrap(), &Device::flex()).unwrap()
 }
 
@@ -62,7 +63,7 @@ fn model_s_finds_and_grasps_every_part() {
             camera: None,
             place: None,
         };
-        // As `run` has them, without a film.
+        // In the same way as `run`, without a film.
         let attempts = (1..=NUM_ATTEMPTS as usize).map(|number| rehearsal.attempt(number, None).unwrap().attempt);
         let failures: Vec<_> = attempts.filter(|attempt| !attempt.success).collect();
         println!(

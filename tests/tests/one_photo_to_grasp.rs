@@ -1,5 +1,5 @@
-//! From end to end: one photo, teaching, unseen pictures, grasps in MuJoCo. Takes minutes, and is the one
-//! test that says whether the product works.
+//! End to end: one photo, teaching, unseen pictures, grasps in MuJoCo. Takes minutes, and is the test of the whole
+//! product.
 
 use std::ops::ControlFlow;
 
@@ -10,26 +10,26 @@ use sdg_grasp::{CheckConfig, Device, GraspModel, TeachOptions, Verification, tea
 use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::views::test_views;
 
-/// Seeds of the pictures; neither the demo's nor the attempts'.
+/// First seed of the pictures; neither the demo nor the attempts use them.
 const VIEWS_SEED: u64 = 1000;
 
 #[test]
 fn the_pendulum_is_taught_found_and_grasped() {
     let object = ObjectSpec::by_name("pendulum").unwrap();
     let demonstration = shipped::demonstration("pendulum").unwrap();
-    // The camera hovers as high as it was for the photo: what has another size is another part.
+    // The camera's height is that of the photo: objects of another size are other parts.
     let mut options = TeachOptions::new(1);
     options.size_tolerance = CheckConfig::FIXED_HEIGHT_TOLERANCE;
     let taught = teach(&[demonstration], &options, &mut |_| ControlFlow::Continue(())).unwrap();
     let seconds = taught.model.facts().seconds;
     println!("taught in {seconds:.0} s: {:?}", taught.model.facts().validation);
 
-    // What is used from here on is what a file gives back.
+    // From here on, the model read back from its file is used.
     let bytes = taught.model.to_bytes().unwrap();
     assert!(bytes.len() < 12_000_000, "{} bytes", bytes.len());
     let model = GraspModel::from_bytes(&bytes, &Device::flex()).unwrap();
 
-    // Each picture is drawn once and shown to the network alone, then to the whole model.
+    // Each picture is rendered once and shown to the network alone, then to the whole model.
     let mut right = [0; 2];
     let mut false_alarms = [0; 2];
     for (present, count) in [(true, 100), (false, 50)] {
@@ -60,7 +60,7 @@ fn the_pendulum_is_taught_found_and_grasped() {
         camera: None,
         place: None,
     };
-    // One after the other, as `run` has them, without a film.
+    // In order, in the same way as `run`, without a film.
     let attempts = (1..=10).map(|number| rehearsal.attempt(number, None).unwrap().attempt);
     let failures: Vec<_> = attempts.filter(|attempt| !attempt.success).collect();
     println!("grasped in {} of 10, failures {failures:?}", 10 - failures.len());

@@ -1,5 +1,5 @@
-//! Parts that move under a camera at 100 frames a second, followed from frame to frame: exact, lost when they are hidden, found
-//! again elsewhere, and nothing else followed in their stead.
+//! Parts that move under a camera at 100 frames per second, tracked from frame to frame: accurately, lost when hidden,
+//! found again elsewhere, and nothing else tracked instead.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -15,26 +15,27 @@ use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::table_camera::{MovingTruth, TableCamera};
 use sdg_simulation::views::demonstration_view;
 
-/// Frames that a search takes: 100 to 200 ms on one of two cores that others use, too (docs/tracking.md).
+/// Number of frames that a search takes: 100 to 200 ms on one of two cores that are also used by others
+/// (docs/tracking.md).
 const SEARCH_FRAMES: u32 = 20;
-/// What is promised: 95 % of the frames within these.
+/// The promised accuracy: 95 % of the frames within these errors.
 const MAX_ERROR_PX: f64 = 2.0;
 const MAX_ERROR_DEG: f64 = 2.0;
 const MIN_SHARE: f64 = 0.95;
-/// At most so long after it lies there again a part is found again.
+/// Maximum number of frames until a reappearing part is found again.
 const MAX_FIND_FRAMES: usize = 100;
-/// What is followed so far from every instance is another thing.
+/// Distance from every instance at which a tracked object counts as another one.
 const ELSEWHERE_PX: f64 = 25.0;
-/// A part that is taken away is lost within so many frames.
+/// Maximum number of frames until a removed part is lost.
 const MAX_LOSE_FRAMES: usize = 3;
 
 fn taught(demonstration: Demonstration, options: &TeachOptions) -> GraspModel {
     let model = teach(&[demonstration], options, &mut |_| ControlFlow::Continue(())).unwrap().model;
-    // What is used from here on is what a file gives back.
+    // From here on, the model read back from its file is used.
     GraspModel::from_bytes(&model.to_bytes().unwrap(), &Device::flex()).unwrap()
 }
 
-/// What was followed in each frame, beside the truth.
+/// The tracked parts in each frame, with the ground truth.
 struct Sequence {
     part: ObjectSpec,
     frames: Vec<(Vec<MovingTruth>, Vec<TrackedPart>)>,
@@ -62,7 +63,7 @@ fn by_picture(_: &TableCamera, part: &ObjectSpec) -> Perception {
     Perception::of_any_camera(taught(shipped::demonstration(&part.name).unwrap(), &options))
 }
 
-/// With one: in the plan view of the marks' plane, and in metres.
+/// With a calibrated camera: in the plan view of the marks' plane, and in metres.
 fn by_plan_view(camera: &TableCamera, part: &ObjectSpec) -> Perception {
     let over_table = |camera| CameraOverTable { camera, table_height_m: 0.0, workspace: None };
     let shown = demonstration_view(part).unwrap();
@@ -80,21 +81,21 @@ fn by_plan_view(camera: &TableCamera, part: &ObjectSpec) -> Perception {
 }
 
 impl Sequence {
-    /// Pixels and degrees between a followed part and the truth.
+    /// Error of a tracked part in pixels and degrees.
     fn error(&self, part: &TrackedPart, truth: &MovingTruth) -> (f64, f64) {
         let (found, expected) = (part.detection.grasp, truth.grasp.planar);
         let turn = self.part.symmetry.distance(found.angle, expected.angle);
         ((found.center() - expected.center()).norm(), turn.to_degrees())
     }
 
-    /// The followed part on an instance; its error.
+    /// The tracked part on an instance, and its error.
     fn on(&self, truth: &MovingTruth, parts: &[TrackedPart]) -> Option<(u64, f64, f64)> {
         let followed = parts.iter().filter(|part| part.is_followed());
         let errors = followed.map(|part| (part.id, self.error(part, truth))).map(|(id, (px, deg))| (id, px, deg));
         errors.min_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, px, _)| *px < ELSEWHERE_PX)
     }
 
-    /// Asserts that nothing is followed but what is shown; a few frames pass until what is taken away is lost.
+    /// Asserts that only visible instances are tracked; a few frames pass until a removed part is lost.
     fn assert_nothing_else(&self) {
         let mut elsewhere = 0;
         for (idx, (truths, parts)) in self.frames.iter().enumerate() {
@@ -107,7 +108,8 @@ impl Sequence {
         }
     }
 
-    /// Asserts that instance `which` is followed under one id as exactly as promised, and found within a second of when it is shown.
+    /// Asserts that instance `which` is tracked under one id with the promised accuracy, and found within a second of
+    /// its appearance.
     fn assert_followed(&self, which: usize) {
         let (mut errors, mut unseen, mut ids) = (Vec::new(), 0, Vec::new());
         let (mut longest, mut was_found) = (0, false);
@@ -161,7 +163,8 @@ impl Sequence {
 
 type MakeDetector = fn(&TableCamera, &ObjectSpec) -> Perception;
 
-/// Four seconds at 50 mm/s and 30°/s with changes of direction; for half a second the part is off the table, and then elsewhere.
+/// Four seconds at 50 mm/s and 30°/s with changes of direction; the part is off the table for half a second, and then
+/// at another position.
 fn assert_tracked(part: &str, seed: u64, beside: &str, detector: MakeDetector) -> Sequence {
     let address = format!("{part}?speed=50&turn=30&fps=100&seconds=4&noise=2&seed={seed}&hide=1.5..2&beside={beside}");
     let sequence = tracked(&address, detector);
@@ -205,7 +208,7 @@ fn a_covered_part_is_lost_and_found_again() {
     sequence.assert_followed(0);
 }
 
-/// Bounds of the median and of 95 % of the errors in metres: what `detect` has (tests/calibrated_camera.rs).
+/// Maximum median and 95th percentile of the errors in metres: as for `detect` (tests/calibrated_camera.rs).
 const MAX_MEDIAN_MM: f64 = 1.0;
 const MAX_ERROR_MM: f64 = 3.0;
 

@@ -1,6 +1,6 @@
-// Requests to the server, whose errors come as one line for people.
+// Requests to the server. Errors are one line of text for the user.
 
-/** A failed request; `message` is fit to be shown. `lost` when the server did not answer at all. */
+/** A failed request; `message` can be shown to the user. `lost`: the server did not answer at all. */
 export class RequestError extends Error {
   constructor(message, lost = false) {
     super(message);
@@ -9,12 +9,12 @@ export class RequestError extends Error {
 }
 
 /**
- * Whether the server is gone: false, true, or "key" where it came back with another key. An answer alone does not end
- * that: a server that was started anew has numbered its pictures anew, and nothing is sent before the numbers are known.
+ * Whether the server is gone: false, true, or "key" if it was restarted with another token. A response alone does not
+ * reset this: a restarted server has renumbered its pictures, and nothing is sent before the numbers are known.
  */
 let lost = false;
 const lossListeners = [];
-/** Requests that wait for the server. */
+/** Requests waiting for the server. */
 let waiting = [];
 export const onLoss = (listener) => lossListeners.push(listener);
 export const isLost = () => lost;
@@ -24,10 +24,10 @@ export function setLost(now) {
   if (!lost) waiting.splice(0).forEach((resolve) => resolve());
   for (const listener of lossListeners) listener(now);
 }
-/** Waits until the server is there and its numbers of pictures are known. */
+/** Waits until the server is back and its picture numbers are known. */
 export const present = () => new Promise((resolve) => (lost ? waiting.push(resolve) : resolve()));
 
-/** The session that the numbers of pictures belong to; the server refuses those of another one. */
+/** The session of the picture numbers; the server rejects those of another one. */
 let sessionId = null;
 export function belongTo(session) {
   sessionId = session.id;
@@ -42,7 +42,7 @@ async function send(method, path, body, options = {}) {
     setLost(true);
     throw new RequestError("No answer from sdg annotate. Is it still running in the terminal?", true);
   }
-  // Another key: it was started anew without --token-file.
+  // Another token: the server was restarted without --token-file.
   if (response.status === 401) {
     setLost("key");
     throw new RequestError("sdg annotate was started again with another key: open the address that it printed.", true);
@@ -52,7 +52,7 @@ async function send(method, path, body, options = {}) {
     throw new RequestError("sdg annotate was started again.", true);
   }
   if (response.ok) return options.isPicture ? response.blob() : response.json();
-  if (response.status === 413) throw new RequestError("That is too large to be taken.");
+  if (response.status === 413) throw new RequestError("That is too large.");
   const text = await response.text();
   let message = text.trim() || `The server answered ${response.status}.`;
   try {
@@ -63,13 +63,13 @@ async function send(method, path, body, options = {}) {
   throw new RequestError(message);
 }
 
-/** Never two detections at once: each uses every core. */
+/** One detection at a time: each uses all cores. */
 let lastDetection = Promise.resolve();
 const inTurn = (work) => (lastDetection = lastDetection.then(work, work));
 
 const json = (method, path, value, options) => send(method, path, JSON.stringify(value), options);
 
-/** Browsers refuse to keep longer requests alive after their page. */
+/** Browsers do not keep larger requests alive after the page is closed. */
 const MAX_KEEPALIVE_CHARS = 20000;
 
 export const api = {
@@ -83,7 +83,7 @@ export const api = {
   uploadPhoto: (file) => send("POST", `/api/images?name=${encodeURIComponent(file.name)}`, file),
   rename: (label) => json("PUT", "/api/label", { label }),
   setRegion: (region) => inTurn(() => json("PUT", "/api/region", region)),
-  // `keepalive`: marks made just before the page is closed are saved, too.
+  // `keepalive`: marks made just before closing the page are saved too.
   saveMarks: (id, marks) => json("PUT", `/api/images/${id}/marks`, marks, { keepalive: JSON.stringify(marks).length < MAX_KEEPALIVE_CHARS }),
   proposeOutline: (id, box, strokes) => json("POST", `/api/images/${id}/outline`, { box, strokes }),
   removeImage: (id) => send("DELETE", `/api/images/${id}`),

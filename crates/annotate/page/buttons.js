@@ -1,6 +1,6 @@
-// Buttons: made in one way, and off with the reason why.
+// Creates buttons, and disables them with a reason.
 
-/** A button with these words. */
+/** A button with this text. */
 export function button(text, action, classes = "") {
   const made = Object.assign(document.createElement("button"), { type: "button", textContent: text, className: classes });
   made.addEventListener("click", action);
@@ -9,7 +9,7 @@ export function button(text, action, classes = "") {
 
 const titles = new WeakMap();
 
-/** Turns a control off for a reason, which its title tells, or on where there is none. */
+/** Disables a control and puts the reason into its title; enables it if there is no reason. */
 export function offBecause(control, reason) {
   if (!titles.has(control)) titles.set(control, control.title);
   control.disabled = Boolean(reason);

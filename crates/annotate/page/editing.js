@@ -1,4 +1,4 @@
-// Changes of marks: committed with a way back, saved at once.
+// Changes of marks: undoable, saved at once.
 
 import { api, isLost, present } from "./api.js";
 import { areaOf, boundsOf, boxPolygon, clamp, graspOf, gripperOf, isWithin, placedAt } from "./geometry.js";
@@ -6,15 +6,15 @@ import { changed, image, marks, region, size, state } from "./store.js";
 import { toast } from "./toast.js";
 import { showBox } from "./view.js";
 
-/** Pixels are told to a hundredth. */
+/** Coordinates are rounded to a hundredth of a pixel. */
 const round = (_, value) => (typeof value === "number" ? Math.round(value * 100) / 100 : value);
-/** Gives what the server tells of a photo the page's own fields; `strokesOf`: the strokes that each proposed outline was found with. */
+/** Adds the page's own fields to the server's view of a photo; `strokesOf`: the strokes with which each proposed outline was found. */
 export function adopt(view) {
   const committed = JSON.stringify(view.marks);
   return { ...view, committed, sent: committed, past: [], future: [], revision: 0, strokes: null, strokesOf: new Map(), drawnBox: null };
 }
 
-/** Makes the marks as they are now a step that can be undone, and saves them. */
+/** Makes the current marks an undoable step, and saves them. */
 export function commit() {
   const target = image();
   const now = JSON.stringify(target.marks, round);
@@ -34,7 +34,7 @@ function travel(from, to) {
   to(target).push(target.committed);
   target.committed = from(target).pop();
   target.marks = JSON.parse(target.committed);
-  // A stroke that is undone counts no more for the next one.
+  // An undone stroke does not count for the next one.
   target.strokes = target.strokesOf.get(target.committed) ?? null;
   Object.assign(state, { draft: null, vertex: null });
   save(target);
@@ -44,13 +44,13 @@ function travel(from, to) {
 export const undo = () => travel((t) => t.past, (t) => t.future);
 export const redo = () => travel((t) => t.future, (t) => t.past);
 
-/** Sends the marks; one request at a time for each photo, and after it what has changed meanwhile. */
+/** Sends the marks; one request at a time for each photo, followed by later changes. */
 export async function save(target) {
   target.revision += 1;
   if (target.saving) return;
   target.saving = true;
   let sent = 0;
-  // A photo that the server has no more, after it was started anew, has no number to be saved under.
+  // A photo that a restarted server does not have has no number to be saved under.
   while (sent !== target.revision && !target.isGone) {
     if (isLost()) {
       target.saved = { state: "refused", why: "sdg annotate does not answer; the marks are kept in this browser", lost: true };
@@ -62,7 +62,7 @@ export async function save(target) {
     try {
       const sending = JSON.stringify(target.marks);
       const view = await api.saveMarks(target.id, target.marks);
-      // What the disk has not taken is not sent yet: it is kept and sent again.
+      // Marks that could not be written to disk are kept and sent again.
       Object.assign(target, { saved: view.saved, advice: view.advice, sent: view.saved.by_disk ? target.sent : sending });
     } catch (error) {
       target.saved = { state: "refused", why: error.message, lost: error.lost };
@@ -74,7 +74,7 @@ export async function save(target) {
   changed();
 }
 
-/** The tool that is wanted next: what is not marked yet. */
+/** The tool for the next missing mark. */
 export function nextTool() {
   const { box, outline, grasp } = marks();
   return !box && !outline ? "box" : !grasp ? "grasp" : "select";
@@ -97,7 +97,7 @@ export function setGripper(gripper) {
   marks().grasp = graspOf(gripper, size());
 }
 
-/** A box was drawn: the outline is looked for in it, unless there is one, and the gripper is next. */
+/** After a box was drawn: its outline is detected unless there is one, and the gripper is next. */
 export function boxDrawn() {
   image().drawnBox = null;
   state.selected = "box";
@@ -123,25 +123,25 @@ export function closeOutline(points) {
   state.tool = nextTool();
 }
 
-/** Says that what lies under a stroke belongs to the part or does not; the outline is found anew with all that was said. */
+/** States that the area under a stroke belongs to the part or does not; the outline is detected again with all strokes. */
 export function strokeOutline(points, isInside) {
   const target = image();
   const box = target.marks.box ?? (target.marks.outline && boundsOf(target.marks.outline));
-  if (!box) return toast("Draw a box around the part first: the outline is looked for in it.");
+  if (!box) return toast("Draw a box around the part first: the outline is detected inside it.");
   target.strokes = [...(target.strokes ?? []), { points, isInside }];
-  // What lies outside the box and belongs to the part makes the box larger.
+  // Areas of the part outside the box enlarge the box.
   const grown = boundsOf([box.slice(0, 2), box.slice(2), ...points]);
   if (isInside && String(grown) !== String(box)) setBox(grown);
   return proposeOutline({ strokes: target.strokes });
 }
 
-/** A person's box reaches beyond the outline by this share of its side at most; a looser one is drawn to a corrected outline. */
+/** Maximum margin of a person's box around the outline, as a share of its side; a looser box is fitted to a corrected outline. */
 const LOOSE = 0.06;
 
-/** Where a stroke leaves less of the outline than this share, that is told. */
+/** If a stroke leaves less of the outline than this share, a note is shown. */
 const MUCH_LEFT = 0.65;
 
-/** Draws a loose box to the outline that was corrected, with a little room. */
+/** Fits a loose box to the corrected outline, with a margin. */
 function snapBox(marks) {
   const [x1, y1, x2, y2] = boundsOf(marks.outline);
   const room = Math.max(2, 0.02 * Math.hypot(x2 - x1, y2 - y1));
@@ -150,15 +150,15 @@ function snapBox(marks) {
   if (Math.max(x1 - bx1, y1 - by1, bx2 - x2, by2 - y2) > most) setBox([x1 - room, y1 - room, x2 + room, y2 + room]);
 }
 
-/** Asks the server for the outline of what is in the box. `quietly` when nobody asked for it by name. */
+/** Asks the server for the outline of the object in the box. `quietly`: without notes, if the user did not ask for it. */
 export async function proposeOutline({ quietly = false, strokes = null } = {}) {
   const target = image();
-  // What is said is looked for in the box that was drawn, also after it was drawn to the outline.
+  // Strokes are applied within the box that was drawn, even after the box was fitted to the outline.
   const drawn = strokes && target.drawnBox;
   const box = drawn ? boundsOf([drawn, target.marks.box].flatMap((b) => [b.slice(0, 2), b.slice(2)])) : target.marks.box ?? (target.marks.outline && boundsOf(target.marks.outline));
   if (!box) {
     setTool("box");
-    return toast("Draw a box around the part first: the outline is looked for in it.");
+    return toast("Draw a box around the part first: the outline is detected inside it.");
   }
   if (!strokes) Object.assign(target, { strokes: null, drawnBox: null });
   state.proposing = true;
@@ -166,10 +166,10 @@ export async function proposeOutline({ quietly = false, strokes = null } = {}) {
   try {
     const said = (strokes ?? []).map(({ points, isInside }) => ({ points, is_inside: isInside }));
     const { outline } = await api.proposeOutline(target.id, box, said);
-    // Whoever has drawn on meanwhile is not overruled.
+    // Marks changed in the meantime take precedence.
     const waited = target === image() && !(quietly && target.marks.outline);
     if (waited && !outline) {
-      if (!quietly) toast("Nothing in the box stands out from what is around it. Draw the outline by hand.");
+      if (!quietly) toast("Nothing in the box differs from its surroundings. Draw the outline by hand.");
     } else if (waited) {
       const before = target.marks.outline;
       target.marks.outline = outline;
@@ -184,11 +184,11 @@ export async function proposeOutline({ quietly = false, strokes = null } = {}) {
       const middle = last?.points[Math.floor(last.points.length / 2)];
       if (!strokes) toast("Found an outline. Where it is wrong, draw “In” or “Out”.");
       else if (!last.isInside && isWithin(middle, outline)) {
-        toast("That place has the part all around it. An outline is one line around the part and has no holes; a hole does no harm.");
+        toast("This place is inside the part. An outline is a single line without holes; a hole does no harm.");
       } else if (last.isInside && !isWithin(middle, outline)) {
-        toast("That place does not hang together with the part. Draw from there to the part, too, or draw the outline by hand.");
+        toast("This place is not connected with the part. Draw from there to the part as well, or draw the outline by hand.");
       } else if (!last.isInside && before && areaOf(outline) < MUCH_LEFT * areaOf(before)) {
-        toast("“Out” took much of the outline.", { text: "Undo", run: undo });
+        toast("“Out” removed much of the outline.", { text: "Undo", run: undo });
       }
     }
   } catch (error) {
@@ -207,7 +207,7 @@ export function clear(kind) {
   changed();
 }
 
-/** Deletes the selected point, or the selected mark. */
+/** Deletes the selected point or the selected mark. */
 export function deleteSelected() {
   const { outline } = marks();
   if (state.draft?.points?.length) {
@@ -223,7 +223,7 @@ export function deleteSelected() {
   if (state.selected && marks()[state.selected]) clear(state.selected);
 }
 
-/** What is selected, moved by so many pixels; `handle` where only a part of it is. */
+/** Moves the selection, or only the given `handle` of it, by this many pixels. */
 export function nudge(by, handle = null) {
   const m = marks();
   const kind = handle?.kind ?? state.selected;
@@ -232,7 +232,7 @@ export function nudge(by, handle = null) {
     const b = m.box;
     const edge = handle?.edge ?? "nwse";
     const [w, h] = size();
-    // A whole box stays as large as it is.
+    // A moved box keeps its size.
     const dx = edge === "nwse" ? clamp(by[0], -b[0], w - b[2]) : by[0];
     const dy = edge === "nwse" ? clamp(by[1], -b[1], h - b[3]) : by[1];
     setBox([b[0] + (edge.includes("w") ? dx : 0), b[1] + (edge.includes("n") ? dy : 0),
@@ -256,7 +256,7 @@ export function nudge(by, handle = null) {
   return true;
 }
 
-/** Turns and opens the gripper by so much. */
+/** Rotates and opens the gripper by these amounts. */
 export function adjustGripper({ turn = 0, open = 0 }) {
   if (!marks().grasp) return;
   const gripper = gripperOf(marks().grasp);
@@ -264,7 +264,7 @@ export function adjustGripper({ turn = 0, open = 0 }) {
   commit();
 }
 
-/** Turns the gripper to where it closes over the least of the part, moves its middle across to that of the part there, and opens it so far. */
+/** Turns the gripper to the direction of the smallest opening over the part, centres it on the part across the line, and sets the opening. */
 export function turnToFit() {
   const { grasp } = marks();
   const part = region();

@@ -1,4 +1,4 @@
-// What was found in all pictures, as a file: a line for each grasp, or JSON with the fields of "sdg detect --json".
+// All detections as a file: one line per grasp, or JSON with the fields of "sdg detect --json".
 
 import { gripperOf } from "./geometry.js";
 import { isFound, state, touchedBy } from "./store.js";
@@ -12,14 +12,14 @@ function graspOf({ marks }) {
   return { x: rounded(center[0]), y: rounded(center[1]), angle_deg: rounded((angle * 180) / Math.PI), width_px: rounded(width) };
 }
 
-/** A field that spreadsheets read as it is meant: quoted, and no formula. */
+/** A field that spreadsheets read literally: quoted, and not a formula. */
 function field(value) {
   const text = String(value ?? "");
   const plain = typeof value === "string" && /^[=+@-]/.test(text) ? `'${text}` : text;
   return /[",\n']/.test(plain) ? `"${plain.replaceAll('"', '""')}"` : plain;
 }
 
-/** The numbers of the found ones that its jaws touch. */
+/** The numbers of the detections that its jaws touch. */
 const touched = (detection, { detections }) => touchedBy(detection, detections).map((other) => detections.indexOf(other) + 1);
 
 function rows(trial) {
@@ -28,7 +28,7 @@ function rows(trial) {
     const { frame, position_mm: [px, py, pz] = [], yaw_deg: yaw, opening_mm: opening } = detection.pose ?? {};
     return [trial.name, i + 1, isFound(detection), rounded(detection.score), x, y, angle, width, frame, px, py, pz, yaw, opening, touched(detection, trial).join(" ")];
   });
-  // A picture with nothing in it has a line, too.
+  // A picture without detections has a line too.
   return found.length ? found : [[trial.name, 0, false]];
 }
 

@@ -1,4 +1,4 @@
-// The other pictures of the project's folder, and photos from elsewhere: seen, and taken in one by one.
+// The other pictures of the project's folder, and photos from elsewhere, added one by one.
 
 import { api } from "./api.js";
 import { button } from "./buttons.js";
@@ -10,7 +10,7 @@ import { toast } from "./toast.js";
 
 const by = (id) => document.getElementById(id);
 const dialog = by("folder");
-/** What a chosen picture becomes: photo or try. */
+/** Role of a chosen picture: photo or try. */
 let wanted = "photo";
 
 const isWithoutPhoto = () => !state.images.length && !state.camera;
@@ -27,7 +27,7 @@ function took(view) {
   openImage(at < 0 ? state.images.length - 1 : at);
 }
 
-/** Runs what takes pictures in; what goes wrong is told. */
+/** Runs an operation that adds pictures and reports its errors. */
 async function take(work) {
   try {
     await work();
@@ -44,7 +44,7 @@ const takePhoto = (id) => take(async () => {
   dialog.close();
 });
 
-/** Takes pictures to try, and shows the first of them. */
+/** Adds pictures to try, and shows the first of them. */
 const takeTrials = (ids) => take(async () => {
   const first = state.trialPictures.length;
   try {
@@ -54,7 +54,7 @@ const takeTrials = (ids) => take(async () => {
   }
 });
 
-/** A photo from elsewhere, which is copied beside the others. */
+/** A photo from elsewhere is copied beside the others. */
 export const uploadPhoto = (file) => take(async () => {
   took(await api.uploadPhoto(file));
   dialog.close();

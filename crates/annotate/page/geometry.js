@@ -6,17 +6,17 @@ export const times = ([x, y], k) => [x * k, y * k];
 export const dot = ([ax, ay], [bx, by]) => ax * bx + ay * by;
 export const norm = ([x, y]) => Math.hypot(x, y);
 export const direction = (radians) => [Math.cos(radians), Math.sin(radians)];
-/** A quarter turn on, clockwise as seen: from along the jaws to across them. */
+/** Rotates by a quarter turn, clockwise as seen: from along the jaws to across them. */
 export const quarter = ([x, y]) => [-y, x];
 export const clamp = (value, least, most) => Math.min(Math.max(value, least), most);
 
-/** The gripper that marks describe: its middle, its turn in radians, how wide its jaws are and how far apart. */
+/** The gripper described by marks: middle, angle in radians, length of the jaws and distance between them. */
 export function gripperOf({ start, end, jaw_width }) {
   const line = sub(end, start);
   return { center: times(add(start, end), 0.5), angle: Math.atan2(line[1], line[0]), length: norm(line), width: jaw_width };
 }
 
-/** The marks of a gripper, with its ends kept inside a photo of `size`: the jaws grow shorter where they must. */
+/** The marks of a gripper, with its ends kept inside a photo of `size`; the jaws are shortened if necessary. */
 export function graspOf({ center, angle, length, width }, size) {
   const middle = [clamp(center[0], 1, size[0] - 1), clamp(center[1], 1, size[1] - 1)];
   const along = direction(angle);
@@ -37,7 +37,7 @@ export function boundsOf(points) {
 
 export const areaOf = (polygon) => Math.abs(polygon.reduce((sum, [x, y], i) => sum + polygon.at(i - 1)[0] * y - x * polygon.at(i - 1)[1], 0)) / 2;
 
-/** Whether a point lies within a polygon: a ray from it to the right crosses the polygon's edges an odd number of times. */
+/** Whether a point is inside a polygon: a ray to the right crosses the polygon's edges an odd number of times. */
 export function isWithin([x, y], polygon) {
   return polygon.filter(([bx, by], i) => {
     const [ax, ay] = polygon.at(i - 1);
@@ -45,7 +45,7 @@ export function isWithin([x, y], polygon) {
   }).length % 2 === 1;
 }
 
-/** Cuts a polygon at the line `dot(p, normal) = bound`, keeping what lies below. */
+/** Clips a polygon at the line `dot(p, normal) = bound` and keeps the part below it. */
 function cut(polygon, normal, bound) {
   const kept = [];
   polygon.forEach((to, i) => {
@@ -57,7 +57,7 @@ function cut(polygon, normal, bound) {
   return kept;
 }
 
-/** How far the part reaches to both sides of the line within the strip that jaws of `length` sweep; null beside it. */
+/** Extent of the part to both sides of the line within the strip swept by jaws of `length`; null if the strip misses the part. */
 export function reach({ center, angle, length }, part) {
   const along = direction(angle);
   const across = quarter(along);
@@ -68,22 +68,22 @@ export function reach({ center, angle, length }, part) {
   return { least: Math.min(...offsets), most: Math.max(...offsets) };
 }
 
-/** Tried turns when a gripper is placed by a click: every five degrees. */
+/** Step between the angles tried when a gripper is placed by a click: five degrees. */
 const TURNS = Array.from({ length: 36 }, (_, i) => (i * Math.PI) / 36 - Math.PI / 2);
-/** Room between a jaw and the part when the gripper is placed, as a share of the part's width, and at least so many pixels. */
+/** Clearance between jaw and part of a placed gripper, as a share of the part's width, and its minimum in pixels. */
 const ROOM = 0.08;
 const MIN_ROOM_PX = 2;
 
 export const withRoom = (width) => width + Math.max(2 * MIN_ROOM_PX, width * ROOM);
 
-/** Sides are looked at so far along the part, in its widths; the farthest at which they are still straight counts. */
+/** Distances along the part, in its widths, at which its sides are examined; the largest at which they are still straight counts. */
 const SIDE_LENGTHS = [4, 2.5, 1.5, 1];
-/** Sides are straight where their points lie so near to a line, as a share of the part's width, and at least so many pixels. */
+/** Maximum deviation of a straight side's points from a line, as a share of the part's width, and its minimum in pixels. */
 const STRAIGHT = 0.03;
 const MIN_STRAIGHT_PX = 0.7;
-/** Edges that run more across the jaws than this are ends of the part, not sides. */
+/** Edges at a larger angle to the jaws' direction are ends of the part, not sides. */
 const MAX_ACROSS = Math.tan((35 * Math.PI) / 180);
-/** Another turn than this is no correction. */
+/** Maximum angle of a correction. */
 const MAX_CORRECTION = (20 * Math.PI) / 180;
 
 /** The points of the part's outline on both sides of the jaws within `half` along them: [along, across], a pixel apart. */
@@ -104,7 +104,7 @@ function sidePoints({ center, angle, width }, part, half) {
   return sides;
 }
 
-/** The common slope of both sides and how far their points lie from it; null where a side is missing. */
+/** The common slope of both sides and their points' distance from it; null if a side is missing. */
 function commonSlope(sides, half) {
   if (sides.some((side) => side.length < Math.max(half, 3))) return null;
   const mean = (points, axis) => points.reduce((sum, p) => sum + p[axis], 0) / points.length;
@@ -117,13 +117,13 @@ function commonSlope(sides, half) {
   return { slope, off };
 }
 
-/** The turn of a gripper along the straight sides of the part between its jaws; its own where they are not straight. */
+/** The gripper's angle aligned with the straight sides of the part between its jaws; its own angle if they are not straight. */
 export function alongSides(gripper, part) {
   const { width } = gripper;
   for (const lengths of SIDE_LENGTHS) {
     let { angle } = gripper;
     let fit = null;
-    // Turned, the jaws see more of the sides.
+    // After the rotation, the jaws cover more of the sides.
     for (let round = 0; round < 3; round += 1) {
       fit = commonSlope(sidePoints({ ...gripper, angle }, part, (lengths * width) / 2), (lengths * width) / 2);
       if (!fit) break;
@@ -135,7 +135,7 @@ export function alongSides(gripper, part) {
   return gripper.angle;
 }
 
-/** The gripper at `point` turned so that it closes over the narrowest of the part, with the middle moved between its sides. */
+/** The gripper at `point`, rotated to the smallest width of the part and centred between its sides. */
 export function placedAt(point, part, jawLength = null) {
   const [x1, y1, x2, y2] = boundsOf(part);
   const length = jawLength ?? Math.max(Math.hypot(x2 - x1, y2 - y1) / 6, 12);
@@ -153,7 +153,7 @@ export function placedAt(point, part, jawLength = null) {
   return { center: middled(angle, (least + most) / 2), angle, length, width: withRoom(most - least) };
 }
 
-/** Jaws that just let the part between them, for a gripper that was drawn as a line. */
+/** Opening at which the part just fits between the jaws, for a gripper that was drawn as a line. */
 export function fittedWidth(gripper, part) {
   const sides = part && reach(gripper, part);
   return sides ? withRoom(2 * Math.max(-sides.least, sides.most, 1)) : gripper.length * 0.7;

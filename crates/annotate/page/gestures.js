@@ -1,4 +1,4 @@
-// What mouse, pen and fingers do on the photo.
+// Gestures of mouse, pen and fingers on the photo.
 
 import { add, direction, dot, fittedWidth, gripperOf, norm, quarter, sub, times } from "./geometry.js";
 import { boxDrawn, closeOutline, commit, placeGripper, setBox, setGripper, setTool, strokeOutline } from "./editing.js";
@@ -9,23 +9,23 @@ import { pan, toPhoto, zoom } from "./view.js";
 
 const stage = document.getElementById("stage");
 const overlay = document.getElementById("overlay");
-/** A pointer that moved less has clicked. */
+/** A pointer that moves less than this has clicked. */
 const CLICK_PX = 5;
-/** The jaws grow wider only when an end's knob is dragged this much out or in: turning alone should not do it. */
+/** The jaws' length changes only if an end's knob is dragged by at least this much outwards or inwards, so that turning alone does not change it. */
 const LENGTH_SLACK_PX = 12;
 /** A second click within this time closes the outline. */
 const DOUBLE_MS = 400;
 const SNAP_RAD = Math.PI / 12;
-/** Between the points of a stroke, and how many there are at most; the server takes a thousand. */
+/** Distance between the points of a stroke, and their maximum number; the server accepts a thousand. */
 const STROKE_STEP_PX = 4;
 const MAX_STROKE_POINTS = 500;
 
-/** Pointers that are down, by their id: where they are on the stage. */
+/** Position on the stage of each pressed pointer, by id. */
 const pointers = new Map();
-/** What the pointer that went down first does: `move(point, event)`, `end(clicked)`. */
+/** Action of the first pressed pointer: `move(point, event)`, `end(clicked)`. */
 let gesture = null;
 let spaceHeld = false;
-/** Where and when the outline got its last point. */
+/** Position and time of the outline's last point. */
 let lastPoint = null;
 
 const place = (event) => {
@@ -101,13 +101,13 @@ function addingPoint() {
   };
 }
 
-/** A stroke, or a click, over what belongs to the part or does not. */
+/** A stroke or click over an area that belongs to the part or does not. */
 function stroking(isInside, from) {
   const points = [from];
   return {
     move(at) {
       const to = toPhoto(at);
-      // Points nearer to each other tell nothing more.
+      // Closer points add no information.
       if (norm(sub(to, points.at(-1))) * state.view.scale < STROKE_STEP_PX || points.length >= MAX_STROKE_POINTS) return;
       points.push(to);
       state.draft = { kind: "stroke", points, isInside };
@@ -123,7 +123,7 @@ function stroking(isInside, from) {
   };
 }
 
-/** Changes marks while the pointer moves; what is there at the end is one step that can be undone. */
+/** Changes marks while the pointer moves; the final state is one undoable step. */
 function correcting(change) {
   return {
     move(at, event) {
@@ -151,7 +151,7 @@ function draggingVertex(vertex) {
   });
 }
 
-/** A new point where the outline's line was taken hold of. */
+/** A new point where the outline's line was grabbed. */
 function draggingLine(from) {
   const { outline } = marks();
   const distance = (i) => {
@@ -190,13 +190,13 @@ function draggingGripper(data, from) {
   return correcting((to) => setGripper({ ...gripper, center: add(gripper.center, sub(to, from)) }));
 }
 
-/** The handle of the outline's point nearest to a place: where points are close, their handles overlap. */
+/** The handle of the outline's nearest point: where points are close, their handles overlap. */
 function nearestVertex(place) {
   const distances = marks().outline.map((point) => norm(sub(point, place)));
   return overlay.querySelector(`.vertex[data-vertex="${distances.indexOf(Math.min(...distances))}"]`);
 }
 
-/** What a pointer that goes down begins. */
+/** The action begun by a pressed pointer. */
 function begin(event, at) {
   const from = toPhoto(at);
   const taken = event.target.closest?.("[data-kind]");
@@ -225,7 +225,7 @@ function begin(event, at) {
   return panning();
 }
 
-// A drag of a selection, or of a picture, would take the pointer away.
+// Dragging a selection or a picture would take the pointer away.
 stage.addEventListener("dragstart", (event) => event.preventDefault());
 
 overlay.addEventListener("pointerdown", (event) => {
@@ -234,7 +234,7 @@ overlay.addEventListener("pointerdown", (event) => {
   pointers.set(event.pointerId, at);
   overlay.setPointerCapture(event.pointerId);
   if (pointers.size > 1) {
-    // Two fingers look around; what the first one began is dropped.
+    // Two fingers move the view; the first finger's action is cancelled.
     if (gesture) abandon();
     gesture = null;
     return;
@@ -274,7 +274,7 @@ function up(event) {
 overlay.addEventListener("pointerup", up);
 overlay.addEventListener("pointercancel", up);
 
-/** Back to the marks before the gesture. */
+/** Restores the marks from before the gesture. */
 export function abandon() {
   gesture = null;
   stage.classList.remove("panning");
@@ -289,7 +289,7 @@ overlay.addEventListener("wheel", (event) => {
   zoom(Math.exp(-event.deltaY * notch * (event.ctrlKey ? 0.01 : 0.0015)), place(event));
 }, { passive: false });
 
-/** A handle that the keyboard reaches is what is selected. */
+/** A handle focused by keyboard becomes the selection. */
 overlay.addEventListener("focusin", (event) => {
   const { kind, vertex } = event.target.dataset;
   if (!kind || gesture) return;
@@ -302,7 +302,7 @@ export function holdSpace(held) {
   spaceHeld = held;
 }
 
-/** Ends what is being drawn; without, lets go of what is selected. */
+/** Ends the current drawing; otherwise clears the selection. */
 export function letGo() {
   abandonRegion();
   if (gesture || state.draft) return abandon();

@@ -1,7 +1,7 @@
-// After the first refusals: which of the refused pictures, learnt from, would help most in the others.
+// After the first refusals: which of the refused pictures would help most in the others, if the model learnt from it.
 //
-// Each of the few that come nearest is learnt from on trial, and the others are looked at with that. It is tried with model S alone, which is
-// taught in a second, and whether the part is where it was refused only the person knows.
+// For each of the few best candidates a trial model is taught, and the other pictures are searched with it. This is
+// done with model S only, which is taught in a second. Only the user knows whether the part is where it was refused.
 
 import { api } from "./api.js";
 import { button } from "./buttons.js";
@@ -9,17 +9,17 @@ import { isFound, isLive, state, trialPicture } from "./store.js";
 import { openTrialPicture } from "./strip.js";
 import { isQuick, teachRequest } from "./teach.js";
 
-/** Below it nothing resembles the part. The same as in found_text.rs. */
+/** Below this score nothing resembles the part. The same value as in found_text.rs. */
 const MIN_LIKE = 0.03;
 const MAX_CANDIDATES = 3;
 const MAX_OTHERS = 8;
-/** No further one is begun after so long. */
+/** After this time no further candidate is begun. */
 const MAX_MS = 6000;
 
 const by = (id) => document.getElementById(id);
 const best = ({ detections }) => detections[0]?.score ?? 0;
 
-/** What there is to try; null where there is nothing, or not yet. */
+/** The candidates and other pictures; null if there are none, or not yet. */
 function question() {
   if (state.tab !== "try" || isLive() || !isQuick()) return null;
   const { trialPictures } = state;
@@ -32,7 +32,7 @@ function question() {
   return { key, candidates, refused };
 }
 
-/** The question that is answered, or being answered; for each candidate the best score in each of the other pictures. */
+/** The query that is or was answered; for each candidate the best score in each of the other pictures. */
 let [asked, answers, isDone, isAsking] = ["", [], true, false];
 
 async function ask({ key, candidates, refused }) {
@@ -45,7 +45,7 @@ async function ask({ key, candidates, refused }) {
       if (!scores) break;
       answers.push({ candidate, scores: scores.map(([, score]) => score) });
     } catch {
-      // Marks that cannot be taught: nothing is said of this one.
+      // Marks unsuitable for teaching: this candidate is skipped.
     }
     if (performance.now() - start > MAX_MS || question()?.key !== key) break;
   }
@@ -53,7 +53,7 @@ async function ask({ key, candidates, refused }) {
   renderHelps();
 }
 
-/** What is said, and the picture that it is about. */
+/** The text, and the picture that it is about. */
 function answer() {
   if (!isDone) return { text: "Trying which of the refused pictures would help most…" };
   const counted = answers.map(({ candidate, scores }) => ({ candidate, count: scores.filter((score) => score >= state.minScore).length, of: scores.length }));
@@ -66,7 +66,7 @@ function answer() {
   return { text, candidate };
 }
 
-/** Asks once what is to be asked, and shows what came of it. */
+/** Sends each query once, and shows its result. */
 export function renderHelps() {
   const now = question();
   if (now && now.key !== asked && !isAsking) ask(now);

@@ -1,4 +1,4 @@
-// Shortcuts. In fields, keys are for writing.
+// Shortcuts. In fields, keys are for text.
 
 import { adjustGripper, boxDrawn, closeOutline, deleteSelected, nudge, placeGripper, proposeOutline, redo, setBox, setTool, strokeOutline, undo } from "./editing.js";
 import { boundsOf, boxPolygon } from "./geometry.js";
@@ -13,7 +13,7 @@ const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], Arrow
 const help = document.getElementById("help");
 const overlay = document.getElementById("overlay");
 
-/** The chosen mark without a pointer: in the middle of what is in view, to be moved from there. */
+/** Creates the chosen mark without a pointer, in the middle of the view; it can be moved from there. */
 function putInTheMiddle() {
   if (state.tool === "outline") {
     if (state.draft) closeOutline(state.draft.points);
@@ -36,7 +36,7 @@ function putInTheMiddle() {
   return true;
 }
 
-/** The whole photo; when that is shown already, the part. */
+/** Shows the whole photo or, if that is shown already, the part. */
 export function fitOrPart() {
   const best = !isLive() && state.tab === "try" ? trialPicture()?.detections?.[0]?.marks : null;
   const part = best ? best.outline ?? boxPolygon(best.box) : state.tab === "try" || isLive() ? null : region();
@@ -44,7 +44,7 @@ export function fitOrPart() {
   else fit();
 }
 
-/** Chosen by its key, a mark is made by keys: Enter is for the photo, whatever button was pressed before. */
+/** A mark chosen by key is made by keys: Enter goes to the photo, whichever button was pressed before. */
 function choose(tool) {
   setTool(tool);
   if (!document.activeElement?.closest("#stage")) overlay.focus({ preventScroll: true });
@@ -87,7 +87,7 @@ const LOOKING = {
   escape: letGo,
 };
 
-/** What the handle in focus is, for the arrow keys. */
+/** The handle in focus, for the arrow keys. */
 function focused() {
   const data = document.activeElement?.dataset;
   if (!data?.kind) return null;
@@ -95,7 +95,7 @@ function focused() {
   return { kind: data.kind, edge: data.edge, end: data.end, jaw: data.jaw !== undefined, vertex };
 }
 
-// Where the focus is on the photo is shown to those who move it by keys: browsers cannot tell for drawings.
+// The focus on the photo is shown only to keyboard users: browsers cannot distinguish this for drawings.
 document.addEventListener("keydown", () => document.documentElement.toggleAttribute("data-keys", true), true);
 document.addEventListener("pointerdown", () => document.documentElement.removeAttribute("data-keys"), true);
 

@@ -1,4 +1,4 @@
-// The camera: its newest picture on the stage, photos taken of it, and the taught model tried on it again and again.
+// The camera: its newest picture on the stage, photos taken from it, and the taught model applied to it continuously.
 
 import { api } from "./api.js";
 import { offBecause } from "./buttons.js";
@@ -10,13 +10,13 @@ import { changed, isFound, isLive, state, touchedBy } from "./store.js";
 import { toast } from "./toast.js";
 import { replacePicture } from "./view.js";
 
-/** Between questions to the server: more pictures a second than a person needs to see. */
+/** Interval between requests: more pictures per second than a person needs. */
 const PAUSE_MS = 60;
-/** The same while the model is tried and waits for the camera's next frame; after a frame the next one is asked for at once. */
+/** Interval while the model is tried and waits for the camera's next frame; after a frame the next one is requested at once. */
 const TRYING_PAUSE_MS = 15;
-/** After a failed question, or while nobody looks at the page. */
+/** Interval after a failed request, or while the page is hidden. */
 const RETRY_MS = 500;
-/** Grasps of a frame that are told in words; all are drawn. */
+/** Maximum number of grasps of a frame described in words; all are drawn. */
 const MAX_TOLD = 3;
 const FAULTS = {
   other_size: "Another size",
@@ -34,7 +34,7 @@ const by = (id) => document.getElementById(id);
 const wait = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 const isPaused = () => state.tab === "try" && state.live.paused;
 
-/** Asks for the newest frame as long as it is shown. */
+/** Requests the newest frame as long as the live picture is shown. */
 let running = false;
 async function run() {
   if (running) return;
@@ -57,7 +57,7 @@ async function run() {
   running = false;
 }
 
-/** Shows the newest frame, with the grasps found in this very frame where the model is tried; says whether it was a new one. */
+/** Shows the newest frame, while the model is tried with its own detections; returns whether the frame was new. */
 async function look() {
   const { live } = state;
   const now = await api.live();
@@ -68,7 +68,7 @@ async function look() {
   const isTrying = state.tab === "try" && state.hasModel && now.is_usable;
   if (number === live.number && (!isTrying || live.detections)) return false;
   const [url, found] = await Promise.all([pictureOf(number), isTrying ? graspsIn(number) : { detections: null }]);
-  // Whoever has paused or gone elsewhere meanwhile keeps what is on the stage.
+  // After a pause or a change of the view in the meantime, the stage is kept.
   if (!isLive() || isPaused()) {
     URL.revokeObjectURL(url);
     return false;
@@ -83,7 +83,7 @@ async function look() {
   return true;
 }
 
-/** The picture as an address that the browser has decoded already: a change of pictures then does not flicker. */
+/** The picture as an address that the browser has already decoded, so that changing pictures does not flicker. */
 async function pictureOf(number) {
   const url = URL.createObjectURL(await api.livePicture(number));
   const decoded = new Image();
@@ -109,7 +109,7 @@ export function toggleCamera() {
   showCurrent();
 }
 
-/** Makes the frame that is on the stage a photo of the part. */
+/** Makes the frame on the stage a photo of the part. */
 export async function takePhoto() {
   const { live } = state;
   if (state.tab !== "mark" || !isLive() || !live.isUsable || live.taking) return;
@@ -119,7 +119,7 @@ export async function takePhoto() {
     const view = await api.takePhoto(live.number);
     state.images.push(adopt(view));
     openImage(state.images.length - 1);
-    // The button goes with the live picture.
+    // The button disappears with the live picture.
     by("overlay").focus({ preventScroll: true });
     toast(`Photo taken: ${view.name}`);
   } catch (error) {
@@ -129,7 +129,7 @@ export async function takePhoto() {
   changed();
 }
 
-/** Pauses and goes on; from another picture, back to the camera. */
+/** Pauses and continues; from another picture, returns to the camera. */
 export function toggleLive() {
   if (!state.camera || state.tab !== "try") return;
   if (state.tryingLive) state.live.paused = !state.live.paused;
@@ -141,7 +141,7 @@ export function toggleLive() {
   changed();
 }
 
-/** Makes the frame that is on the stage a picture to try. */
+/** Makes the frame on the stage a picture to try. */
 export async function keepPicture() {
   const { live } = state;
   if (state.tab !== "try" || !isLive() || live.number === null) return;
@@ -166,7 +166,7 @@ function setText(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
 
-/** Where a grasp is, in words: in pixels of the picture, and over the table where a camera tells. */
+/** A grasp's position in words: in pixels of the picture, and over the table if the camera is calibrated. */
 export function placeText({ marks, pose }) {
   const { center, angle, width } = gripperOf(marks.grasp);
   const [x, y] = center.map((v) => v.toFixed(1));
@@ -174,7 +174,7 @@ export function placeText({ marks, pose }) {
   return pose ? `${inPicture}\n${poseText(pose)}` : inPicture;
 }
 
-/** Which parts the jaws of a found one touch, by their numbers among those that are listed; empty where they touch none. */
+/** The parts that a detection's jaws touch, by their numbers in the list; empty if there are none. */
 export function touchText(detection, detections, listed) {
   const touched = isFound(detection) ? touchedBy(detection, detections) : [];
   if (!touched.length) return "";
@@ -196,7 +196,7 @@ function renderState() {
   const kind = isPaused() ? "paused" : live.fault ? live.fault.kind : live.url ? "live" : "waiting";
   by("live-state").dataset.kind = live.fault && !isPaused() ? (live.isUsable ? "ended" : "fault") : kind;
   setText(by("live-word"), { paused: "Paused", live: "Live", waiting: "Waiting" }[kind] ?? FAULTS[kind]);
-  const why = { paused: "", live: state.camera, waiting: state.camera, gone: `${live.fault?.text}. It is tried again and again.` }[kind];
+  const why = { paused: "", live: state.camera, waiting: state.camera, gone: `${live.fault?.text}. Connecting is retried.` }[kind];
   setText(by("live-why"), why ?? live.fault.text);
 }
 
@@ -231,7 +231,7 @@ function renderTrying() {
   const isAnswered = state.tryingLive && live.isUsable && live.detections && !live.failed;
   by("live-error").hidden = !state.tryingLive || !live.failed;
   setText(by("live-error"), live.failed ?? "");
-  const time = isAnswered ? `Looked for ${Math.max(1, Math.round(live.seconds * 1000))} ms.` : state.hasModel ? "Looking…" : "Teach a model first: it then looks for the part here.";
+  const time = isAnswered ? `Search took ${Math.max(1, Math.round(live.seconds * 1000))} ms.` : state.hasModel ? "Looking…" : "Teach a model first: it then looks for the part here.";
   setText(by("live-time"), live.failed || !state.tryingLive || (live.fault && !live.isUsable) ? "" : time);
   const told = isAnswered ? cards(live.detections) : [];
   const text = JSON.stringify(told);
@@ -249,7 +249,7 @@ function renderTrying() {
     item.querySelector(".warning").hidden = !touching;
     return item;
   }));
-  // Told to those who do not see the page when the number changes only; the figures change with every frame.
+  // Announced to screen readers only if the number changes; the figures change with every frame.
   const count = live.detections?.filter(isFound).length ?? 0;
   setText(by("live-status"), isAnswered ? `${count} found` : "");
 }

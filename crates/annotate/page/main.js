@@ -1,4 +1,4 @@
-// The page: asks the server what there is, then shows what `state` says, again after every change.
+// The page: loads the session from the server, then renders `state` after every change.
 
 import { api, belongTo } from "./api.js";
 import { adopt } from "./editing.js";
@@ -23,7 +23,7 @@ import { renderView, zoom } from "./view.js";
 
 const by = (id) => document.getElementById(id);
 
-/** The theme outlives the page, as far as the browser keeps it. */
+/** The theme is stored in the browser, if it allows that. */
 const THEMES = ["auto", "light", "dark"];
 function setTheme(theme) {
   document.documentElement.dataset.theme = theme;
@@ -42,13 +42,13 @@ by("zoom-out").addEventListener("click", () => zoom(0.8));
 by("zoom-fit").addEventListener("click", fitOrPart);
 
 onChange(() => {
-  // Until the server has answered there is nothing to show.
+  // Nothing is shown before the server has answered.
   if (state.project === undefined) return;
   for (const render of [renderTabs, renderView, renderOverlay, renderStrip, renderMarkPanel, renderSamples, renderTeach, renderVersions, renderTry, renderLive, renderRegion, renderFolder, renderUnsaved]) render();
   document.title = `${shownName() || "Photo"} · Teach a grasp`;
 });
 
-// The key in the address is in a cookie now: out of sight, and out of the history.
+// The token from the address is in a cookie now: it is removed from the address and the history.
 history.replaceState(null, "", "/");
 
 try {

@@ -1,4 +1,4 @@
-// The first step's panel: what to mark next, in numbers too, what looks odd, and what it is enough for.
+// The first step's panel: the next mark, its numbers, problems, and the models that the marks suffice for.
 
 import { api } from "./api.js";
 import { offBecause } from "./buttons.js";
@@ -33,12 +33,12 @@ for (const button of document.querySelectorAll("[data-draw]")) {
 for (const button of document.querySelectorAll("[data-clear]")) {
   button.addEventListener("click", () => {
     clear(button.dataset.clear);
-    // The button goes with the mark; left alone, the focus would stay on it until the next frame, and take Enter.
+    // The button disappears with the mark; otherwise the focus would stay on it until the next frame and receive Enter.
     by("overlay").focus({ preventScroll: true });
   });
 }
 for (const kind of ["box", "grasp", "outline"]) {
-  // The way to a mark that lies under another one.
+  // Selects a mark that is under another one.
   by(`do-${kind}`).addEventListener("click", (event) => {
     if (event.target.closest("button, input") || !marks()[kind] || state.draft) return;
     Object.assign(state, { selected: kind, vertex: null, tool: "select" });
@@ -100,7 +100,7 @@ function renderTodo() {
     item.classList.toggle("selected", kind === state.selected);
     item.querySelector(`[data-clear]`).hidden = !marks()[kind];
     const draw = item.querySelector(`[data-draw]`);
-    if (kind !== "outline") draw.textContent = marks()[kind] ? "Draw anew" : kind === "box" ? "Draw" : "Place";
+    if (kind !== "outline") draw.textContent = marks()[kind] ? "Draw again" : kind === "box" ? "Draw" : "Place";
   }
   by("turn-around").hidden = by("turn-to-fit").hidden = !grasp;
   by("remove-photo").hidden = state.images.length < 2;
@@ -109,8 +109,8 @@ function renderTodo() {
   offBecause(by("turn-to-fit"), noBox);
   offBecause(document.querySelector("#panel-mark [data-next=samples]"), noBox);
   by("grasp-numbers").hidden = !grasp;
-  offBecause(by("propose"), state.proposing ? "The outline is looked for" : noBox);
-  by("propose").lastChild.textContent = state.proposing ? "Looking…" : outline ? "Find it anew" : "Find it";
+  offBecause(by("propose"), state.proposing ? "The outline is being detected" : noBox);
+  by("propose").lastChild.textContent = state.proposing ? "Looking…" : outline ? "Find it again" : "Find it";
   if (!grasp) return;
   const { angle, width, length } = gripperOf(grasp);
   const numbers = { angle: (angle * 180) / Math.PI, width, length };
@@ -170,15 +170,15 @@ function renderAdvice({ advice }) {
 
 function hint() {
   const { box, grasp, outline } = marks();
-  if (state.proposing) return "Looking for the outline…";
+  if (state.proposing) return "Detecting the outline…";
   if (state.tool === "box") return "Drag a box around the whole part";
-  if (state.tool === "grasp") return "Click the part where the gripper is to hold it";
+  if (state.tool === "grasp") return "Click the part where the gripper should hold it";
   if (state.tool === "outline") {
     const count = state.draft?.points?.length ?? 0;
     return count > 2 ? "Click the first point, or press Enter, to close" : "Click around the part, point by point";
   }
-  if (state.tool === "in") return "Click, or draw over, what belongs to the part and is left out";
-  if (state.tool === "out") return "Click, or draw over, what does not belong to the part: a shadow, the table";
+  if (state.tool === "in") return "Click or draw over missing areas of the part";
+  if (state.tool === "out") return "Click or draw over areas outside the part: a shadow, the table";
   if (state.selected === "grasp" && grasp) return "Drag between the jaws to move, a jaw to open, an end to turn";
   if (state.selected === "outline" && outline) return "Drag a point, or the line to add one; Del deletes";
   return box || grasp || outline ? "" : "Choose Box to begin";

@@ -1,4 +1,4 @@
-// Marks as they are drawn over the photo. Elements are kept from frame to frame, so that a handle in focus stays so.
+// The marks drawn over the photo. Elements are kept between frames, so that a focused handle keeps the focus.
 
 import { add, boundsOf, boxPolygon, direction, gripperOf, quarter, sub, times } from "./geometry.js";
 import { image, isFound, isLive, isMarking, marks, state, touchedBy, trialPicture } from "./store.js";
@@ -6,12 +6,12 @@ import { toScreen } from "./view.js";
 
 const SVG = "http://www.w3.org/2000/svg";
 const overlay = document.getElementById("overlay");
-/** How far around a handle a pointer takes hold of it: fingers are thicker. */
+/** Radius around a handle in which a pointer grabs it: larger for fingers. */
 const REACH_PX = matchMedia("(pointer: coarse)").matches ? 20 : 11;
-/** Between the end of the line and its knob, so that knob and jaws are apart however small the gripper is. */
+/** Distance between the end of the line and its knob, so that knob and jaws stay apart however small the gripper is. */
 export const KNOB_PX = 20;
 const JAW_PX = 12;
-/** Where nothing is accepted, the best refused one is shown if it scores so much. */
+/** If nothing is accepted, the best refused detection is shown if its score is at least this. */
 export const MIN_SHOWN = 0.002;
 
 const CORNERS = { nw: [0, 1], n: [0.5, 1], ne: [2, 1], e: [2, 1.5], se: [2, 3], s: [0.5, 3], sw: [0, 3], w: [0, 1.5] };
@@ -20,7 +20,7 @@ const SIDES = { nw: "top left", n: "top", ne: "top right", e: "right", se: "bott
 let drawn = new Map();
 let next = new Map();
 
-/** An element by its key, made if it is new; those not asked for in a frame are removed after it. */
+/** An element by its key, created if new; elements not requested in a frame are removed after it. */
 function element(key, name, attributes, parent = overlay) {
   let found = drawn.get(key);
   if (!found) {
@@ -44,7 +44,7 @@ function line(key, parent, d) {
   element(`${key}/line`, "path", { class: "line", d }, parent);
 }
 
-/** A handle that mouse, finger and keyboard take hold of. What it is stands in its data. */
+/** A handle for mouse, finger and keyboard. Its role is in its data. */
 function handle(key, parent, data, label, classes = "") {
   const attributes = { class: `handle ${classes}`, tabindex: 0, role: "button", "aria-label": label };
   for (const [name, value] of Object.entries(data)) attributes[`data-${name}`] = value;
@@ -150,7 +150,7 @@ function drawDraft(draft) {
   });
 }
 
-/** What was said to belong to the part and what not: strokes, and clicks as dots. */
+/** Strokes for the part and its surroundings, and clicks as dots. */
 function drawStrokes(strokes) {
   const parent = group("strokes", "strokes");
   strokes.forEach(({ points, isInside }, i) => {
@@ -159,7 +159,7 @@ function drawStrokes(strokes) {
   });
 }
 
-/** Where picture and photo differ under a refused one: edges red, surface blue. */
+/** Differences between picture and photo below a refused detection: edges red, surface blue. */
 function drawDifferences(refusal, i) {
   const parent = group(`differs${i}`, "differs");
   for (const kind of ["surface", "edges"]) {
@@ -168,10 +168,10 @@ function drawDifferences(refusal, i) {
   }
 }
 
-/** Text about one of several grasps, with the number that it has in the picture and in the list. */
+/** Text about one of several grasps, with its number in the picture and in the list. */
 export const numbered = (text, i, count) => (count > 1 ? `${i + 1}: ${text}` : text);
 
-/** A grasp that a model found: drawn alike, but not to be taken hold of. */
+/** A detected grasp: drawn like a marked one, but not draggable. */
 function drawDetection(detection, i, count, detections) {
   const touches = isFound(detection) && touchedBy(detection, detections).length;
   const parent = group(`found${i}`, isFound(detection) ? (touches ? "touching" : "") : "refused");
@@ -194,7 +194,7 @@ function drawDetection(detection, i, count, detections) {
 export function renderOverlay() {
   next = new Map();
   if (state.tab === "try") {
-    // What was found in an old picture is not there now.
+    // Detections in an old picture are not valid now.
     const inLive = state.live.isUsable ? state.live.detections : null;
     const detections = isLive() ? inLive : trialPicture()?.detections;
     const shown = detections?.filter((d, i) => isFound(d) || state.showRefused || (!isLive() && i === 0 && d.score >= MIN_SHOWN)) ?? [];
@@ -215,7 +215,7 @@ export function renderOverlay() {
   }
   for (const [key, found] of drawn) if (!next.has(key)) found.remove();
   drawn = next;
-  // What is selected lies on top, so that nothing else is in its way. It has the focus: the others are moved under it.
+  // The selection is on top, so that nothing covers it. It has the focus: the others are moved below it.
   const order = ["grasp", "outline", "box"].filter((key) => key !== state.selected);
   const groups = [...order, state.selected, "draft"].map((key) => drawn.get(key)).filter(Boolean);
   for (let i = groups.length - 2; i >= 0; i -= 1) {

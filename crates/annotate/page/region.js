@@ -1,4 +1,4 @@
-// The part of the pictures that is searched: shown as a frame, set by dragging on the picture or by four numbers.
+// The searched region of the pictures: shown as a frame, set by dragging on the picture or by four numbers.
 
 import { api } from "./api.js";
 import { offBecause } from "./buttons.js";
@@ -12,20 +12,20 @@ const SIDES = ["x", "y", "width", "height"];
 /** A region with a shorter side was drawn by mistake. */
 const MIN_SIDE_PX = 8;
 
-/** Whether the next drag on the picture draws the region; what is being drawn, as [x, y, width, height]. */
+/** Whether the next drag on the picture draws the region; the region being drawn, as [x, y, width, height]. */
 let isDrawing = false;
 let drawn = null;
 
 export const isChoosingRegion = () => isDrawing && state.tab === "try";
 
-/** Width and height of the picture on the stage; null where there is none. */
+/** Width and height of the picture on the stage; null without a picture. */
 function pictureSize() {
   if (isLive()) return state.live.size;
   const shown = trialPicture();
   return shown ? [shown.width, shown.height] : null;
 }
 
-/** Asks the server to search this part alone, or all with null, and looks at everything again. */
+/** Asks the server to search only this region (null: the whole picture), and searches all pictures again. */
 async function setRegion(region) {
   by("region-error").hidden = true;
   try {
@@ -41,7 +41,7 @@ async function setRegion(region) {
 
 const ofNumbers = ([x, y, width, height]) => setRegion({ x, y, width, height, picture: pictureSize() });
 
-/** What a drag on the picture does while a region is drawn. */
+/** The action of a drag on the picture while a region is drawn. */
 export function drawingRegion(from) {
   return {
     move(at) {
@@ -63,7 +63,7 @@ export function drawingRegion(from) {
   };
 }
 
-/** Lets go of what is being drawn. */
+/** Cancels the drawing. */
 export function abandonRegion() {
   if (!isDrawing) return;
   [isDrawing, drawn] = [false, null];
@@ -80,7 +80,7 @@ by("region-form").addEventListener("submit", (event) => {
   ofNumbers(SIDES.map((side) => by(`region-${side}`).valueAsNumber));
 });
 
-/** The frame, and the rest of the picture darkened. It lies below all else that is drawn. */
+/** The frame, with the rest of the picture darkened. It is below all other drawings. */
 function renderFrame() {
   const overlay = by("overlay");
   let frame = by("region-frame");
@@ -116,12 +116,12 @@ export function renderRegion() {
   by("region-all").hidden = !region;
   const isOther = region?.picture && String(region.picture) !== String(size);
   by("region-text").textContent = isDrawing
-    ? "Drag over the part of the picture where parts are to be looked for."
+    ? "Drag over the region of the picture to be searched."
     : isOther
       ? `It is for pictures of ${region.picture.join(" × ")} pixels; this one has ${size.join(" × ")}.`
       : region
-        ? "Parts whose grasp and at least half of which lie in the frame are found. What is taught next searches there, too."
-        : "All of the picture is searched. A part of it is quicker, and nothing beside it is found.";
+        ? "Parts are found if their grasp and at least half of the part are in the frame. Models taught later search there, too."
+        : "The whole picture is searched. A smaller region is faster, but parts outside it are not found.";
   for (const id of ["region-draw", "region-all", "region-set"]) {
     offBecause(by(id), ["running", "stopping"].includes(state.teaching.status) && "A model is being taught");
   }

@@ -14,7 +14,7 @@ document.getElementById("other-samples").addEventListener("click", () => {
   renderSamples();
 });
 
-/** Shows samples of the marks as they are; pictures are asked for anew only when the marks have changed. */
+/** Shows samples of the current marks; pictures are requested again only if the marks have changed. */
 export function renderSamples() {
   if (state.tab !== "samples") return;
   const isBoxed = image() && (image().marks.box || image().marks.outline);
@@ -34,7 +34,7 @@ export function renderSamples() {
     problem.textContent = "There is nothing to show yet: draw a box around the part first.";
     return sheet.replaceChildren();
   }
-  // The revision keeps apart pictures of the same address.
+  // The revision distinguishes pictures of the same address.
   const revision = image().revision;
   sheet.replaceChildren(...Array.from({ length: COUNT }, (_, i) => {
     const item = document.createElement("li");
@@ -49,7 +49,7 @@ export function renderSamples() {
   }));
 }
 
-/** What went wrong with a sample, in the server's words. */
+/** The server's error text for a sample. */
 async function explain(event) {
   if (!problem.hidden) return;
   problem.hidden = false;

@@ -1,4 +1,5 @@
-// The server's end: a banner says so, the picture stays, and marks wait in the browser until the server is back.
+// Loss of the server: a banner reports it, the picture stays, and marks are kept in the browser until the server is
+// back.
 
 import { api, belongTo, isLost, onLoss, setLost } from "./api.js";
 import { adopt, save } from "./editing.js";
@@ -7,14 +8,14 @@ import { showCurrent } from "./strip.js";
 import { toast } from "./toast.js";
 
 const banner = document.getElementById("lost");
-/** Between questions whether the server is there: while it answers, and while it does not. */
+/** Intervals of checking the server: while it answers, and while it does not. */
 const BEAT_MS = 3000;
 const RETRY_MS = 1500;
 const KEPT = "kept-marks";
 
 const isUnsaved = (target) => target.saving || target.saved.lost || target.saved.by_disk;
 
-/** Keeps marks that the server has not got, by the photo's name. */
+/** Stores marks that the server has not received, by the photo's name. */
 function keep() {
   const kept = {};
   for (const target of state.images.filter(isUnsaved)) kept[target.name] = { was: target.sent, marks: target.marks };
@@ -33,7 +34,7 @@ onLoss((lost) => {
   } else toast("sdg annotate answers again.");
 });
 
-/** Pairs each of `known` with the one in `views` of its name; of equal names the first with the first. */
+/** Pairs each entry of `known` with the one in `views` of the same name; equal names are paired in order. */
 function pairsByName(known, views) {
   const left = [...views];
   const pairs = known.map((entry) => {
@@ -43,18 +44,18 @@ function pairsByName(known, views) {
   return { pairs, further: left };
 }
 
-/** Takes over the numbers of a server that was started anew, if there is one; then what waits for it is sent. */
+/** Adopts the numbers of a restarted server, if there is one; then waiting marks are sent. */
 async function meetAgain() {
   let session;
   try {
     session = await api.session({ ofAnySession: true });
   } catch {
-    // The next beat asks again.
+    // The next check tries again.
     return;
   }
-  // It was started without a project: the marks that wait are sent when this one is opened again.
+  // The server was started without a project: waiting marks are sent when this project is opened again.
   if (session.start) return location.reload();
-  // Another call of this was quicker.
+  // Another call of this function was faster.
   if (!isLost()) return;
   const gone = [];
   const adoptNumbers = (entries, views, take) => {
@@ -81,12 +82,12 @@ async function meetAgain() {
   belongTo(session);
   setLost(false);
   api.teaching().then((teaching) => Object.assign(state, { teaching }), () => null).then(changed);
-  if (gone.length) toast(`Not there any more: ${gone.join(", ")}.`);
+  if (gone.length) toast(`No longer there: ${gone.join(", ")}.`);
   if (state.images[state.current] !== shown || state.trialPictures[state.trial] !== tried) showCurrent();
   changed();
 }
 
-/** Marks that were kept when the page was closed or loaded again without a server. */
+/** Marks stored when the page was closed or reloaded without a server. */
 export async function sendKept(project) {
   const text = localStorage.getItem(KEPT);
   localStorage.removeItem(KEPT);
@@ -96,7 +97,7 @@ export async function sendKept(project) {
   const sent = [];
   for (const [name, { was, marks }] of Object.entries(kept)) {
     const target = state.images.find((image) => image.name === name);
-    // What was changed elsewhere since is not overwritten.
+    // Marks changed elsewhere since then are not overwritten.
     if (!target || target.committed !== was || JSON.stringify(marks) === was) continue;
     target.past.push(target.committed);
     Object.assign(target, { marks, committed: JSON.stringify(marks) });
@@ -108,7 +109,7 @@ export async function sendKept(project) {
 
 window.addEventListener("pagehide", () => keep());
 
-/** A banner that stays as long as marks could not be written. */
+/** A banner shown as long as marks could not be written. */
 export function renderUnsaved() {
   const unsaved = state.images.filter(({ saved }) => saved.by_disk);
   const [first] = unsaved;
@@ -121,7 +122,7 @@ export function renderUnsaved() {
   line.textContent = text;
 }
 
-/** Asks again and again whether the server is there. */
+/** Checks repeatedly whether the server answers. */
 export async function beat() {
   for (;;) {
     await new Promise((resolve) => setTimeout(resolve, isLost() ? RETRY_MS : BEAT_MS));

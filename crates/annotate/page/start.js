@@ -1,11 +1,11 @@
-// Without a project: one of those that were opened before, or a new one of a photo.
+// Without a project: opens a recent one, or creates a new one from a photo.
 
 import { api } from "./api.js";
 import { button } from "./buttons.js";
 
 const by = (id) => document.getElementById(id);
 const PICTURE = /\.(png|jpe?g|webp|bmp|tiff?)$/i;
-/** What cameras call any picture. */
+/** Names that cameras give to any picture. */
 const ANY_NAME = /^(photo|image|picture|img|pic|dscn?f?|pxl|p|demo|frame|screenshot)?[\W\d_]*$/i;
 let photo = null;
 

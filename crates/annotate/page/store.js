@@ -1,43 +1,43 @@
-// What the page knows. Whoever changes it calls `changed`; everything that shows it then shows it anew, once a frame.
+// The page's state. Code that changes it calls `changed`; everything that shows it is then redrawn, once per frame.
 
 export const state = {
   label: "",
-  /** Whether somebody gave that name; it is a proposal otherwise. */
+  /** Whether the user gave that name; otherwise it is a proposal. */
   isNamed: true,
   modelPath: "",
   /** The project's folder, or the file of a photo's; its folder's other pictures; versions of the model, oldest first. */
   project: undefined,
   others: [],
   models: [],
-  /** Whether the camera of the photos is calibrated: the size of the part in them is known then. */
+  /** Whether the camera of the photos is calibrated: the size of the part is then known. */
   isCalibrated: false,
-  /** Photos of the part: what the server tells of each, and `past`, `future` of its marks as JSON. */
+  /** Photos of the part: the server's view of each, and `past`, `future` of its marks as JSON. */
   images: [],
   current: 0,
-  /** Pictures to try, each with its `detections` once looked at. */
+  /** Pictures to try, each with its `detections` once searched. */
   trialPictures: [],
   trial: 0,
   tab: "mark",
   tool: "select",
-  /** Which mark is being corrected: box, grasp, outline; and which of the outline's points. */
+  /** The mark being corrected: box, grasp, outline; and the outline's selected point. */
   selected: null,
   vertex: null,
-  /** What is being drawn just now: a box, a line, an unclosed outline. */
+  /** The current drawing: a box, a line, an unclosed outline. */
   draft: null,
   proposing: false,
   /** The camera's address; null without one. */
   camera: null,
-  /** Whether the first step shows the camera for a further photo, and the last one the camera instead of a picture. */
+  /** Whether the first step shows the camera for a further photo, and whether the last step shows the camera in place of a picture. */
   shooting: false,
   tryingLive: true,
-  /** The frame on the stage, with its `detections` where the model is tried, and what is wrong with the camera. */
+  /** The frame on the stage, with its `detections` while the model is tried, and the camera's fault. */
   live: { number: null, url: null, size: null, detections: null, failed: null, fault: null, isUsable: false, paused: false },
-  /** What scores so much is found. */
+  /** Minimum score of accepted detections. */
   minScore: 0.5,
-  /** The order of the pictures to try in their row: as they were added, by score, by state. */
+  /** Order of the pictures to try in their row: as added, by score, by state. */
   sortedBy: "added",
   showDifferences: true,
-  /** The part of the pictures that is searched, and for pictures of which size; null for all of them. */
+  /** The searched region of the pictures, and the picture size that it applies to; null for the whole picture. */
   region: null,
   teaching: { status: "idle", losses: [], validations: [] },
   /** The part of the photo in view: screen = photo · scale + [x, y]. */
@@ -50,7 +50,7 @@ let queued = false;
 /** Calls `listener` after every change. */
 export const onChange = (listener) => listeners.push(listener);
 
-/** Says that `state` is not what it was. */
+/** Announces a change of `state`. */
 export function changed() {
   if (queued) return;
   queued = true;
@@ -66,9 +66,9 @@ export const trialPicture = () => state.trialPictures[state.trial];
 /** Whether a photo has all the marks that a teaching needs. */
 export const isComplete = ({ marks: { box, outline, grasp } }) => Boolean((box || outline) && grasp);
 export const isAnyMarked = () => state.images.some(isComplete);
-/** Whether a detection counts as found at the least score that is chosen. */
+/** Whether a detection is accepted at the chosen minimum score. */
 export const isFound = (detection) => detection.score >= state.minScore;
-/** The found ones among a picture's detections whose parts the jaws of one of them touch. */
+/** The accepted detections of a picture whose parts are touched by the jaws of one of them. */
 export const touchedBy = (detection, detections) => detection.touches.map((i) => detections[i]).filter((other) => other && isFound(other));
 export const size = () => [image().width, image().height];
 
@@ -79,10 +79,10 @@ export function isLive() {
   return !state.images.length || (state.shooting && state.tab === "mark");
 }
 
-/** Whether the stage shows a photo on which marks can be made. */
+/** Whether the stage shows a photo that can be marked. */
 export const isMarking = () => state.tab === "mark" && !isLive() && Boolean(image());
 
-/** Where the part is, as far as it is marked: its outline, or its box. */
+/** The part's marked region: its outline, or its box. */
 export function region() {
   if (!image()) return null;
   const { outline, box } = marks();

@@ -24,13 +24,13 @@ export function openTrialPicture(index) {
   showCurrent();
 }
 
-/** What the server says of all pictures to try and of the models, after one was taken out or put back. */
+/** The server's view of all pictures to try and of the models, after one was removed or restored. */
 function adoptSession(session) {
   for (const view of session.trial_pictures) Object.assign(state.trialPictures.find((trial) => trial.id === view.id) ?? {}, view);
   state.models = session.models;
 }
 
-/** Takes a photo, or a picture to try, out of the session; its file stays, and it can be put back. */
+/** Removes a photo or a picture to try from the session; its file is kept, and it can be restored. */
 async function remove(entries, target, { takeOut, putBack, open }) {
   const index = entries.indexOf(target);
   try {
@@ -48,7 +48,7 @@ async function remove(entries, target, { takeOut, putBack, open }) {
       }
     };
     const stays = entries === state.images ? " and its marks stay" : " stays";
-    toast(`${target.name} is taken out. Its file${stays} in the folder.`, { text: "Put it back", run: back });
+    toast(`${target.name} is removed. Its file${stays} in the folder.`, { text: "Put it back", run: back });
   } catch (error) {
     toast(error.message);
   }
@@ -62,7 +62,7 @@ export const removePhoto = (target) =>
 export const removeTrialPicture = (target) =>
   remove(state.trialPictures, target, { takeOut: api.removeTrialPicture, putBack: api.putBackTrialPicture, open: openTrialPicture });
 
-/** What is on the stage: address, size and words; null where there is nothing yet. */
+/** The content of the stage: address, size and text; null if there is none. */
 function onStage() {
   if (isLive()) return state.live.url && [state.live.url, state.live.size, `Live picture of ${state.camera}`];
   const trying = state.tab === "try";
@@ -71,7 +71,7 @@ function onStage() {
   return [trying ? api.trialPictureUrl(shown.id) : api.imageUrl(shown.id), [shown.width, shown.height], `Photo ${shown.name}`];
 }
 
-/** Shows what the present step is about. */
+/** Shows the content of the current step. */
 export function showCurrent() {
   const shown = onStage();
   document.getElementById("photo").hidden = !shown;
@@ -94,7 +94,7 @@ function words(entry, trying) {
   return count ? `${count} found` : "nothing found";
 }
 
-/** The numbers of the pictures in the order of the row; those that were not looked at yet come last. */
+/** The indices of the pictures in the order of the row; those not yet searched come last. */
 function order(entries, trying) {
   const numbers = entries.map((_, i) => i);
   if (!trying || state.sortedBy === "added") return numbers;
@@ -134,6 +134,6 @@ export function renderStrip() {
   });
 }
 
-/** For the title of the window. */
+/** The title of the window. */
 export const shownName = () => (isLive() ? "Live" : (state.tab === "try" ? trialPicture() : image())?.name) ?? "";
 export const isMarked = () => Boolean(image() && isComplete(image()));

@@ -1,10 +1,11 @@
-// Whether an outline looks the same when turned. The page asks only then; the print on a part may tell its turns apart.
+// Whether an outline looks the same when turned. Only then does the page ask; a print on the part may break the
+// symmetry.
 
 import { sub } from "./geometry.js";
 
 /** Directions in which the outline is measured: a multiple of all the turns. */
 const DIRECTIONS = 120;
-/** Mean difference of the measured radii, over their mean, up to which a turned outline is the same. Chosen by hand. */
+/** Maximum mean difference of the measured radii, relative to their mean, for which a turned outline is the same. Chosen by hand. */
 const MAX_DIFFERENCE = 0.05;
 
 /** The area's centroid. */
@@ -18,7 +19,7 @@ function centroid(polygon) {
   return [x / (3 * sum), y / (3 * sum)];
 }
 
-/** How far the outline reaches from its centroid, direction by direction; 0 where it does not reach. */
+/** Radius of the outline around its centroid in each direction; 0 if there is none. */
 function radii(polygon) {
   const center = centroid(polygon);
   const points = polygon.map((point) => sub(point, center));
@@ -39,7 +40,7 @@ function radii(polygon) {
   });
 }
 
-/** The equal turns in a whole one after which an outline looks the same: 0 for any turn, 1 for none. */
+/** Number of turns, in a full rotation, in which an outline looks the same: 0 for any turn, 1 for none. */
 export function turnsOf(polygon) {
   if (!polygon || polygon.length < 3) return 1;
   const reach = radii(polygon);

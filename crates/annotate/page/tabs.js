@@ -11,17 +11,17 @@ export function openTab(name) {
   if (state.tab === name) return;
   const before = [state.tab === "try", isLive()];
   Object.assign(state, { tab: name, draft: null });
-  // Only then is another picture shown: the view of one that stays is kept.
+  // Another picture is shown only then: otherwise the view is kept.
   if (String(before) !== String([name === "try", isLive()])) showCurrent();
   changed();
   document.querySelector(".panel").scrollTop = 0;
   if (name === "teach" || name === "try") refreshVersions();
 }
 
-/** Which versions are stale depends on marks that were changed since. */
+/** Whether versions are stale depends on marks changed since. */
 async function refreshVersions() {
   try {
-    // First the marks that are on their way.
+    // Marks that are being sent come first.
     while (state.images.some((photo) => photo.saving)) await new Promise((resolve) => setTimeout(resolve, 50));
     state.models = (await api.session()).models;
     changed();
@@ -50,7 +50,7 @@ for (const button of document.querySelectorAll("[data-next]")) {
 
 export function renderTabs() {
   const done = { mark: isMarked(), samples: false, teach: state.hasModel, try: state.images.length > 0 && state.trialPictures.some((s) => s.became !== null) };
-  // Where the way goes on: the button for it may be below what the panel shows.
+  // The tab of the next step is highlighted, since the button in the panel may be out of view.
   const next = { mark: isMarked() && "samples", samples: "teach", teach: state.hasModel && "try" }[state.tab];
   for (const name of NAMES) {
     const open = name === state.tab;

@@ -1,4 +1,4 @@
-// The third step: teaching, and how it goes.
+// The third step: teaching, and its progress.
 
 import { api } from "./api.js";
 import { offBecause } from "./buttons.js";
@@ -17,7 +17,7 @@ const MODELS = [
   ["D", "Mask", "Needs the outline. A minute."],
 ];
 
-/** How often a part looks the same in a whole turn, each with a part that does. */
+/** Number of turns in which a part looks the same, each with an example. */
 const SHAPES = [
   ["1", "No", '<path d="M3 8h11l5 4-5 4H3z"/>'],
   ["2", "Half a turn: bar", '<path d="M2 8.5h20v7H2z"/>'],
@@ -45,7 +45,7 @@ for (const [letter, name, says] of MODELS) {
 }
 
 export const isRunning = () => ["running", "stopping"].includes(state.teaching.status);
-/** Whether the model in use is taught in seconds: it then learns at once from what is right. */
+/** Whether the model in use is taught in seconds: it then learns at once from confirmed detections. */
 export const isQuick = () => state.models.find((model) => model.is_current)?.summary.model === "S" && !isRunning();
 const seconds = (s) => (s < 90 ? `${Math.round(s)} s` : `${Math.floor(s / 60)} min ${Math.round(s % 60)} s`);
 const percent = (share) => `${Math.round(share * 100)}\u00a0%`;
@@ -55,7 +55,7 @@ by("teach-form").addEventListener("submit", (event) => {
   teach();
 });
 
-/** What the form asks for. */
+/** The settings in the form. */
 export function teachRequest() {
   preselect();
   const number = (id) => (by(id).value === "" ? null : by(id).valueAsNumber);
@@ -90,7 +90,7 @@ by("teach-stop").addEventListener("click", async () => {
   changed();
 });
 
-/** Asks for news until the teaching has ended. */
+/** Requests progress until the teaching has ended. */
 export async function watch() {
   while (isRunning()) {
     await new Promise((resolve) => setTimeout(resolve, POLL_MS));
@@ -103,7 +103,7 @@ export async function watch() {
   }
   if (state.teaching.status === "done") {
     state.models = (await api.session().catch(() => state)).models;
-    // What another model found is old news; it is told what has changed.
+    // Results of another model are outdated; the changes are reported.
     for (const trial of state.trialPictures) trial.before = trial.detections && trial.detections.filter(isFound).length;
     for (const trial of [...state.trialPictures, state.live]) trial.detections = null;
     changed();
@@ -130,7 +130,7 @@ function renderProgress(news) {
   by("progress").hidden = news.status === "idle" || news.model === "S" && !isRunning();
   by("progress-title").textContent = {
     running: `Teaching ${news.of || `model ${news.model}`}`,
-    stopping: "Stopping, with what there is…",
+    stopping: "Stopping; the result so far is kept…",
     done: `Taught model ${news.model}`,
     failed: "Not taught",
   }[news.status] ?? "";
@@ -142,9 +142,9 @@ function renderProgress(news) {
     : isRunning() ? "Getting ready…" : "";
   by("teach-form").hidden = isRunning();
   by("teach-stop").hidden = !isRunning();
-  // Before anything was found there is nothing to keep.
+  // Before the first result there is nothing to keep.
   const keeps = news.validations.some(([, share]) => share >= 0.5);
-  by("teach-stop").textContent = keeps ? "Stop, and keep what there is" : "Stop; nothing is kept yet";
+  by("teach-stop").textContent = keeps ? "Stop and keep the result so far" : "Stop; nothing is kept yet";
   by("teach-stop").disabled = news.status === "stopping";
   renderCurve(news.losses);
   by("validations").replaceChildren(...news.validations.map(([step, share]) => {
@@ -179,7 +179,7 @@ function renderOutcome(news) {
 
 const chosen = (name) => document.querySelector(`[name=${name}]:checked`);
 
-/** What is folded says what it holds; a question is opened when the outline raises it. */
+/** A closed section shows its content in its title; the symmetry question is opened if the outline looks symmetric. */
 let [measured, turns, asked] = [null, 1, 1];
 function renderFolds() {
   const model = MODELS.find(([letter]) => letter === chosen("model").value);
@@ -199,7 +199,7 @@ function renderFolds() {
 }
 by("teach-form").addEventListener("change", changed);
 
-/** The model taught last is the one that is chosen. */
+/** The model that was taught last is selected. */
 let preselected = false;
 function preselect() {
   const last = state.models.find((model) => model.is_current) ?? state.models.at(-1);

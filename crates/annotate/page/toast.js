@@ -1,7 +1,7 @@
-// Short notes that go away by themselves.
+// Short notes that disappear by themselves.
 
 const SHOWN_MS = 3500;
-/** A note with a button has to be read, decided on and reached. */
+/** Notes with a button are shown longer: they must be read and reached. */
 const SHOWN_WITH_BUTTON_MS = 12000;
 
 /** Shows `text`; with `action`, a `{ text, run }`, a button beside it. */
@@ -18,7 +18,7 @@ export function toast(text, action = null) {
     note.append(button);
   }
   const end = () => {
-    // Whoever is about to press the button is not hurried.
+    // The note stays while the pointer is on it.
     if (note.matches(":hover, :focus-within")) setTimeout(end, SHOWN_MS);
     else note.remove();
   };

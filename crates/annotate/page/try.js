@@ -1,4 +1,4 @@
-// The fourth step: the taught model on other pictures. What it got right, or is put right, becomes a demonstration.
+// The fourth step: the taught model on other pictures. Confirmed or corrected detections become demonstrations.
 
 import { api } from "./api.js";
 import { button } from "./buttons.js";
@@ -19,7 +19,7 @@ import { showBox } from "./view.js";
 const by = (id) => document.getElementById(id);
 const stage = by("stage");
 const PICTURE = /\.(png|jpe?g|webp|bmp|tiff?)$/i;
-/** So few pictures are seen at a glance, whatever their order. */
+/** Up to this number of pictures the order does not matter. */
 const MIN_SORTED = 5;
 const isTaught = () => Boolean(state.hasModel);
 
@@ -27,7 +27,7 @@ by("add-pictures").addEventListener("click", () => by("picture-input").click());
 by("add-folder").addEventListener("click", () => by("folder-input").click());
 for (const id of ["picture-input", "folder-input"]) {
   by(id).addEventListener("change", () => {
-    // A copy: emptying the field, so that the same files can be chosen again, empties its list.
+    // A copy: clearing the field, so that the same files can be chosen again, clears its list.
     const files = [...by(id).files];
     by(id).value = "";
     addPictures(files);
@@ -84,7 +84,7 @@ async function addPictures(files) {
   if (state.trialPictures.length > first) openTrialPicture(first);
 }
 
-/** Looks at every picture that was not looked at yet, the shown one first. */
+/** Searches every picture that was not searched yet, the shown one first. */
 let looking = false;
 async function lookAtAll() {
   if (looking || !isTaught()) return;
@@ -125,12 +125,12 @@ async function accept(marks, { correct }) {
   changed();
 }
 
-/** What the last teaching changed on the pictures that were tried before it. */
+/** The effect of the last teaching on the pictures that were tried before it. */
 function renderLearnt() {
   const again = state.trialPictures.filter(({ before, detections }) => typeof before === "number" && detections);
   const known = state.trialPictures.filter(({ before }) => typeof before === "number");
   let text = "";
-  if (isRunning() && state.tab === "try") text = "It learns from what you said…";
+  if (isRunning() && state.tab === "try") text = "It learns from your answers…";
   else if (known.length && again.length < known.length) text = `The new model looks at the pictures again: ${again.length} of ${known.length}…`;
   else if (known.length) {
     const count = (trial) => trial.detections.filter(isFound).length;
@@ -150,19 +150,19 @@ function renderLearnt() {
 by("save-csv").addEventListener("click", () => exportPictures("csv"));
 by("save-json").addEventListener("click", () => exportPictures("json"));
 
-/** Teaches as before, with what was added since, and shows how it goes. */
+/** Teaches with the same settings and the new pictures, and shows the progress. */
 function teachAgain() {
   openTab("teach");
   by("tab-teach").focus();
   teach();
 }
 
-/** Says that the part is not in this picture, or takes that back. */
+/** States that the part is not in this picture, or revokes that. */
 async function setAbsent(target, absent) {
   try {
     Object.assign(target, await api.setAbsent(target.id, absent));
     state.models = (await api.session()).models;
-    toast(absent ? "Kept as a picture without the part. Teach again to learn from it." : "It is no picture without the part any more.");
+    toast(absent ? "Kept as a picture without the part. Teach again to learn from it." : "No longer used as a picture without the part.");
   } catch (error) {
     toast(error.message);
   }
@@ -182,7 +182,7 @@ function card(detection, i, listed, shown) {
   title.append(text("span", `score ${detection.score.toFixed(2)}`, "score"));
   const row = text("div", "", "row");
   if (shown.became === null) {
-    const words = isFound(detection) ? "Right: learn from it" : "Right all the same: learn from it";
+    const words = isFound(detection) ? "Right: learn from it" : "Right after all: learn from it";
     row.append(button(words, () => accept(detection.marks, { correct: false })));
     row.append(button("Correct it…", () => accept(detection.marks, { correct: true }), "plain"));
   }
@@ -191,7 +191,7 @@ function card(detection, i, listed, shown) {
   item.append(text("p", placeText(detection), "pose"));
   const touching = touchText(detection, shown.detections, listed);
   if (touching) item.append(text("p", touching, "warning"));
-  if (!isFound(detection) && !refusal) item.append(text("p", "Why: it scores less than you ask for.", "why"));
+  if (!isFound(detection) && !refusal) item.append(text("p", "Why: its score is below the minimum.", "why"));
   if (refusal) {
     item.append(text("p", `Why: ${refusal.reason}.`, "why"));
     if (refusal.remedy) item.append(text("p", `What would help: ${refusal.remedy}.`));
@@ -220,7 +220,7 @@ function renderFound() {
   if (!shown.detections) return found.append(text("p", "Looking…"));
   const accepted = shown.detections.filter(isFound);
   const refused = shown.detections.length - accepted.length;
-  const time = `Looked for ${Math.max(1, Math.round(shown.seconds * 1000))} ms. `;
+  const time = `Search took ${Math.max(1, Math.round(shown.seconds * 1000))} ms. `;
   found.append(text("p", time + (accepted.length ? "" : "Nothing is accepted.")));
   if (shown.is_absent) {
     found.append(text("p", "You said that the part is not here: the next teaching uses this picture.", "note"),
@@ -230,7 +230,7 @@ function renderFound() {
   listed.forEach((detection, i) => found.append(card(detection, i, listed, shown)));
   if (shown.became !== null) {
     const index = state.images.findIndex((image) => image.id === shown.became);
-    found.append(text("p", `A demonstration now: ${state.images[index]?.name}.`), button("Look at its marks", () => {
+    found.append(text("p", `Now a demonstration: ${state.images[index]?.name}.`), button("Look at its marks", () => {
       openTab("mark");
       openImage(index);
     }), button("Teach again", teachAgain, "primary"));
@@ -242,10 +242,10 @@ function renderFound() {
     found.append(text("p", "If the part is there, mark it: it then learns from this picture, too."), button("Mark it by hand…", () => accept(nothing, { correct: true })));
   }
   if (shown.is_absent) found.append(button("Teach again", teachAgain, "primary"));
-  found.append(button("Take this picture out", () => removeTrialPicture(shown), "plain"));
+  found.append(button("Remove this picture", () => removeTrialPicture(shown), "plain"));
   const more = shown.detections.filter((d) => !isFound(d) && (state.showRefused || !isShown(d, shown))).length;
   if (refused && (more || state.showRefused)) {
-    const words = state.showRefused ? "Hide what was refused" : `Show what was refused (${more})`;
+    const words = state.showRefused ? "Hide refused parts" : `Show refused parts (${more})`;
     found.append(button(words, () => {
       state.showRefused = !state.showRefused;
       changed();
@@ -253,22 +253,22 @@ function renderFound() {
   }
 }
 
-/** Refused ones that are shown unasked: the best one, where nothing is accepted, that resembles the part at all. */
+/** Refused detections that are shown by default: the best one, if nothing is accepted and it resembles the part. */
 export function isShown(detection, { detections }) {
   if (state.showRefused) return true;
   return detection === detections[0] && detection.score >= MIN_SHOWN;
 }
 
-/** What counts as found, and how much that is. */
+/** The minimum score, and the resulting counts. */
 function renderJudge() {
   const looked = state.trialPictures.filter((trial) => trial.detections);
   by("judge").hidden = !isTaught() || !(looked.length || state.camera);
   const least = state.minScore.toFixed(2);
   by("least-score-value").textContent = least;
-  // What resembles the part hardly at all is no candidate.
+  // Detections that hardly resemble the part are not counted as candidates.
   const places = looked.flatMap((trial) => trial.detections).filter((d) => d.score >= MIN_SHOWN);
   const inPictures = looked.filter((trial) => trial.detections.some(isFound)).length;
-  // Parts that are followed are judged by their track: there the option asks for each frame on its own.
+  // Tracked parts are judged by their track: there the option requires searching each frame on its own.
   const ofLive = state.camera ? `; with --from also --every-frame` : "";
   const beyond = state.minScore === 0.5 ? "" : ` For “sdg detect”: --min-score ${least}${ofLive}.`;
   const words = looked.length

@@ -1,4 +1,4 @@
-// The models taught so far: what each is worth, which one is in use, two of them compared.
+// The models taught so far: the quality of each, the one in use, and comparisons.
 
 import { api } from "./api.js";
 import { button } from "./buttons.js";
@@ -8,7 +8,7 @@ import { toast } from "./toast.js";
 const by = (id) => document.getElementById(id);
 const list = by("version-list");
 const percent = (share) => `${Math.round(share * 100)}\u00a0%`;
-/** Chosen to be compared. */
+/** Selected for comparison. */
 let chosen = [];
 
 /** The same without intervals and errors, for a list of models. */
@@ -18,17 +18,17 @@ function briefFigures({ figures }) {
   return `${found[0]} of ${found[1]} found, ${wrong} wrong, ${alarms[0]} of ${alarms[1]} false alarms`;
 }
 
-/** What the finished model made of held-back samples, in words. */
+/** The finished model's results on held-back samples, in words. */
 export function figuresText({ figures, negatives }) {
   if (!figures) return "";
   const { found, found_interval: [low, high], wrong, false_alarms: alarms, error, error_degrees: degrees, others_in_photo: others } = figures;
   const off = error ? `, off by ${error[0].toFixed(1)}\u00a0${error[1]} and ${degrees.toFixed(1)}° (median)` : "";
-  const more = others ? ` ${others} more of it found in the photo were taken out of the samples.` : "";
+  const more = others ? ` ${others} further instances found in the photo were removed from the samples.` : "";
   const said = negatives ? ` It refuses ${negatives.refused} of your ${negatives.pictures} picture${negatives.pictures === 1 ? "" : "s"} without the part.` : "";
   return `On new samples it finds ${found[0]} of ${found[1]} parts (95\u00a0%: ${Math.round(100 * low)} to ${percent(high)})${off}; ${wrong} wrong, false alarms in ${alarms[0]} of ${alarms[1]}.${more}${said}`;
 }
 
-/** Whether that is good, to be doubted, or poor. Chosen by hand: nine of ten, and seven of ten. */
+/** Grade of the result: good, doubtful, or poor. Thresholds chosen by hand: nine of ten, and seven of ten. */
 export function gradeOf({ figures }) {
   if (!figures) return "good";
   const found = figures.found[0] / Math.max(figures.found[1], 1);
@@ -42,7 +42,7 @@ async function use(id) {
     const session = await api.useModel(id);
     Object.assign(state, { models: session.models, region: session.region, hasModel: true });
     for (const trial of [...state.trialPictures, state.live]) trial.detections = null;
-    toast("This version is used now, and stands under the model’s name.");
+    toast("This version is now in use, under the model’s name.");
   } catch (error) {
     toast(error.message);
   }
@@ -79,7 +79,7 @@ function table(rows) {
 
 export function renderVersions() {
   const { models } = state;
-  // Of the only one, taught just now, the outcome above says all.
+  // For the only version, just taught, the result above is enough.
   by("versions").hidden = !models.length || (models.length === 1 && state.teaching.status === "done");
   const wanted = JSON.stringify([models, chosen]);
   if (list.dataset.shown === wanted) return;

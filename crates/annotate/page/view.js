@@ -1,11 +1,11 @@
-// The part of the photo that is in view: screen = photo · scale + [x, y].
+// The visible region of the photo: screen = photo · scale + [x, y].
 
 import { clamp } from "./geometry.js";
 import { changed, state } from "./store.js";
 
 const MIN_SCALE = 0.05;
 const MAX_SCALE = 40;
-/** Room around a photo that is shown whole, so that marks at its border can be taken hold of. */
+/** Margin around a photo that is shown whole, so that marks at its border can be grabbed. */
 const MARGIN_PX = 24;
 /** From this scale on, pixels are shown as squares. */
 const CRISP_FROM = 4;
@@ -19,7 +19,7 @@ let shown = [1, 1];
 export const toScreen = ([x, y]) => [x * state.view.scale + state.view.x, y * state.view.scale + state.view.y];
 export const toPhoto = ([x, y]) => [(x - state.view.x) / state.view.scale, (y - state.view.y) / state.view.scale];
 
-/** The middle of the view, in the photo. */
+/** The middle of the view, in photo coordinates. */
 export function middle() {
   const [x, y] = toPhoto([stage.clientWidth / 2, stage.clientHeight / 2]);
   return [clamp(x, 0, shown[0]), clamp(y, 0, shown[1])];
@@ -34,7 +34,7 @@ export function show(url, size, alt) {
   fit();
 }
 
-/** Shows the next picture of the same size; the view stays. */
+/** Shows the next picture of the same size and keeps the view. */
 export function replacePicture(url) {
   photo.src = url;
 }
@@ -44,19 +44,19 @@ export function fit() {
   const room = Math.min(MARGIN_PX, clientWidth / 20);
   const scale = Math.min((clientWidth - 2 * room) / shown[0], (clientHeight - 2 * room) / shown[1]);
   const [x, y] = [(clientWidth - shown[0] * scale) / 2, (clientHeight - shown[1] * scale) / 2];
-  // A stage that is hidden has no size: it is fitted as soon as it has one.
+  // A hidden stage has no size: it is fitted as soon as it has one.
   state.view = scale > 0 ? { scale, x, y, fitted: true } : { ...state.view, fitted: true };
   changed();
 }
 
-/** Shows a box of the photo, with as much again around it. */
+/** Shows a box of the photo, with a margin of its size. */
 export function showBox([x1, y1, x2, y2]) {
   const { clientWidth, clientHeight } = stage;
   const scale = clamp(Math.min(clientWidth / (2 * (x2 - x1)), clientHeight / (2 * (y2 - y1))), MIN_SCALE, MAX_SCALE);
   move(scale, clientWidth / 2 - (scale * (x1 + x2)) / 2, clientHeight / 2 - (scale * (y1 + y2)) / 2);
 }
 
-/** Zooms by `factor` so that the place under `at` (on the screen) stays. */
+/** Zooms by `factor` and keeps the point under `at` (on the screen) fixed. */
 export function zoom(factor, at = [stage.clientWidth / 2, stage.clientHeight / 2]) {
   const [px, py] = toPhoto(at);
   const scale = clamp(state.view.scale * factor, MIN_SCALE, MAX_SCALE);
@@ -68,7 +68,7 @@ export const actualSize = () => zoom(1 / state.view.scale);
 
 export const pan = ([dx, dy]) => move(state.view.scale, state.view.x + dx, state.view.y + dy);
 
-/** Some of the photo stays in view whatever is done. */
+/** Some of the photo always stays in view. */
 function move(scale, x, y) {
   const kept = 40;
   state.view = {

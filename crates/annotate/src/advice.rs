@@ -1,4 +1,4 @@
-//! Which models the marks suffice for, and warnings about marks that look wrong, after every change.
+//! Checks the marks after every change: which models they suffice for, and which marks look wrong.
 
 use sdg_demonstration::ModelKind;
 use sdg_geometry::Polygon;
@@ -7,29 +7,31 @@ use serde::Serialize;
 use crate::gripper::Gripper;
 use crate::marks::Marks;
 
-/// A mark this near to the picture's border is cut by it.
+/// Marks within this distance of the picture's border are taken as cut off by it, pixels.
 const BORDER_PX: f64 = 1.0;
-/// Least overlap (IoU) of the box with the outline's own.
+/// Minimum overlap (IoU) of the box with the outline's bounding box.
 const MIN_BOX_AGREEMENT: f64 = 0.8;
-/// A shorter line has no reliable angle: an error of one pixel turns it by more than five degrees.
+/// Minimum length of a grasp line. On a shorter line, an error of one pixel changes the angle by more than five
+/// degrees.
 const MIN_LINE_PX: f64 = 12.0;
-/// Fewer pixels show too little of a part.
+/// Minimum size of a part in pixels.
 const MIN_PART_PX: f64 = 24.0;
-/// The part may reach this far beyond a jaw: outlines are drawn by hand.
+/// Tolerated extent of the part beyond a jaw: outlines are drawn by hand.
 const JAW_SLACK_PX: f64 = 1.5;
-/// Jaws that would have to open by more than this, over the narrowest opening about the same middle, lie the wrong way.
+/// Maximum ratio of the opening to the narrowest opening about the same middle; above it the jaws are in the wrong
+/// direction.
 const MAX_OPENING: f64 = 2.0;
-/// Jaws farther from the part than this share of its width were left wide open by mistake.
+/// Maximum clearance of the jaws as a share of the part's width; wider jaws were left open by mistake.
 const MAX_CLEARANCE: f64 = 1.0;
 
-const HAND_TOO_SMALL: &str = "The part is wider here than the hand opens. Hold it at another place, or turned.";
+const HAND_TOO_SMALL: &str = "The part is wider here than the hand opens. Grasp it elsewhere, or turn the gripper.";
 
-/// What the marks of one picture suffice for.
+/// The result of checking the marks of one picture.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Advice {
     /// Every model, in the order of their letters.
     pub models: Vec<ModelAdvice>,
-    /// What is odd, worst first.
+    /// Problems, worst first.
     pub remarks: Vec<Remark>,
 }
 
@@ -38,32 +40,32 @@ pub struct Advice {
 pub struct ModelAdvice {
     /// The grasp model.
     pub model: ModelKind,
-    /// What is missing; empty when nothing is.
+    /// Missing marks; empty if there are none.
     pub lacks: Vec<&'static str>,
 }
 
-/// Something that the person should look at.
+/// A problem with the marks.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Remark {
     /// Stable identifier, for programs.
     pub code: &'static str,
     /// One line for the person at the page.
     pub text: String,
-    /// What the page offers to do about it.
+    /// The remedy that the page offers.
     pub fix: Option<Fix>,
 }
 
-/// A remedy, with what the page then sets.
+/// A remedy, with the value that the page then sets.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Fix {
-    /// Opens or closes the jaws to so many pixels.
+    /// Sets the distance between the jaws, in pixels.
     JawWidth(f64),
-    /// Marks the box, `[x1, y1, x2, y2]` in pixels.
+    /// Sets the box, `[x1, y1, x2, y2]` in pixels.
     Box([f64; 4]),
 }
 
-/// Looks the marks over on a picture of `size` pixels, for a hand that opens so far in them where that is known.
+/// Checks the marks on a picture of `size` pixels; `max_opening_px` is the hand's opening in this picture, if known.
 pub fn advise(marks: &Marks, size: [u32; 2], max_opening_px: Option<f64>) -> Advice {
     let lacks = |model: ModelKind| {
         let mut lacks = Vec::new();
@@ -102,15 +104,16 @@ fn about_outline(marks: &Marks, remarks: &mut Vec<Remark>) {
             let (text, fix) = if around.intersection(&bbox) == 0.0 {
                 ("The outline lies outside the box. One of them is on the wrong thing.", None)
             } else if is_inside {
-                // Which of the two is wrong nobody knows: a right box is not shrunk to an outline that misses some of the part.
+                // It is unknown which of the two is wrong: a correct box must not be shrunk to an outline that misses
+                // some of the part.
                 (
-                    "The outline leaves much of the box empty. Click “In” where the part is left out, or draw the box closer.",
+                    "The outline leaves much of the box empty. Click “In” on missing areas of the part, or draw a tighter box.",
                     None,
                 )
             } else {
                 let both =
                     [around.x1.min(bbox.x1), around.y1.min(bbox.y1), around.x2.max(bbox.x2), around.y2.max(bbox.y2)];
-                ("The outline reaches out of the box.", Some(Fix::Box(both)))
+                ("The outline extends beyond the box.", Some(Fix::Box(both)))
             };
             remarks.push(remark("outline_misses_box", text, fix));
         }
@@ -128,10 +131,10 @@ fn about_grasp(marks: &Marks, max_opening_px: f64, remarks: &mut Vec<Remark>) {
         remarks.push(remark("grasp_beside", "The jaws close beside the part. Drag the gripper onto it.", None));
         return;
     };
-    // Rounded up, so that what the button sets passes the check.
+    // Rounded up, so that the value set by the button passes the check.
     let fitting = (2.0 * reach.left.max(reach.right)).max(1.0).ceil();
     let half = 0.5 * grasp.jaw_width;
-    // Without an outline the box is all there is, and it is wider than a part that lies askew.
+    // Without an outline only the box is known, which is wider than a part in an oblique direction.
     if reach.left <= 0.0 || reach.right <= 0.0 {
         remarks.push(remark(
             "grasp_off_middle",
@@ -140,7 +143,8 @@ fn about_grasp(marks: &Marks, max_opening_px: f64, remarks: &mut Vec<Remark>) {
         ));
     } else if marks.outline.is_some() && reach.left.max(reach.right) > half + JAW_SLACK_PX {
         if fitting > MAX_OPENING * gripper.narrowest(&part) {
-            let text = "The gripper lies along the part: it would have to open past twice the part. Turn it across.";
+            let text =
+                "The gripper lies along the part and would have to open more than twice as wide. Turn it across.";
             remarks.push(remark("gripper_along", text, None));
             return;
         }
@@ -151,10 +155,10 @@ fn about_grasp(marks: &Marks, max_opening_px: f64, remarks: &mut Vec<Remark>) {
         let text = "The gripper is too narrow: a jaw would come down on the part. Open it.";
         remarks.push(remark("gripper_narrow", text, Some(Fix::JawWidth(fitting))));
     } else if marks.outline.is_some() && grasp.jaw_width > fitting * (1.0 + MAX_CLEARANCE) {
-        let text = "The jaws stand far from the part. Close them until they almost touch it.";
+        let text = "The jaws are far from the part. Close them until they almost touch it.";
         remarks.push(remark("gripper_wide", text, Some(Fix::JawWidth(fitting))));
     } else if grasp.jaw_width > max_opening_px {
-        // With an outline, what the part needs is known; the box is wider than a part that lies askew.
+        // With an outline the required opening is known; the box is wider than a part in an oblique direction.
         let (text, fix) = if marks.outline.is_some() && fitting > max_opening_px {
             (HAND_TOO_SMALL, None)
         } else {
@@ -248,7 +252,7 @@ mod tests {
 
     #[test]
     fn jaws_along_the_part_are_to_be_turned_and_not_opened() {
-        // Across the part's length of 200 px, where 60 would do the other way round.
+        // Across the part's length of 200 px; the other direction needs 60.
         let along = with_grasp([200.0, 110.0], [200.0, 150.0], 66.0);
         let advice = advise(&along, SIZE, None);
         assert_eq!((advice.remarks[0].code, advice.remarks[0].fix), ("gripper_along", None));
@@ -267,7 +271,7 @@ mod tests {
         let remark = |bbox: [f64; 4]| advise(&Marks { bbox: Some(bbox), ..good() }, SIZE, None).remarks.remove(0);
         let apart = remark([400.0, 300.0, 500.0, 400.0]);
         assert_eq!((apart.code, apart.fix), ("outline_misses_box", None));
-        // An outline of half of the part, in the right box.
+        // An outline of half of the part, in the correct box.
         let half = remark([100.0, 100.0, 500.0, 160.0]);
         assert_eq!((half.code, half.fix), ("outline_misses_box", None));
         assert!(half.text.contains("Click “In”"), "{half:?}");

@@ -1,12 +1,12 @@
-//! Where the marks of a picture stand on the disk: read from any format that `sdg_demonstration` knows, written as COCO.
+//! The file with the marks of a picture: read in any format of `sdg_demonstration`, written as COCO.
 //!
 //! ```text
 //! photo.png ─┬─ photo.coco.json   where marks are written if photo.json is another tool's file
 //!            └─ photo.json        where marks are written otherwise
 //! ```
 //!
-//! A file that holds more than this page would write back (LabelMe's flags, further objects, further pictures) is read
-//! and never written.
+//! A file with more information than the page would write back (LabelMe's flags, further objects, further pictures) is
+//! read and never written.
 
 use std::fs;
 use std::io::ErrorKind;
@@ -19,28 +19,28 @@ use serde_json::Value;
 use crate::error::{Error, Result};
 use crate::marks::Marks;
 
-/// Larger annotations than any tool writes.
+/// Maximum size of an annotation file.
 const MAX_BYTES: u64 = 64 << 20;
 
-/// What stood beside a picture when it was opened.
+/// The contents of the annotation file when a picture is opened.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Opened {
-    /// The object's name, where one is marked.
+    /// The object's name, if an object is marked.
     pub label: Option<String>,
-    /// Its marks; none where the file marks nothing.
+    /// Its marks; empty if nothing is marked.
     pub marks: Marks,
-    /// Where marks will be written.
+    /// Path that marks will be written to.
     pub path: PathBuf,
-    /// Where they stand now; `None` where nothing stands beside the picture.
+    /// Path of the existing file; `None` if the picture has none.
     pub found: Option<PathBuf>,
-    /// What the person should know about the file, if anything.
+    /// A note about the file for the user.
     pub note: Option<String>,
 }
 
-/// Reads the marks beside a picture; `annotation` names their file, which otherwise is the picture's name with `.json`.
+/// Reads the marks of a picture; `annotation` names their file, otherwise it is the picture's name with `.json`.
 ///
 /// # Errors
-/// A file that is there and cannot be read, is no annotation, or belongs to another picture.
+/// The file exists but cannot be read, is no annotation, or belongs to another picture.
 pub fn open(picture: &Path, annotation: Option<&Path>, size: [u32; 2]) -> Result<Opened> {
     let own = annotation.map_or_else(|| picture.with_extension("json"), Path::to_owned);
     let spare = own.with_extension("coco.json");
@@ -58,7 +58,7 @@ pub fn open(picture: &Path, annotation: Option<&Path>, size: [u32; 2]) -> Result
         let named = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let note = match (objects.len(), writable) {
             (0 | 1, true) => None,
-            (0 | 1, false) => Some(format!("{} stays as it is; changes go to {}.", named(path), named(&target))),
+            (0 | 1, false) => Some(format!("{} is kept unchanged; changes go to {}.", named(path), named(&target))),
             (count, _) => Some(format!(
                 "{} marks {count} objects; the first is shown. Changes go to {}.",
                 named(path),
@@ -90,8 +90,8 @@ fn read_if_there(path: &Path) -> Result<Option<Vec<u8>>> {
     fs::read(path).map(Some).map_err(Error::file(path, "cannot read"))
 }
 
-/// Whether the file is a COCO file of one picture and at most one object, with nothing that [`Marks::to_coco`] would
-/// drop: then it may be written over.
+/// Whether the file is a COCO file of one picture with at most one object and no information that [`Marks::to_coco`]
+/// would drop. Such a file may be overwritten.
 fn is_ours(bytes: &[u8]) -> bool {
     let Ok(Value::Object(file)) = serde_json::from_slice(bytes) else { return false };
     let count = |name: &str| file.get(name).and_then(Value::as_array).map_or(0, Vec::len);
@@ -123,10 +123,10 @@ fn is_ours(bytes: &[u8]) -> bool {
         && items("categories").all(|category| only_known(category, &["id", "name", "keypoints", "skeleton"]))
 }
 
-/// Writes the marks, whole or not at all. Where nothing is marked and no file stands, none is made.
+/// Writes the marks atomically. If nothing is marked and no file exists, no file is created.
 ///
 /// # Errors
-/// Marks that could not be taught, a file that cannot be written. `Ok(false)` where there was nothing to write.
+/// The marks are unsuitable for teaching, or the file cannot be written. Returns `Ok(false)` if there was nothing to write.
 pub fn save(path: &Path, marks: &Marks, label: &str, picture: &str, size: [u32; 2]) -> Result<bool> {
     if !marks.has_object() && !path.exists() {
         return Ok(false);
@@ -164,7 +164,7 @@ mod tests {
         let after = open(&picture, None, SIZE).unwrap();
         assert_eq!((after.label.as_deref(), &after.marks), (Some("bar"), &marks()));
         assert_eq!((after.path, after.note), (before.path.clone(), None));
-        // Cleared marks do not leave the old ones on the disk.
+        // Clearing the marks also clears the file.
         assert!(save(&before.path, &Marks::default(), "bar", "photo.png", SIZE).unwrap());
         assert_eq!(open(&picture, None, SIZE).unwrap().marks, Marks::default());
     }
@@ -179,7 +179,7 @@ mod tests {
         let opened = open(&picture, None, SIZE).unwrap();
         assert_eq!(opened.marks.bbox, Some([10.0, 20.0, 110.0, 60.0]));
         assert_eq!(opened.path, folder.path().join("photo.coco.json"));
-        assert!(opened.note.as_ref().unwrap().contains("photo.json stays as it is"), "{opened:?}");
+        assert!(opened.note.as_ref().unwrap().contains("photo.json is kept unchanged"), "{opened:?}");
         save(&opened.path, &marks(), "bar", "photo.png", SIZE).unwrap();
         assert_eq!(fs::read_to_string(folder.path().join("photo.json")).unwrap(), labelme);
         assert_eq!(open(&picture, None, SIZE).unwrap().marks, marks(), "the newer file is the one that counts");

@@ -1,6 +1,6 @@
 //! A camera's pictures for the page.
 //!
-//! A thread reads the camera without a pause, so that the page, which asks when it likes, gets the newest picture.
+//! A thread reads the camera continuously, so that each request of the page gets the newest picture.
 
 use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -12,13 +12,13 @@ use sdg_camera::{Address, Camera, CameraError, Fault, Playback};
 
 use crate::live::{Live, LiveFault, LiveFaultKind, LiveFrame, LivePictures};
 
-/// Pictures a second from files whose address names no pace: a folder that is read as fast as it can be would be over, or take a
-/// core, before anybody has seen it.
+/// Default interval between pictures from files without a frame rate in their address. Without it, a folder would be
+/// over, or use a whole core, before anyone has seen it.
 const FILES_INTERVAL: Duration = Duration::from_millis(200);
-/// A torn frame is a fault only when no whole one has come for so long: single ones are common with cheap cameras.
+/// Time without a complete frame after which torn frames are a fault: single ones are common with cheap cameras.
 const MAX_TORN_AGE: Duration = Duration::from_secs(1);
 
-/// The newest picture of a camera that a thread reads for as long as the process runs.
+/// The newest picture of a camera, which a thread reads for as long as the process runs.
 #[derive(Debug)]
 pub struct CameraPictures(Arc<Mutex<Newest>>);
 
@@ -29,7 +29,7 @@ struct Newest {
     check: Option<Box<SizeCheck>>,
 }
 
-/// Says what is wrong with pictures of that width and height.
+/// Describes the error of pictures of this width and height.
 pub type SizeCheck = dyn Fn((u32, u32)) -> Result<(), String> + Send;
 
 impl fmt::Debug for Newest {
@@ -39,8 +39,8 @@ impl fmt::Debug for Newest {
 }
 
 impl CameraPictures {
-    /// Begins to read a camera; pictures that `check` refuses are a fault. A simulated camera draws as fast as it can, and is read by
-    /// the clock of its frames.
+    /// Starts reading a camera; pictures rejected by `check` are a fault. A simulated camera renders as fast as it can,
+    /// so it is read at the rate of its frames' timestamps.
     pub fn read(mut camera: Box<dyn Camera>, is_simulated: bool, check: Option<Box<SizeCheck>>) -> Self {
         let newest = Arc::new(Mutex::new(Newest { check, ..Newest::default() }));
         let writer = Arc::clone(&newest);
@@ -76,7 +76,7 @@ fn lock(newest: &Mutex<Newest>) -> MutexGuard<'_, Newest> {
 }
 
 impl Newest {
-    /// Takes what the camera gave; true where nothing more will come.
+    /// Stores the camera's result; returns true if no more pictures will come.
     fn has_ended_with(&mut self, next: Result<Option<sdg_camera::Frame>, CameraError>) -> bool {
         let fault = |kind, text: String| Some(LiveFault { kind, text });
         match next {
@@ -106,7 +106,7 @@ impl Newest {
     }
 }
 
-/// The page's text for a fault; `None` for what does not matter on it.
+/// The page's text for a fault; `None` for faults that do not matter there.
 fn live_fault(fault: &Fault) -> Option<LiveFault> {
     let kind = match fault {
         Fault::Stale { .. } => LiveFaultKind::Stale,
@@ -114,16 +114,16 @@ fn live_fault(fault: &Fault) -> Option<LiveFault> {
         Fault::Gone { .. } => LiveFaultKind::Gone,
         Fault::Frozen { .. } => LiveFaultKind::Frozen,
         Fault::Black => LiveFaultKind::Black,
-        // The page shows pictures of any size, and a camera that is back is seen to be.
+        // The page shows pictures of any size, and it sees by itself when a camera is back.
         _ => return None,
     };
-    // The page names the kind itself.
+    // The page shows the kind of the fault itself.
     let text = fault.to_string();
     let text = text.split_once(": ").map_or(text.as_str(), |(_, rest)| rest).to_owned();
     Some(LiveFault { kind, text })
 }
 
-/// The address with a pace that can be watched, where it is one of files without a pace.
+/// The address with a watchable frame rate, if it is an address of files without one.
 pub fn paced(mut address: Address) -> Address {
     if let Address::Folder { playback: Playback { interval, .. }, .. }
     | Address::File { playback: Playback { interval, .. }, .. } = &mut address

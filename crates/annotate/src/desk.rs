@@ -1,4 +1,4 @@
-//! What the server answers from: a session or, until a project is chosen on the page, the projects that there are.
+//! The state behind the server: a session or, until a project is chosen on the page, the list of projects.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, PoisonError, RwLock};
@@ -17,23 +17,23 @@ use crate::views::SessionView;
 /// Opens the project in a folder, or that of a photo.
 pub type OpenProject = Box<dyn Fn(&Path) -> std::result::Result<Session, TeacherError> + Send + Sync>;
 
-/// Where projects are chosen and made.
+/// The folder and list for choosing and creating projects.
 pub struct Start {
-    /// Projects that were opened before.
+    /// Recently opened projects.
     pub recent: RecentProjects,
-    /// New projects are made in this folder.
+    /// Folder for new projects.
     pub folder: PathBuf,
-    /// Opens the one that is chosen.
+    /// Opens the chosen project.
     pub open: OpenProject,
 }
 
-/// The session, if there is one, and where another is chosen, if it can be.
+/// The session, if any, and the means to choose another, if allowed.
 pub struct Desk {
     session: RwLock<Option<Arc<Session>>>,
     start: Option<Start>,
 }
 
-/// What the page starts from.
+/// The data with which the page starts.
 #[derive(Serialize)]
 #[serde(untagged)]
 pub enum FirstView {
@@ -43,18 +43,18 @@ pub enum FirstView {
 
 #[derive(Serialize)]
 pub struct StartView {
-    /// Where a new project is made.
+    /// Folder for new projects.
     folder: String,
     recent: Vec<RecentView>,
 }
 
 #[derive(Serialize)]
 struct RecentView {
-    /// The same whatever else is listed.
+    /// Identifier that does not depend on the other entries.
     id: String,
-    /// The part's name or, where it has none, that of the folder or the photo.
+    /// The part's name or, without one, the name of the folder or photo.
     name: String,
-    /// The folder, or the photo.
+    /// Path of the folder or photo.
     path: String,
     opened_secs: u64,
 }
@@ -99,10 +99,10 @@ impl Desk {
         self.view()
     }
 
-    /// Opens a project that was opened before.
+    /// Opens a recent project.
     ///
     /// # Errors
-    /// No such project, one that cannot be opened, another that is open.
+    /// Unknown project; the project cannot be opened; another project is open.
     pub fn open(&self, id: &str) -> Result<FirstView> {
         self.take(|start| {
             let project = start.recent.list().into_iter().find(|project| id_of(project) == id);
@@ -111,10 +111,10 @@ impl Desk {
         })
     }
 
-    /// Makes a project of this name and puts a photo in it.
+    /// Creates a project with this name and copies a photo into it.
     ///
     /// # Errors
-    /// A name that is taken or none, bytes that are no picture, a folder that cannot be made.
+    /// The name is empty or taken, the bytes are not a picture, or the folder cannot be created.
     pub fn create(&self, name: &str, photo: &str, bytes: &[u8]) -> Result<FirstView> {
         self.take(|start| {
             let name = check_label(name)?;
@@ -132,10 +132,10 @@ impl Desk {
         })
     }
 
-    /// Leaves the project, so that another can be chosen.
+    /// Closes the project, so that another can be chosen.
     ///
     /// # Errors
-    /// A page of one project, a teaching that goes on.
+    /// The page is for one project only, or a teaching is running.
     pub fn close(&self) -> Result<FirstView> {
         self.start()?;
         let mut session = self.session.write().unwrap_or_else(PoisonError::into_inner);

@@ -1,4 +1,4 @@
-//! What can go wrong, each with what was expected and what was found.
+//! Errors, each with the expected and the found value.
 
 use std::io;
 use std::path::PathBuf;
@@ -8,10 +8,10 @@ use thiserror::Error;
 /// Result of this crate's functions.
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// What a grasp model of the caller's failed with.
+/// Error of the caller's grasp model.
 pub type TeacherError = Box<dyn std::error::Error + Send + Sync>;
 
-/// Why the page could not be opened, or one of its requests not be answered.
+/// Why the page could not be opened, or a request could not be answered.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
@@ -22,20 +22,20 @@ pub enum Error {
     /// A file could not be read or written.
     #[error("{}: {action}: {source}", path.display())]
     File { path: PathBuf, action: &'static str, source: io::Error },
-    /// A file is larger than any that makes sense.
+    /// A file exceeds the maximum size.
     #[error("{}: expected at most {most} bytes, found {found}", path.display())]
     TooLarge { path: PathBuf, most: u64, found: u64 },
-    /// A picture or its marks are not what they should be.
+    /// A picture or its marks are invalid.
     #[error("{name}: {source}")]
     Demonstration {
         name: String,
-        /// What is wrong with it.
+        /// The reason.
         source: sdg_demonstration::Error,
     },
     /// An annotation could not be written.
     #[error(transparent)]
     Write(#[from] sdg_files::FileError),
-    /// The marks are not enough for what was asked.
+    /// Marks needed for the request are missing.
     #[error("{name}: expected {expected}, found {found}")]
     NotMarked { name: String, expected: &'static str, found: &'static str },
     /// No picture of that number.
@@ -44,41 +44,41 @@ pub enum Error {
     /// No version of that number.
     #[error("expected a version of the model numbered below {count}, found {id}")]
     NoSuchVersion { id: usize, count: usize },
-    /// A project's file that is none.
+    /// A file is not a project's file.
     #[error("{}: expected a project's file as `sdg annotate` writes it, found {found}", path.display())]
     Project { path: PathBuf, found: String },
-    /// A file of the page's key that holds something else.
+    /// A file with the page's token has other content.
     #[error(
         "{}: expected a key of 16 letters and digits or more, found {found} characters (delete the file for a new key)",
         path.display()
     )]
     NotAKey {
         path: PathBuf,
-        /// How many characters it has.
+        /// Number of characters in it.
         found: usize,
     },
-    /// More pictures than a session keeps.
+    /// More pictures than the maximum of a session.
     #[error("expected at most {most} pictures to try, found one more")]
     TooManyPictures { most: usize },
     /// The page was opened without a camera.
     #[error("expected a page with a camera, found none")]
     NoCamera,
-    /// A frame that was not shown, or so long ago that it is not kept any more.
+    /// A frame that was not shown, or is no longer kept.
     #[error("expected a frame that was shown lately, found frame {number}")]
     NoSuchFrame { number: u64 },
-    /// The camera is not in a state for this.
+    /// The camera's state does not allow the request.
     #[error("expected {expected}, found {found}")]
     Camera { expected: &'static str, found: String },
-    /// The request makes no sense.
+    /// An invalid request.
     #[error("{what}: expected {expected}, found {found}")]
     Request { what: &'static str, expected: String, found: String },
-    /// Something else is going on that must end first.
+    /// Another operation must end first.
     #[error("{0}")]
     Busy(&'static str),
     /// Nothing has been taught yet.
     #[error("expected a taught model, found none: teach one first")]
     NotTaught,
-    /// The grasp model's own complaint.
+    /// Error of the grasp model.
     #[error("{0}")]
     Teacher(TeacherError),
     /// The operating system gave no random bytes for the token.
@@ -94,7 +94,7 @@ pub enum Error {
 }
 
 impl Error {
-    /// For `map_err` on what reads or writes `path`.
+    /// For `map_err` on an operation that reads or writes `path`.
     pub(crate) fn file(path: &std::path::Path, action: &'static str) -> impl FnOnce(io::Error) -> Self {
         move |source| Self::File { path: path.to_owned(), action, source }
     }

@@ -1,12 +1,12 @@
-//! The gripper over the part: what lies between its jaws.
+//! The gripper over the part, and the section of the part between its jaws.
 
 use std::f64::consts::PI;
 
 use nalgebra::{Rotation2, Vector2};
 use sdg_geometry::{GraspLine, Polygon};
 
-/// A two-finger gripper seen from above. Its jaws are as wide as `line` is long, stand on both sides of it, and close
-/// across it.
+/// A two-finger gripper seen from above. Its jaws are as wide as `line` is long, are on both sides of the line, and
+/// close across it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gripper {
     /// From `grasp_start` to `grasp_end`, in pixels.
@@ -15,17 +15,17 @@ pub struct Gripper {
     pub jaw_width: f64,
 }
 
-/// How far the part reaches between the jaws, in pixels from the line: to its left (start to end, y down) and right.
+/// Extent of the part between the jaws, in pixels from the line: to its left (start to end, y down) and right.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reach {
     /// Towards the jaw at negative offsets.
     pub left: f64,
-    /// Towards the other.
+    /// Towards the jaw at positive offsets.
     pub right: f64,
 }
 
 impl Gripper {
-    /// What of the part lies in the strip that the jaws sweep as they close; `None` where they would close on nothing.
+    /// The extent of the part in the strip that the jaws sweep when closing; `None` if the strip contains no part.
     pub fn reach(&self, part: &Polygon) -> Option<Reach> {
         let length = self.line.length();
         if length == 0.0 {
@@ -34,7 +34,7 @@ impl Gripper {
         let along = (self.line.end - self.line.start) / length;
         let across = Vector2::new(-along.y, along.x);
         let farthest = part.vertices.iter().map(|v| (v - self.line.start).norm()).fold(0.0, f64::max) + 1.0;
-        // In the strip's own frame the polygon's clip against an image does the cutting.
+        // In the strip's frame, clipping the polygon against an image performs the cut.
         let in_strip = Polygon {
             vertices: part
                 .vertices
@@ -51,8 +51,8 @@ impl Gripper {
         (least <= most).then_some(Reach { left: -least, right: most })
     }
 
-    /// The narrowest opening of the same jaws about the same middle, turned by any angle; infinite where they would close on nothing
-    /// whatever the turn.
+    /// The minimum, over all angles, of the opening needed by the same jaws about the same middle; infinite if the jaws
+    /// close on nothing at every angle.
     pub fn narrowest(&self, part: &Polygon) -> f64 {
         const NUM_TURNS: u32 = 36;
         let center = self.line.center();
@@ -65,8 +65,8 @@ impl Gripper {
         (0..NUM_TURNS).filter_map(turned).fold(f64::INFINITY, f64::min)
     }
 
-    /// The narrowest opening whose jaws do not come down on the part; zero where they would close on nothing. The hand
-    /// closes about the line, so the side that reaches farther counts twice.
+    /// The minimum opening at which the jaws do not touch the part when lowered; zero if they would close on nothing.
+    /// The hand closes about the line, so twice the larger extent counts.
     pub fn min_jaw_width(&self, part: &Polygon) -> f64 {
         self.reach(part).map_or(0.0, |reach| 2.0 * reach.left.max(reach.right).max(0.0))
     }
@@ -101,7 +101,7 @@ mod tests {
 
     #[test]
     fn what_the_jaws_do_not_sweep_does_not_count() {
-        // A lug stands up from the bar beyond the jaws.
+        // A lug protrudes from the bar beyond the jaws.
         let lugged = Polygon {
             vertices: [
                 [10.0, 20.0],

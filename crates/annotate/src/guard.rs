@@ -1,34 +1,34 @@
-//! Which requests are answered: those with the token, this server's host name and no foreign origin.
+//! Decides which requests are answered: those with the token, this server's host name and no foreign origin.
 //!
-//! Every program on this computer can reach the port, and every web page in the browser can make it send requests there.
-//! So each request must name this very server ([`Guard::check`]'s `Host`: a foreign name that was made to point here is
-//! refused), must not come from another page (`Origin`), and must carry the token, which is in the printed address and
-//! then in a cookie.
+//! Every program on this computer can reach the port, and every web page in the browser can make the browser send
+//! requests to it. So each request must name this server (`Host`: a foreign name that resolves to this address is
+//! rejected), must not come from another page (`Origin`), and must carry the token, which is in the printed address and
+//! later in a cookie.
 
 use crate::error::{Error, Result};
 use crate::http::{Head, Response};
 
-/// Length of the token: 128 bits, which a page elsewhere cannot guess.
+/// Length of the token: 128 bits, which cannot be guessed.
 const TOKEN_BYTES: usize = 16;
 
-/// The token and the server's own names, which every request is checked against.
+/// The token and the server's own names, against which every request is checked.
 #[derive(Debug, Clone)]
 pub struct Guard {
     token: String,
     port: u16,
 }
 
-/// A token that nobody can guess: 32 hexadecimal digits.
+/// A random token of 32 hexadecimal digits.
 ///
 /// # Errors
-/// No random bytes from the operating system.
+/// The operating system gives no random bytes.
 pub fn new_token() -> Result<String> {
     let mut bytes = [0; TOKEN_BYTES];
     getrandom::fill(&mut bytes).map_err(Error::Random)?;
     Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
 }
 
-/// Why a request is turned away.
+/// Why a request is rejected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Refusal {
     /// Its Host header names another server.
@@ -40,13 +40,13 @@ pub enum Refusal {
 }
 
 impl Refusal {
-    /// The line that the reader gets.
+    /// The response to the client.
     pub fn answer(self) -> Response {
         match self {
             Self::Host => Response::plain(403, "this server answers to 127.0.0.1 and localhost only\n"),
             Self::Origin => Response::plain(403, "this server answers its own page only\n"),
             Self::Token => {
-                Response::plain(401, "open the address that `sdg annotate` printed: it carries the key to this page\n")
+                Response::plain(401, "open the address that `sdg annotate` printed: it contains the key to this page\n")
             }
         }
     }
@@ -56,7 +56,7 @@ impl Guard {
     /// A guard with this token, or with a new one.
     ///
     /// # Errors
-    /// No random bytes from the operating system.
+    /// The operating system gives no random bytes.
     pub fn new(port: u16, token: Option<&str>) -> Result<Self> {
         if let Some(token) = token {
             return Ok(Self { token: token.to_owned(), port });
@@ -69,8 +69,8 @@ impl Guard {
         format!("http://127.0.0.1:{}/?token={}", self.port, self.token)
     }
 
-    /// The cookie that leaves the token with the browser. Cookies of one host are shared by all its ports, so that the
-    /// port is in the name; scripts do not see it, and requests from other sites do not carry it.
+    /// The cookie with the token. Cookies of a host are shared by all its ports, so the port is part of the name.
+    /// Scripts cannot read the cookie, and requests from other sites do not carry it.
     pub fn cookie(&self) -> (&'static str, String) {
         ("Set-Cookie", format!("{}={}; Path=/; HttpOnly; SameSite=Strict", self.cookie_name(), self.token))
     }
@@ -79,7 +79,7 @@ impl Guard {
         format!("sdg-annotate-{}", self.port)
     }
 
-    /// Lets a request pass, or says why not.
+    /// Accepts a request, or returns the reason for rejecting it.
     ///
     /// # Errors
     /// The first of [`Refusal`]'s reasons that applies.
@@ -107,7 +107,7 @@ impl Guard {
         in_address.chain(in_cookies).chain(in_header).any(|found| self.is_token(found))
     }
 
-    /// Takes equally long for every wrong token of the right length.
+    /// Compares in constant time for tokens of the correct length.
     fn is_token(&self, found: &str) -> bool {
         found.len() == self.token.len()
             && found.bytes().zip(self.token.bytes()).fold(0, |differs, (a, b)| differs | (a ^ b)) == 0

@@ -1,6 +1,6 @@
-//! Requests and answers as the routes know them, between them and hyper's types.
+//! Requests and responses of the routes, independent of hyper's types.
 //!
-//! What is deliberately absent: reading and writing (server.rs), upgrades, trailers, compression, TLS.
+//! Deliberately absent: reading and writing (server.rs), upgrades, trailers, compression, TLS.
 
 use std::borrow::Cow;
 
@@ -10,20 +10,20 @@ use hyper::body::Bytes;
 use hyper::header::{CONTENT_TYPE, HeaderValue};
 use hyper::http::request::Parts;
 
-/// Where a request goes and what it says of itself.
+/// Request line and headers.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Head {
     /// `GET`, `PUT` …
     pub method: String,
     /// The path, as sent.
     pub path: String,
-    /// What follows the question mark.
+    /// The part after the question mark.
     pub query: Option<String>,
-    /// Names in small letters, in the order sent.
+    /// Names in lower case, in the order sent.
     pub headers: Vec<(String, String)>,
 }
 
-/// A request as it is answered.
+/// A complete request.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Request {
     /// Request line and headers.
@@ -45,12 +45,12 @@ impl Head {
         })
     }
 
-    /// Every value of a header, whose name is given in small letters.
+    /// All values of a header; `name` is in lower case.
     pub fn all<'a>(&'a self, name: &'a str) -> impl Iterator<Item = &'a str> {
         self.headers.iter().filter(move |(known, _)| known == name).map(|(_, value)| value.as_str())
     }
 
-    /// The value of `name` in the query, percent signs resolved.
+    /// The percent-decoded value of `name` in the query.
     pub fn query_value(&self, name: &str) -> Option<String> {
         let raw = self.query.as_ref()?.split('&').find_map(|pair| pair.strip_prefix(name)?.strip_prefix('='))?;
         let mut bytes = Vec::with_capacity(raw.len());
@@ -79,14 +79,14 @@ pub struct Response {
     pub status: u16,
     /// The body's media type.
     pub media_type: &'static str,
-    /// What follows the head.
+    /// The body.
     pub body: Cow<'static, [u8]>,
     /// Further headers.
     pub headers: Vec<(&'static str, String)>,
 }
 
 impl Response {
-    /// An answer of that status in plain words.
+    /// A plain-text response.
     pub fn plain(status: u16, text: &'static str) -> Self {
         Self::new(status, "text/plain; charset=utf-8", text.as_bytes())
     }
@@ -96,7 +96,7 @@ impl Response {
         Self { status, media_type, body: body.into(), headers: Vec::new() }
     }
 
-    /// The answer as hyper sends it. A header that is none, which no answer of ours has, makes it an internal error.
+    /// Converts to hyper's type. An invalid header, which none of our responses has, gives an internal error.
     pub fn into_hyper(self) -> hyper::Response<Full<Bytes>> {
         let body = match self.body {
             Cow::Borrowed(bytes) => Bytes::from_static(bytes),

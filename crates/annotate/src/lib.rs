@@ -8,8 +8,9 @@
 //!    └─ Server: 127.0.0.1 only, behind a Guard (token, Host, Origin) ─ routes ─ page/ (HTML, CSS, JavaScript)
 //! ```
 //!
-//! What is deliberately absent: grasp models and burn. Teaching and detecting come in through [`GraspTeacher`], live
-//! pictures through [`LivePictures`] (a camera's are [`CameraPictures`]), so that this crate builds in seconds. No request names a path: pictures have numbers.
+//! Deliberately absent: grasp models and burn. The caller provides teaching and detection as [`GraspTeacher`] and live
+//! pictures as [`LivePictures`] (of a camera: [`CameraPictures`]), so that this crate builds in seconds. No request
+//! contains a path: pictures have numbers.
 //!
 //! ```no_run
 //! use std::sync::Arc;

@@ -1,7 +1,7 @@
-//! Live pictures, of whatever implements [`LivePictures`].
+//! Live pictures from any implementation of [`LivePictures`].
 //!
-//! A frame that was shown to the page is kept for a while, so that the photo that is taken is the one that the person saw, and
-//! detections are drawn on the picture that they were found in.
+//! A frame that was shown on the page is kept for a while, so that the photo taken is the frame that the person saw,
+//! and detections are drawn on the frame in which they were found.
 
 use std::collections::VecDeque;
 use std::fmt;
@@ -14,12 +14,12 @@ use serde::Serialize;
 
 use crate::error::{Error, Result};
 
-/// Frames that are kept after they were shown: some for each of the few pages that may be open.
+/// Number of shown frames that are kept: several for each open page.
 const MAX_KEPT: usize = 8;
 
-/// A camera as the page needs it.
+/// A camera as used by the page.
 pub trait LivePictures: fmt::Debug + Send + Sync + 'static {
-    /// The newest picture and what is wrong with the camera; does not wait.
+    /// The newest picture and the camera's fault, without waiting.
     fn newest(&self) -> Live;
 }
 
@@ -28,7 +28,7 @@ pub trait LivePictures: fmt::Debug + Send + Sync + 'static {
 pub struct Live {
     /// `None` until the first picture.
     pub frame: Option<LiveFrame>,
-    /// `None` where nothing is wrong.
+    /// `None` if there is no fault.
     pub fault: Option<LiveFault>,
 }
 
@@ -37,18 +37,18 @@ pub struct Live {
 pub struct LiveFrame {
     /// The picture.
     pub picture: Arc<RgbImage>,
-    /// Tells it from every other picture of the camera.
+    /// Number, unique among the camera's pictures.
     pub number: u64,
-    /// The time since it arrived.
+    /// Time since its arrival.
     pub age: Duration,
 }
 
-/// What is wrong with a camera.
+/// A fault of a camera.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct LiveFault {
-    /// What kind of fault it is.
+    /// The kind of fault.
     pub kind: LiveFaultKind,
-    /// The same for people, in one line.
+    /// One line of text for the user.
     pub text: String,
 }
 
@@ -58,41 +58,41 @@ pub struct LiveFault {
 pub enum LiveFaultKind {
     /// No new picture for too long.
     Stale,
-    /// The same picture again and again.
+    /// The same picture repeatedly.
     Frozen,
-    /// Pictures do not arrive whole.
+    /// Pictures are incomplete.
     Torn,
-    /// The camera cannot be reached; it is tried again.
+    /// The camera cannot be reached; connecting is retried.
     Gone,
     /// The pictures are black.
     Black,
     /// Pictures of another size than the calibrated camera's.
     OtherSize,
-    /// There will be no more pictures, as at the end of a folder; the last one stays.
+    /// There are no more pictures, as at the end of a folder; the last one remains.
     Ended,
     /// It failed and is not opened again.
     Failed,
 }
 
 impl LiveFaultKind {
-    /// Whether the newest picture shows what the camera was meant to show.
+    /// Whether the newest picture is valid and current.
     pub fn is_usable(self) -> bool {
         self == Self::Ended
     }
 }
 
-/// The camera that a session is opened with.
+/// The camera of a session.
 #[derive(Debug, Clone)]
 pub struct LiveOptions {
     /// Source of its pictures.
     pub pictures: Arc<dyn LivePictures>,
-    /// What the page calls it.
+    /// Name shown on the page.
     pub address: String,
-    /// Where the first photo is written, if there is no file of that name yet; further ones get numbers.
+    /// Path of the first photo, if no such file exists; further photos get numbers.
     pub photo_path: PathBuf,
 }
 
-/// The camera of a session, and the frames that were shown.
+/// The camera of a session, and the frames shown so far.
 #[derive(Debug)]
 pub(crate) struct LiveDesk {
     pub(crate) options: LiveOptions,
@@ -108,7 +108,7 @@ impl LiveDesk {
         self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The newest frame, which is kept from now on, and what is wrong with the camera.
+    /// The newest frame, which is kept from now on, and the camera's fault.
     pub(crate) fn newest(&self) -> Live {
         let live = self.options.pictures.newest();
         if let Some(frame) = &live.frame {
@@ -123,23 +123,23 @@ impl LiveDesk {
         live
     }
 
-    /// The picture of a frame that was shown.
+    /// The picture of a shown frame.
     ///
     /// # Errors
-    /// [`Error::NoSuchFrame`] for one that is not kept any more.
+    /// [`Error::NoSuchFrame`] if it is no longer kept.
     pub(crate) fn frame(&self, number: u64) -> Result<Arc<RgbImage>> {
         let kept = self.kept();
         let frame = kept.iter().find(|frame| frame.number == number).ok_or(Error::NoSuchFrame { number })?;
         Ok(Arc::clone(&frame.picture))
     }
 
-    /// The picture of a frame to make a photo of.
+    /// The picture of a shown frame, for use as a photo.
     ///
     /// # Errors
-    /// As [`frame`](Self::frame), and [`Error::Camera`] while the camera shows something else than what is before it.
+    /// As [`frame`](Self::frame), and [`Error::Camera`] while the camera has a fault.
     pub(crate) fn photo(&self, number: u64) -> Result<Arc<RgbImage>> {
         match self.options.pictures.newest().fault.filter(|fault| !fault.kind.is_usable()) {
-            Some(fault) => Err(Error::Camera { expected: "a camera that shows what is before it", found: fault.text }),
+            Some(fault) => Err(Error::Camera { expected: "a camera without a fault", found: fault.text }),
             None => self.frame(number),
         }
     }

@@ -1,4 +1,4 @@
-//! Marks as they travel between page and server: any of box, grasp and outline may still be missing.
+//! Marks as exchanged between page and server: box, grasp and outline are each optional.
 
 use nalgebra::{Point2, Vector2};
 use sdg_demonstration::{Annotation, CocoFile, ImageFacts};
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::teacher::FoundGrasp;
 
-/// What is marked on one picture so far, in its pixels: x right, y down, centre of the first pixel (0.5, 0.5).
+/// The marks on one picture, in its pixels: x right, y down, centre of the first pixel (0.5, 0.5).
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Marks {
@@ -22,7 +22,7 @@ pub struct Marks {
     pub outline: Option<Vec<[f64; 2]>>,
 }
 
-/// The gripper as marked: the line along which its jaws are wide, and how far apart they are.
+/// The marked gripper: the line along which its jaws extend, and the distance between the jaws.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GraspMarks {
@@ -30,7 +30,7 @@ pub struct GraspMarks {
     pub start: [f64; 2],
     /// `grasp_end`.
     pub end: [f64; 2],
-    /// Pixels between the jaws, across the line.
+    /// Distance between the jaws, across the line, in pixels.
     pub jaw_width: f64,
 }
 
@@ -42,7 +42,7 @@ impl GraspMarks {
 }
 
 impl Marks {
-    /// The marks of an annotation. A grasp without jaw width (other tools know none) gets the one that is taught without it.
+    /// The marks of an annotation. A grasp without a jaw width (other tools have none) gets the default of teaching.
     pub fn of(annotation: &Annotation) -> Self {
         let BoundingBox { x1, y1, x2, y2 } = annotation.bbox;
         let grasp = annotation.grasp.map(|line| {
@@ -57,13 +57,13 @@ impl Marks {
         Self { bbox: Some([x1, y1, x2, y2]), grasp, outline }
     }
 
-    /// A grasp that a model found, as marks to be corrected; places outside a picture of that size are cut off.
+    /// A detected grasp as marks for correction, clipped to a picture of `size`.
     pub fn of_found(found: &FoundGrasp, size: [u32; 2]) -> Self {
         let [width, height] = size.map(f64::from);
         let BoundingBox { x1, y1, x2, y2 } = found.bbox.clip(width, height);
         let (sin, cos) = found.grasp.angle.radians().sin_cos();
         let center = found.grasp.center();
-        // Where the part lies at the border the line is shortened on both sides, so that its middle stays.
+        // At the picture's border the line is shortened on both sides, so that its middle stays.
         let inside = |along: f64| {
             let end = center + Vector2::new(cos, sin) * along;
             (0.0..=width).contains(&end.x) && (0.0..=height).contains(&end.y)
@@ -95,16 +95,16 @@ impl Marks {
         self.outline.as_ref().map(|vertices| Polygon { vertices: vertices.iter().map(|&v| Point2::from(v)).collect() })
     }
 
-    /// Where the part is: its outline, or its box.
+    /// The part's region: its outline, or its box.
     pub fn region(&self) -> Option<Polygon> {
         self.polygon().or_else(|| self.bounding_box().map(|bbox| Polygon::from_box(&bbox)))
     }
 
-    /// The COCO file that says this, with the object's name; without box and outline, one of a picture without objects.
-    /// Reading it again is the check of the marks: what is written can be taught.
+    /// The COCO file with these marks and the object's name; without box and outline, the file of a picture without
+    /// objects. Reading the file back validates the marks: everything written can be taught.
     ///
     /// # Errors
-    /// Marks outside the picture, without extent, an outline that crosses itself.
+    /// Marks outside the picture or of zero size; an outline that crosses itself.
     pub fn to_coco(&self, label: &str, image: &ImageFacts) -> sdg_demonstration::Result<String> {
         let mut file = CocoFile::new();
         let file_name = image.file_name.unwrap_or_default();
@@ -126,7 +126,7 @@ impl Marks {
         Ok(text)
     }
 
-    /// Whether there is enough for an object to be written down.
+    /// Whether the marks suffice for an object in a file.
     pub fn has_object(&self) -> bool {
         self.bbox.is_some() || self.outline.is_some()
     }
@@ -161,7 +161,7 @@ mod tests {
         let mut read = Annotation::read(text.as_bytes(), &IMAGE).unwrap().remove(0);
         read.jaw_width = None;
         assert!((Marks::of(&read).grasp.unwrap().jaw_width - 40.0).abs() < 1e-9);
-        // A lug beside the middle, under the jaws' length: it is not where the opening is measured.
+        // A lug beside the middle, but under the jaws: the opening is measured at the middle.
         let lugged = [
             [10.0, 20.0],
             [70.0, 20.0],

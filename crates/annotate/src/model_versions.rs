@@ -1,10 +1,10 @@
-//! The versions of a model: each teaching's file stays, under the name and time of its teaching, and the one in use stands under the
-//! model's own name as well.
+//! The versions of a model: the file of each teaching is kept, under a name with the time of the teaching. The version
+//! in use also exists under the model's own name.
 //!
 //! ```text
 //! pendulum.sdg                           the version in use
 //! models/pendulum-C-20261123-203107.sdg  a teaching's file
-//! models/pendulum-20261120-081500.sdg    what stood under the name before, when it came from elsewhere
+//! models/pendulum-20261120-081500.sdg    the former file of that name, if it was not made by a teaching here
 //! ```
 
 use std::fs;
@@ -18,22 +18,22 @@ use crate::error::{Error, Result};
 use crate::names::{file_name, free_numbered};
 use crate::teacher::TaughtSummary;
 
-/// Larger model files than any teaching writes.
+/// Maximum size of a model file.
 const MAX_MODEL_BYTES: u64 = 1 << 30;
 
-/// One teaching's model.
+/// The model of one teaching.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Version {
-    /// Its file's name in the folder of versions.
+    /// File name in the folder of versions.
     pub file: String,
-    /// When it was taught: seconds since 1970.
+    /// Time of the teaching: seconds since 1970.
     pub taught_secs: u64,
-    /// What it is and how good it was found to be.
+    /// The model's facts and measured quality.
     pub summary: TaughtSummary,
-    /// Photos and pictures without the part that it was taught from.
+    /// Number of photos and of pictures without the part that it was taught from.
     pub photos: usize,
     pub negatives: usize,
-    /// [`fingerprint`] of what it was taught from.
+    /// [`fingerprint`] of the teaching's inputs.
     pub material: String,
 }
 
@@ -47,7 +47,7 @@ pub struct ModelVersions {
 
 impl ModelVersions {
     /// # Errors
-    /// No such version.
+    /// Unknown version.
     pub fn get(&self, id: usize) -> Result<&Version> {
         self.versions.get(id).ok_or(Error::NoSuchVersion { id, count: self.versions.len() })
     }
@@ -55,7 +55,7 @@ impl ModelVersions {
     /// Reads a version's file.
     ///
     /// # Errors
-    /// No such version, a file that cannot be read.
+    /// Unknown version, or its file cannot be read.
     pub fn read(&self, id: usize) -> Result<Vec<u8>> {
         let path = self.folder.join(&self.get(id)?.file);
         let failed = || Error::file(&path, "cannot read");
@@ -66,10 +66,10 @@ impl ModelVersions {
         fs::read(&path).map_err(failed())
     }
 
-    /// Writes a new version under a name of its own and makes it the one in use, which stands at `path`.
+    /// Writes a new version under its own name and makes it the one in use, at `path`.
     ///
     /// # Errors
-    /// A file that cannot be written.
+    /// A file cannot be written.
     pub fn keep(&mut self, path: &Path, bytes: &[u8], version: Version) -> Result<()> {
         fs::create_dir_all(&self.folder).map_err(Error::file(&self.folder, "cannot make this folder"))?;
         self.keep_foreign(path)?;
@@ -85,7 +85,7 @@ impl ModelVersions {
     /// Makes a version the one in use.
     ///
     /// # Errors
-    /// No such version, files that cannot be read or written.
+    /// Unknown version, or files cannot be read or written.
     pub fn use_version(&mut self, path: &Path, id: usize) -> Result<Vec<u8>> {
         let bytes = self.read(id)?;
         self.keep_foreign(path)?;
@@ -94,7 +94,7 @@ impl ModelVersions {
         Ok(bytes)
     }
 
-    /// What stands at `path` is not lost, unless it is a version that is kept anyway.
+    /// Keeps the file at `path` as a version, unless it is one already.
     fn keep_foreign(&self, path: &Path) -> Result<()> {
         let Ok(metadata) = fs::metadata(path) else { return Ok(()) };
         let standing = fs::read(path).map_err(Error::file(path, "cannot read"))?;
@@ -109,7 +109,7 @@ impl ModelVersions {
     }
 }
 
-/// Now, in seconds since 1970.
+/// The current time in seconds since 1970.
 pub fn now_secs() -> u64 {
     SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since: Duration| since.as_secs())
 }
@@ -118,7 +118,7 @@ fn stem(path: &Path) -> String {
     path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// Date and time of day in UTC, fit for names: 20261123-203107.
+/// Date and time of day in UTC, for file names: 20261123-203107.
 ///
 /// # Source
 /// Hinnant, "chrono-Compatible Low-Level Date Algorithms", `civil_from_days`.
@@ -135,7 +135,7 @@ fn stamp(secs: u64) -> String {
     format!("{year:04}{month:02}{day:02}-{:02}{:02}{:02}", of_day / 3600, of_day / 60 % 60, of_day % 60)
 }
 
-/// A number of what a model was taught from, by which changes show: FNV-1a, 64 bits.
+/// A hash of a teaching's inputs, which reveals changes: FNV-1a, 64 bits.
 pub fn fingerprint(text: &str) -> String {
     let hash = text
         .bytes()

@@ -2,15 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
-/// The last part of a path, for people.
+/// The last part of a path, for display.
 pub fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// Accents that stand behind their letter, as macOS writes umlauts.
+/// Combining accents, as in umlauts on macOS.
 const COMBINING: std::ops::RangeInclusive<char> = '\u{300}'..='\u{36f}';
 
-/// What of a name any file system takes.
+/// The characters of a name that every file system accepts.
 pub fn safe_stem(name: &str) -> String {
     let safe: String = name
         .chars()
@@ -20,13 +20,13 @@ pub fn safe_stem(name: &str) -> String {
     if safe.chars().all(|c| c == '_') { "part".to_owned() } else { safe }
 }
 
-/// A name beside `beside` that is not taken, made of what of `name` any file system takes.
+/// An unused path in the folder of `beside`, from the characters of `name` that every file system accepts.
 pub fn free_name(beside: &Path, name: &str, extension: &str) -> PathBuf {
     let stem = safe_stem(&Path::new(name).file_stem().unwrap_or_default().to_string_lossy());
     free_numbered(&beside.with_file_name(format!("{stem}.{extension}")))
 }
 
-/// The path itself or, where a picture or marks of that name are there already, the same with a number.
+/// The path itself or, if a picture or marks with that name exist, the path with a number.
 pub fn free_numbered(path: &Path) -> PathBuf {
     let (stem, extension) = (path.file_stem().unwrap_or_default(), path.extension().unwrap_or_default());
     let numbered = |n: usize| match n {
@@ -38,7 +38,7 @@ pub fn free_numbered(path: &Path) -> PathBuf {
     (1..).map(numbered).find(|path| !taken(path)).expect("numbers do not run out")
 }
 
-/// What cameras and people call any picture.
+/// Names that cameras and people give to any picture.
 const ANY_PICTURE: [&str; 14] = [
     "photo",
     "image",
@@ -56,7 +56,7 @@ const ANY_PICTURE: [&str; 14] = [
     "webcam",
 ];
 
-/// A name for the part that is on a photo: the photo's, or its folder's where the photo is called as any picture is.
+/// The proposed name of the part on a photo: the photo's name, or its folder's if the photo has a generic name.
 pub fn proposed_label(photo: Option<&Path>, folder: &Path) -> String {
     let says_something = |name: &String| {
         let letters: String = name.chars().filter(|c| c.is_alphabetic()).flat_map(char::to_lowercase).collect();

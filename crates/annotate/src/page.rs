@@ -1,16 +1,16 @@
-//! The page's own files, compiled in: it fetches nothing from elsewhere and needs no build step.
+//! The page's files, compiled in: the page loads nothing from other servers and needs no build step.
 //!
-//! They are sent without their indentation and without lines that are comments alone, which are a seventh of them. Every line keeps
-//! its number, so that the browser's messages name lines of the files as they stand in page/.
+//! They are sent without indentation and without comment-only lines, which saves a seventh. Line numbers are kept, so
+//! that messages in the browser refer to lines of the files in page/.
 
-/// The page's HTML document, as it stands in page/.
+/// The page's HTML document, as in page/.
 const INDEX: &str = include_str!("../page/index.html");
 
 const SCRIPT: &str = "text/javascript; charset=utf-8";
 const ICON: &str = "image/svg+xml";
 const STYLE: &str = "text/css; charset=utf-8";
 
-/// Name, media type and text of every other file. They stand flat under `/page/`.
+/// Name, media type and text of every other file. They are all directly under `/page/`.
 const FILES: &[(&str, &str, &str)] = &[
     ("page.css", STYLE, include_str!("../page/page.css")),
     ("icon.svg", ICON, include_str!("../page/icon.svg")),
@@ -42,12 +42,12 @@ const FILES: &[(&str, &str, &str)] = &[
     ("view.js", SCRIPT, include_str!("../page/view.js")),
 ];
 
-/// The page's HTML document, as it is sent.
+/// The page's HTML document, as sent.
 pub fn index() -> String {
     lean(INDEX)
 }
 
-/// A file by its name, as it is sent, with its media type.
+/// The text of a file, as sent, with its media type.
 pub fn file(name: &str) -> Option<(&'static str, String)> {
     let &(_, media_type, text) = FILES.iter().find(|(known, ..)| *known == name)?;
     Some((media_type, lean(text)))
@@ -74,7 +74,7 @@ fn lean(text: &str) -> String {
 mod tests {
     use super::*;
 
-    /// Issue 47: the page stays below 190 KB.
+    /// The limit of issue 47: the page is smaller than 190 KB.
     const MAX_BYTES: usize = 190_000;
 
     #[test]
@@ -89,7 +89,7 @@ mod tests {
         assert_eq!(lean(text), "\n\n\nconst a = 1; // kept\nb(`//`);\n\n");
         for text in FILES.iter().map(|&(.., text)| text).chain([INDEX]) {
             assert_eq!(lean(text).lines().count(), text.lines().count());
-            // A template that goes over several lines, or code after a comment's end, would be changed.
+            // A template literal over several lines, or code after the end of a comment, would be changed.
             for line in text.lines() {
                 assert!(line.matches('`').count() % 2 == 0, "a template over several lines: {line}");
                 let after = line.split_once("*/").map_or("", |(_, after)| after);
@@ -101,7 +101,7 @@ mod tests {
         }
     }
 
-    /// The values of a property of this name in the page's CSS, and of those that begin with it.
+    /// The values of all properties in the page's CSS whose name begins with `property`.
     fn values(property: &str) -> Vec<&'static str> {
         let css = FILES.iter().find(|(name, ..)| *name == "page.css").unwrap().2;
         let declarations = css.split(['{', '}', ';']).filter_map(|declaration| declaration.split_once(": "));
@@ -126,7 +126,7 @@ mod tests {
         }
     }
 
-    /// Reports are read beside the page.
+    /// Reports use the same style as the page.
     const REPORT_CSS: &str = include_str!("../../report/src/page.css");
 
     #[test]
@@ -163,7 +163,7 @@ mod tests {
         for name in ["sans", "mono"] {
             assert_eq!(value(css, name), value(light, name), "--{name}");
         }
-        // A document has larger headings and wider margins besides.
+        // Documents also have larger headings and wider margins.
         const SIZES: [&str; 6] = [".8125rem", ".9375rem", "1.0625rem", "1.25rem", "13px", "14px"];
         const SPACES_PX: [i32; 8] = [2, 4, 8, 12, 16, 24, 40, 64];
         let on_screen = REPORT_CSS.split("@page").next().unwrap();

@@ -1,4 +1,4 @@
-//! The picture files that the page may show, and no others.
+//! The picture files that the page may show, and no other files.
 
 use std::fs;
 use std::io::Cursor;
@@ -9,37 +9,37 @@ use sdg_demonstration::{IMAGE_EXTENSIONS, ImageLimits, PictureError, decode_imag
 
 use crate::error::{Error, Result};
 
-/// Larger photos than any camera makes.
+/// Maximum size of a photo's file.
 pub const MAX_PICTURE_BYTES: u64 = 64 << 20;
-/// Quality of pictures that are encoded for the page alone.
+/// JPEG quality of pictures encoded for the page.
 const JPEG_QUALITY: u8 = 90;
 
-/// One picture on the disk, known to be readable.
+/// A readable picture file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Picture {
     /// Path of the file.
     pub path: PathBuf,
-    /// What the page calls it.
+    /// Name shown on the page.
     pub name: String,
-    /// Pixels across and down, upright.
+    /// Width and height of the upright picture, in pixels.
     pub size: [u32; 2],
 }
 
 impl Picture {
-    /// Reads and decodes the file once, so that everything wrong with it is reported now.
+    /// Reads and decodes the file once, so that any error is reported now.
     ///
     /// # Errors
-    /// A file that cannot be read or is no picture.
+    /// The file cannot be read or is not a picture.
     pub fn open(path: &Path) -> Result<Self> {
         let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
         let image = decode(&read(path)?, &path.display().to_string())?;
         Ok(Self { path: path.to_owned(), name, size: [image.width(), image.height()] })
     }
 
-    /// Decodes bytes once, so that what is no picture is refused before it is written.
+    /// Decodes bytes once, so that invalid pictures are rejected before they are written.
     ///
     /// # Errors
-    /// Bytes that are no picture.
+    /// The bytes are not a picture.
     pub fn check(bytes: &[u8], name: &str) -> Result<()> {
         decode(bytes, name).map(|_| ())
     }
@@ -47,7 +47,7 @@ impl Picture {
     /// The pixels, upright.
     ///
     /// # Errors
-    /// A file that has become unreadable or another picture since it was opened.
+    /// The file has become unreadable or was replaced since it was opened.
     pub fn pixels(&self) -> Result<RgbImage> {
         let image = decode(&read(&self.path)?, &self.name)?;
         if [image.width(), image.height()] == self.size {
@@ -60,11 +60,11 @@ impl Picture {
         })
     }
 
-    /// Bytes for a browser, and their media type: the file itself, or a JPEG where browsers do not read the file, or where its pixels
-    /// lie on their side, so that places in both are the same.
+    /// Bytes for a browser, and their media type: the file itself, or a JPEG if browsers do not support the format or
+    /// the stored pixels are rotated, so that coordinates are the same in both.
     ///
     /// # Errors
-    /// A file that has become unreadable.
+    /// The file has become unreadable.
     pub fn for_browser(&self) -> Result<(Vec<u8>, &'static str)> {
         let bytes = read(&self.path)?;
         let media_type = match image::guess_format(&bytes) {
@@ -79,10 +79,10 @@ impl Picture {
     }
 }
 
-/// The pictures in a folder, by name; folders in it are left out.
+/// The pictures in a folder, sorted by name; subfolders are ignored.
 ///
 /// # Errors
-/// A folder that cannot be listed.
+/// The folder cannot be listed.
 pub fn pictures_in(folder: &Path) -> Result<Vec<PathBuf>> {
     let failed = || Error::file(folder, "cannot list this folder");
     let mut paths = Vec::new();
@@ -101,7 +101,8 @@ pub fn pictures_in(folder: &Path) -> Result<Vec<PathBuf>> {
 pub fn jpeg(image: &RgbImage) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut encoder = image::codecs::jpeg::JpegEncoder::new_with_quality(&mut bytes, JPEG_QUALITY);
-    // Writing to memory fails for pictures beyond JPEG's 65535 pixels a side only, which no demonstration has.
+    // Writing to memory fails only for pictures above JPEG's limit of 65535 pixels per side, which no demonstration
+    // has.
     match encoder.encode_image(image) {
         Ok(()) => bytes,
         Err(_) => Vec::new(),
@@ -111,7 +112,7 @@ pub fn jpeg(image: &RgbImage) -> Vec<u8> {
 /// The picture as PNG, without loss.
 ///
 /// # Errors
-/// A picture without pixels.
+/// The picture has no pixels.
 pub fn png(image: &RgbImage) -> Result<Vec<u8>> {
     let mut bytes = Cursor::new(Vec::new());
     image.write_to(&mut bytes, ImageFormat::Png).map_err(|error| Error::Camera {

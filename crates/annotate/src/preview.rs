@@ -1,4 +1,4 @@
-//! Samples made from the marks as they are now, to see what a model will learn from.
+//! Samples made from the current marks: a preview of the training data.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -16,11 +16,11 @@ const SAMPLE_PX: f64 = 400.0;
 /// Line width of the marks on a sample.
 const PEN_PX: f64 = 1.6;
 
-/// The augmenter of the marks that were asked for last: preparing it costs more than a sample.
+/// The augmenter of the last requested marks: preparing it takes longer than making a sample.
 #[derive(Default)]
 pub struct Previews(Mutex<Option<Arc<Prepared>>>);
 
-/// What a sample is made from, besides the picture itself.
+/// The inputs of a sample besides the picture.
 #[derive(PartialEq)]
 pub struct SampleKey {
     pub image_id: usize,
@@ -35,11 +35,11 @@ struct Prepared {
 }
 
 impl Previews {
-    /// Sample `index` of `key`, with the grasp drawn where the marks went, as JPEG. `demonstration` is called only when the
+    /// Sample `index` of `key` as JPEG, with the transformed grasp drawn on it. `demonstration` is called only if the
     /// key differs from the last one.
     ///
     /// # Errors
-    /// Those of `demonstration`, and marks that cannot be taught.
+    /// Those of `demonstration`; the marks are unsuitable for teaching.
     pub fn sample(
         &self,
         key: SampleKey,

@@ -1,16 +1,17 @@
-//! A project: photos with their marks beside them, and a file that says what is what.
+//! A project: photos with their marks beside them, and a file that records the role of each file.
 //!
 //! ```text
-//! DIR/sdg-project.json         photos, tried pictures and what was said of them, versions of the model
+//! DIR/sdg-project.json         photos, tried pictures and the user's statements on them, versions of the model
 //!     photo.sdg-project.json   the same for a photo that was opened alone
 //!     photo.png .json          a photo of the part, its marks
 //!     pendulum.sdg             the model in use
 //!     models/                  all versions
-//!     tried/                   pictures that came from the page
+//!     tried/                   pictures added on the page
 //! ```
-//! Names are relative to the folder where they lie in it. A folder that is a project may hold pictures that its file does not name.
-//! They have come there since: with marks beside it such a picture is a photo, otherwise a picture to try. In a new folder without
-//! any marks the person chooses the photo. Nothing of the folder is taken into the project of a photo.
+//! Names are relative to the project's folder for files in it. A project's folder may contain pictures that its file
+//! does not name, because they were added later: such a picture is a photo if it has marks beside it, otherwise a
+//! picture to try. In a new folder without any marks, the user chooses the photo. A photo's own project ignores the
+//! other files of the folder.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -27,18 +28,18 @@ use crate::picture::{Picture, pictures_in};
 use crate::region::Region;
 
 const FILE: &str = "sdg-project.json";
-/// Where pictures that came from the page are kept.
+/// Folder of pictures added on the page.
 pub const TRIED_FOLDER: &str = "tried";
 const FORMAT: u32 = 1;
-/// Larger than any project's file.
+/// Maximum size of a project's file.
 const MAX_BYTES: u64 = 64 << 20;
 
-/// Where a project's file stands, and the folder that its names are relative to.
+/// A project's file, and the folder that its names are relative to.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ProjectPlace {
     pub folder: PathBuf,
     pub file: PathBuf,
-    /// Whether the folder is the project, not a photo in it.
+    /// Whether the project is the folder and not a single photo in it.
     pub is_folder: bool,
 }
 
@@ -47,10 +48,10 @@ impl ProjectPlace {
         Self { folder: folder.to_owned(), file: folder.join(FILE), is_folder: true }
     }
 
-    /// The project of the photo's folder where that names the photo, otherwise the photo's own.
+    /// The project of the photo's folder if it names the photo, otherwise the photo's own project.
     ///
     /// # Errors
-    /// A file that cannot be read or is no project's.
+    /// A file cannot be read or is not a project's file.
     pub fn of_photo(photo: &Path) -> Result<Self> {
         let folder = photo.parent().unwrap_or(Path::new("")).to_owned();
         let whole = Self { folder: folder.clone(), file: folder.join(FILE), is_folder: false };
@@ -61,39 +62,39 @@ impl ProjectPlace {
         Ok(Self { folder, file: photo.with_extension(FILE), is_folder: false })
     }
 
-    /// For people, and to tell one project from another: the folder, or the file of a photo's.
+    /// The project's path for display and comparison: the folder, or the file of a photo's project.
     pub fn shown(&self) -> String {
         if self.is_folder { self.folder.display().to_string() } else { self.file.display().to_string() }
     }
 }
 
-/// The file of the project that is opened with a photo, which need not be there yet.
+/// The project's file for an opened photo; it need not exist yet.
 ///
 /// # Errors
-/// A file in the photo's folder that cannot be read or is no project's.
+/// A file in the photo's folder cannot be read or is not a project's file.
 pub fn project_of_photo(photo: &Path) -> Result<PathBuf> {
     Ok(ProjectPlace::of_photo(photo)?.file)
 }
 
-/// The name of the part whose project is opened with a folder or a photo, where one was given.
+/// The name of the part in the project of a folder or photo, if it has one.
 pub fn label_of(opened: &Path) -> Option<String> {
     let place = if opened.is_dir() { ProjectPlace::of_folder(opened) } else { ProjectPlace::of_photo(opened).ok()? };
     let file = ProjectFile::read(&place).ok().flatten();
     if let Some(label) = file.as_ref().and_then(|file| file.label.clone()) {
         return Some(label);
     }
-    // The marks of a photo that has no file yet name it, too.
+    // Without a project's file, the photo's marks give the name.
     let first = file.and_then(|file| file.photos.first().map(|name| place.folder.join(name)));
     let photo = if place.is_folder { first? } else { opened.to_owned() };
     let size = Picture::open(&photo).ok()?.size;
     annotation_file::open(&photo, None, size).ok()?.label
 }
 
-/// What the file says.
+/// The contents of a project's file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ProjectFile {
-    /// Of the file.
+    /// Version of the format.
     pub format: u32,
     /// The object's name.
     pub label: Option<String>,
@@ -101,34 +102,34 @@ pub struct ProjectFile {
     pub photos: Vec<String>,
     /// Pictures that a model was tried on.
     pub tried: Vec<Tried>,
-    /// Pictures of the folder that are taken out of the project.
+    /// Pictures of the folder that were removed from the project.
     pub removed: BTreeSet<String>,
     /// Versions of the model, oldest first.
     pub models: Vec<Version>,
-    /// Index of the one in use.
+    /// Index of the version in use.
     pub current_model: Option<usize>,
-    /// The part of pictures that is searched; `None` in files that do not say it: what the model in use says.
+    /// The searched region of pictures; `None` in files without this field: the region of the model in use applies.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub searched: Option<Searched>,
 }
 
-/// The part of pictures that is searched.
+/// The searched region of pictures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Searched {
-    /// All of them, whatever the model says.
+    /// The whole picture, whatever the model's file says.
     All,
     Part(Region),
 }
 
-/// A picture that a model was tried on, and what the person said of it.
+/// A picture that a model was tried on, with the user's statements on it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Tried {
     pub file: String,
-    /// The name for people.
+    /// Name for display.
     pub name: String,
-    /// The part is not there.
+    /// The part is not in the picture.
     #[serde(default)]
     pub absent: bool,
     /// The photo that it became.
@@ -136,7 +137,7 @@ pub struct Tried {
     pub became: Option<String>,
 }
 
-/// What a project's file names and is not there: on a disk that is not mounted, perhaps.
+/// Files named in a project's file that do not exist, for example because their disk is not mounted.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Gone {
     pub photos: Vec<String>,
@@ -165,10 +166,10 @@ impl Default for ProjectFile {
 }
 
 impl ProjectFile {
-    /// Reads a project's file, if there is one.
+    /// Reads a project's file, if it exists.
     ///
     /// # Errors
-    /// A file that cannot be read or is no project's.
+    /// The file cannot be read or is not a project's file.
     fn read(place: &ProjectPlace) -> Result<Option<Self>> {
         let path = place.file.clone();
         match fs::metadata(&path) {
@@ -189,11 +190,11 @@ impl ProjectFile {
         }
     }
 
-    /// Reads a project's file and, of a folder, adds the pictures that have come there since. Pictures that are gone are left out
-    /// and come second.
+    /// Reads a project's file and, for a folder, adds pictures that were added later. Missing pictures are removed and
+    /// returned separately.
     ///
     /// # Errors
-    /// A folder that cannot be read, a file that is no project's, marks that belong to another picture.
+    /// The folder cannot be read, the file is not a project's file, or marks belong to another picture.
     pub fn open(place: &ProjectPlace) -> Result<(Self, Gone)> {
         let read = Self::read(place)?;
         let is_new = read.is_none();
@@ -213,7 +214,7 @@ impl ProjectFile {
         Ok((file, gone))
     }
 
-    /// Names what is gone as before, behind what is there.
+    /// Keeps the names of missing files, after the existing ones.
     pub fn keep_gone(&mut self, gone: &Gone) {
         let photos = gone.photos.iter().filter(|name| !self.photos.contains(name));
         let photos: Vec<String> = photos.cloned().collect();
@@ -241,10 +242,10 @@ impl ProjectFile {
             }
         }
         if is_new && self.photos.is_empty() && self.tried.len() > 1 {
-            // Which of them is the photo only the person knows; until it is chosen, none is taken in.
+            // Only the user knows which of them is the photo; until it is chosen, none is added.
             self.removed.extend(self.tried.drain(..).map(|tried| tried.file));
         }
-        // The only picture of a new folder, and another one where the photo is gone.
+        // The only picture of a new folder; a picture in a project whose photo is missing is not taken as one.
         if self.photos.is_empty()
             && let Some(first) = self.tried.iter().position(|tried| !tried.absent)
         {
@@ -253,17 +254,17 @@ impl ProjectFile {
         Ok(())
     }
 
-    /// Whether it says no more than that there is a photo, which needs no file.
+    /// Whether the project only consists of a photo, which needs no file.
     fn is_bare(&self) -> bool {
         let Self { label, tried, removed, models, photos, searched, .. } = self;
         let is_set = matches!(searched, Some(Searched::Part(_)));
         label.is_none() && tried.is_empty() && removed.is_empty() && models.is_empty() && photos.len() < 2 && !is_set
     }
 
-    /// Writes the file. A photo that is only looked at gets none.
+    /// Writes the file. For a photo without any work on it, no file is written.
     ///
     /// # Errors
-    /// A folder that cannot be written to.
+    /// The folder cannot be written to.
     pub fn write(&self, place: &ProjectPlace) -> Result<()> {
         let path = &place.file;
         if !place.is_folder && self.is_bare() && !path.exists() {
@@ -275,7 +276,7 @@ impl ProjectFile {
     }
 }
 
-/// The name that the file has for a path: relative to the folder where it lies in it.
+/// The name of a path in the file: relative to the folder if it is inside.
 pub fn relative(folder: &Path, path: &Path) -> String {
     let inside: PathBuf = path.strip_prefix(folder).map_or_else(|_| absolute(path), Path::to_owned);
     inside.to_string_lossy().into_owned()
@@ -305,7 +306,7 @@ mod tests {
         for name in ["a.png", "b.png", "c.png"] {
             RgbImage::new(60, 40).save(at(name)).unwrap();
         }
-        // Without marks, the person chooses.
+        // Without marks, the user chooses.
         let (file, gone) = open(folder.path());
         assert_eq!((file.photos.len(), file.tried.len(), gone.len()), (0, 0, 0));
         assert_eq!(file.removed.len(), 3);
@@ -322,7 +323,7 @@ mod tests {
         fs::remove_file(at("b.png")).unwrap();
         let (again, gone) = open(folder.path());
         assert_eq!(gone, ["b.png"]);
-        // What was taken out stays out; what is known not to show the part is no photo of it.
+        // Removed pictures stay removed, and a picture known not to show the part is not a photo of it.
         assert_eq!((again.photos, &again.tried), (vec!["d.png".to_owned()], &file.tried));
     }
 
@@ -335,7 +336,7 @@ mod tests {
         }
         let place = ProjectPlace::of_photo(&at("a.png")).unwrap();
         assert_eq!(place.file, at("a.sdg-project.json"));
-        // Nothing else of the folder is taken in, and nothing is written for a look.
+        // No other file of the folder is added, and opening writes no file.
         assert_eq!(ProjectFile::open(&place).unwrap().0, ProjectFile::default());
         let bare = ProjectFile { photos: vec!["a.png".into()], ..ProjectFile::default() };
         bare.write(&place).unwrap();

@@ -1,4 +1,4 @@
-//! The projects that were opened lately, in a file of the person's: the newest first.
+//! The list of recently opened projects in a file of the user, newest first.
 
 use std::path::{Path, PathBuf};
 
@@ -9,23 +9,23 @@ use crate::error::{Error, Result};
 use crate::model_versions::now_secs;
 
 const FORMAT: u32 = 1;
-/// More than anybody looks through.
+/// Maximum number of projects in the list.
 const MAX_PROJECTS: usize = 20;
-/// Larger than any list of so many paths.
+/// Maximum size of the file.
 const MAX_BYTES: u64 = 1 << 20;
 
-/// The file that lists them.
+/// The file with the list.
 #[derive(Debug, Clone)]
 pub struct RecentProjects {
     path: PathBuf,
 }
 
-/// A project that was opened: its folder, or its photo.
+/// A recently opened project: its folder, or its photo.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RecentProject {
-    /// Absolute.
+    /// Absolute path.
     pub path: PathBuf,
-    /// When it was opened last: seconds since 1970.
+    /// Time of the last opening: seconds since 1970.
     pub opened_secs: u64,
 }
 
@@ -36,27 +36,27 @@ struct RecentFile {
 }
 
 impl RecentProjects {
-    /// The list in this file, which need not be there yet.
+    /// The list in this file, which need not exist yet.
     pub fn at(path: PathBuf) -> Self {
         Self { path }
     }
 
     fn read(&self) -> Vec<RecentProject> {
-        // A list that is lost or of another version is no reason not to open the page.
+        // A missing list, or one of another version, must not prevent opening the page.
         let read = sdg_files::read(&self.path, MAX_BYTES).ok();
         let file: Option<RecentFile> = read.and_then(|bytes| serde_json::from_slice(&bytes).ok());
         file.filter(|file| file.format == FORMAT).map(|file| file.projects).unwrap_or_default()
     }
 
-    /// Those that are still there, the newest first.
+    /// The projects that still exist, newest first.
     pub fn list(&self) -> Vec<RecentProject> {
         self.read().into_iter().filter(|project| project.path.exists()).collect()
     }
 
-    /// Writes down that a folder, or a photo, was opened now.
+    /// Records that a folder or photo was opened now.
     ///
     /// # Errors
-    /// A file that cannot be written.
+    /// The file cannot be written.
     pub fn note(&self, opened: &Path) -> Result<()> {
         let path = std::path::absolute(opened).map_err(Error::file(opened, "cannot be found"))?;
         let mut projects = self.read();

@@ -1,4 +1,4 @@
-//! The part of a picture that a model searches, as the page sets it.
+//! The searched region of a picture, as set on the page.
 
 use serde::{Deserialize, Serialize};
 
@@ -12,18 +12,18 @@ pub struct Region {
     pub x: u32,
     /// Upper edge.
     pub y: u32,
-    /// Pixels across.
+    /// Width in pixels.
     pub width: u32,
-    /// Pixels down.
+    /// Height in pixels.
     pub height: u32,
-    /// Width and height of the pictures that it is for; `None` for pictures of any size.
+    /// Width and height of the pictures that it applies to; `None` for pictures of any size.
     #[serde(default)]
     pub picture: Option<[u32; 2]>,
 }
 
 impl Region {
     /// # Errors
-    /// No pixel, or some outside the picture that it is for.
+    /// The region is empty or extends beyond the picture.
     pub(crate) fn check(&self) -> Result<()> {
         let refuse = |expected: String, found: String| Err(Error::Request { what: "region", expected, found });
         if self.width == 0 || self.height == 0 {

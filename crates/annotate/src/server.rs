@@ -1,11 +1,11 @@
-//! The server: this computer only, one port, one project at a time, connections read and written by hyper.
+//! The server: this computer only, one port, one project at a time; hyper reads and writes the connections.
 //!
 //! ```text
 //! TcpStream ─ hyper (head bounded, timed) ─ admit (length, Guard) ─ body (bounded, timed) ─ routes, on a thread ─ hyper
 //! ```
 //!
-//! One thread reads and writes all connections. What a request asks for reads files and computes, so it is answered on
-//! a thread of the runtime's pool.
+//! One thread reads and writes all connections. Requests read files and compute, so they are answered on threads of the
+//! runtime's pool.
 
 use std::io;
 use std::net::{Ipv4Addr, TcpListener};
@@ -30,20 +30,20 @@ use crate::http::{Head, Request, Response};
 use crate::routes;
 use crate::session::Session;
 
-/// Between looks at whether to stop.
+/// Interval of the checks whether to stop.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
-/// A connection on which nothing comes, or takes nothing, for so long is closed.
+/// Maximum silence of a connection, in either direction, before it is closed.
 const MAX_WAIT: Duration = Duration::from_secs(30);
-/// How long the body of what is refused is read and dropped: a connection that is closed on unread bytes is reset, and
-/// the refusal may be lost.
+/// Time for which the body of a rejected request is read and discarded: closing a connection with unread bytes resets
+/// it, and the response may be lost.
 const CLOSE_TIMEOUT: Duration = Duration::from_secs(2);
-/// Longer heads than any browser sends to a page of ours.
+/// Maximum size of a request's head; browsers send smaller ones.
 const MAX_HEAD_BYTES: usize = 16 << 10;
 const MAX_HEADERS: usize = 64;
-/// More connections than the page's browsers keep, and more requests than are answered at a time.
+/// Maximum number of connections, and of requests answered at a time; the page needs fewer.
 const MAX_CONNECTIONS: usize = 64;
 
-/// A bound port and what is behind it.
+/// A bound port and the service behind it.
 pub struct Server {
     listener: TcpListener,
     port: u16,
@@ -51,7 +51,7 @@ pub struct Server {
     service: Service,
 }
 
-/// What every request is checked against and answered from.
+/// The guard and the state for answering requests.
 #[derive(Clone)]
 struct Service {
     guard: Arc<Guard>,
@@ -59,19 +59,19 @@ struct Service {
 }
 
 impl Server {
-    /// Takes a port of 127.0.0.1; 0 for any that is free.
+    /// Binds a port of 127.0.0.1; 0 for any free port.
     ///
     /// # Errors
-    /// A port that is taken, or no random bytes for the token.
+    /// The port is taken, or there are no random bytes for the token.
     pub fn bind(session: Session, port: u16) -> Result<Self> {
         let token = session.token().map(str::to_owned);
         Self::bind_desk(Desk::of_session(session), port, token.as_deref())
     }
 
-    /// The same with the key to the page, if it has one already, where a project is chosen on the page.
+    /// The same for a page on which a project is chosen; `token` is an existing token, if any.
     ///
     /// # Errors
-    /// A port that is taken, or no random bytes for the token.
+    /// The port is taken, or there are no random bytes for the token.
     pub fn bind_start(start: Start, port: u16, token: Option<&str>) -> Result<Self> {
         Self::bind_desk(Desk::of_start(start), port, token)
     }
@@ -84,18 +84,18 @@ impl Server {
         Ok(Self { listener, port, patience: MAX_WAIT, service })
     }
 
-    /// Closes connections after so long a silence, instead of half a minute.
+    /// Sets the silence after which connections are closed; the default is half a minute.
     pub fn with_patience(mut self, patience: Duration) -> Self {
         self.patience = patience;
         self
     }
 
-    /// The address that opens the page; it holds the token, so it gives access.
+    /// The address that opens the page; it contains the token, so it gives access.
     pub fn url(&self) -> String {
         self.service.guard.url()
     }
 
-    /// Answers until `stop` says so.
+    /// Serves requests until `stop` returns true.
     ///
     /// # Errors
     /// The port failed.
@@ -105,7 +105,7 @@ impl Server {
         let mut builder = tokio::runtime::Builder::new_current_thread();
         let runtime = builder.enable_all().max_blocking_threads(MAX_CONNECTIONS).build().map_err(failed)?;
         let outcome = runtime.block_on(self.accept(stop)).map_err(failed);
-        // What is still being computed is not waited for.
+        // Running computations are not waited for.
         runtime.shutdown_background();
         outcome
     }
@@ -118,7 +118,7 @@ impl Server {
             let Ok(accepted) = timeout(LOOK_EVERY, listener.accept()).await else { continue };
             let stream = match accepted {
                 Ok((stream, _)) => stream,
-                // One connection that broke before it was taken is no reason to close the page.
+                // A connection that broke before it was accepted must not end the server.
                 Err(error) if error.kind() == io::ErrorKind::ConnectionAborted => continue,
                 Err(error) => return Err(error),
             };
@@ -133,12 +133,12 @@ impl Server {
     }
 }
 
-/// Answers the requests of one connection, until either side has enough.
+/// Answers the requests of one connection until either side closes it.
 async fn serve(stream: TcpStream, service: Service, patience: Duration) {
     if stream.set_nodelay(true).is_err() {
         return;
     }
-    // hyper bounds the time of a head, `Service::answer` that of a body, and this the time of an answer.
+    // hyper limits the time of a head, `Service::answer` that of a body, and this the time of a response.
     let mut stream = TimeoutStream::new(stream);
     stream.set_write_timeout(Some(patience));
     let connection = http1::Builder::new()
@@ -150,12 +150,12 @@ async fn serve(stream: TcpStream, service: Service, patience: Duration) {
             TokioIo::new(Box::pin(stream)),
             service_fn(move |request| service.clone().answer(request, patience)),
         );
-    // A connection that breaks off or speaks no HTTP has ended; nobody else is concerned.
+    // A broken or invalid connection has ended; other connections are not affected.
     let _ = connection.await;
 }
 
 impl Service {
-    /// Answers a request. An error, a body that breaks off or does not come, ends the connection.
+    /// Answers a request. A body that is incomplete or late is an error, which ends the connection.
     async fn answer(
         self,
         request: hyper::Request<Incoming>,
@@ -173,7 +173,7 @@ impl Service {
         let is_page = head.path == "/";
         let request = Request { head, body: read_body(body, patience).await? };
         let desk = self.desk;
-        // A panic in one request is an error of that request alone; the terminal has its message.
+        // A panic fails only its own request; the message is in the terminal.
         let answered = tokio::task::spawn_blocking(move || routes::answer(&desk, &request)).await;
         let mut response = answered.unwrap_or_else(|_| routes::broken());
         if is_page {
@@ -182,7 +182,7 @@ impl Service {
         Ok(with_policy(response).into_hyper())
     }
 
-    /// The head of a request that may be answered. Nothing of a body is kept before its sender is known to be the page.
+    /// The head of an allowed request. No part of a body is stored before the sender is known to be the page.
     fn admit(&self, parts: &Parts, body: &Incoming) -> std::result::Result<Head, Response> {
         let head = Head::of(parts).ok_or_else(|| Response::plain(400, "expected an HTTP/1.1 request\n"))?;
         let Some(length) = body.size_hint().exact() else {
@@ -196,7 +196,7 @@ impl Service {
     }
 }
 
-/// Reads a body whose length was found in order, waiting for each piece no longer than `patience`.
+/// Reads a body of known length, waiting at most `patience` for each piece.
 async fn read_body(mut body: Incoming, patience: Duration) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     while let Some(frame) = timeout(patience, body.frame()).await? {
@@ -207,7 +207,7 @@ async fn read_body(mut body: Incoming, patience: Duration) -> io::Result<Vec<u8>
     Ok(bytes)
 }
 
-/// Puts on an answer what browsers should know of it.
+/// Adds the security headers to a response.
 fn with_policy(mut response: Response) -> Response {
     const POLICY: [(&str, &str); 5] = [
         (
@@ -216,7 +216,7 @@ fn with_policy(mut response: Response) -> Response {
              base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
         ),
         ("X-Content-Type-Options", "nosniff"),
-        // The address has the token.
+        // The address contains the token.
         ("Referrer-Policy", "no-referrer"),
         ("Cache-Control", "no-store"),
         ("Cross-Origin-Resource-Policy", "same-origin"),

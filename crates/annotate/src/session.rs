@@ -1,6 +1,6 @@
-//! One session of the page: the pictures given, what is marked on them, and what was tried.
+//! A session of the page: the given pictures, their marks, and the tried pictures.
 //!
-//! Requests name pictures by their index in a list made here. No path comes from the page.
+//! Requests name pictures by their index in a list of the session. The page never sends a path.
 
 mod folder;
 mod opening;
@@ -28,28 +28,28 @@ use crate::teacher::{GraspTeacher, TaughtModel, TeachRequest, TeachingMaterial};
 use crate::teaching::{News, Teaching};
 use crate::views::{ImageView, Saved, SessionView};
 
-/// Pictures to try that one session keeps.
+/// Maximum number of pictures to try in a session.
 const MAX_TRIAL_PICTURES: usize = 500;
-/// The longest name of an object.
+/// Maximum length of an object's name.
 const MAX_LABEL_CHARS: usize = 80;
 
-/// What the page is opened with.
+/// The inputs of a session.
 #[derive(Debug, Clone, Default)]
 pub struct SessionOptions {
-    /// Pictures of one object, each with the file of its marks if that has another name than the picture's.
+    /// Pictures of one object, each with the file of its marks if that file is not named after the picture.
     pub images: Vec<(PathBuf, Option<PathBuf>)>,
     /// Pictures, or folders of pictures, to try a taught model on.
     pub trial_pictures: Vec<PathBuf>,
-    /// Where a taught model is written; without it, beside the first picture under the object's name.
+    /// File for a taught model; default: beside the first picture, named after the object.
     pub model_path: Option<PathBuf>,
-    /// A camera to take pictures with; with one, `images` may be empty.
+    /// A camera for taking pictures; with one, `images` may be empty.
     pub live: Option<LiveOptions>,
-    /// The folder of a project; `images` are then empty. Without one, the first image has a project of its own. Either is opened
-    /// where it was left.
+    /// The folder of a project; `images` are then empty. Without it, the first image has its own project. Either is
+    /// opened in its last state.
     pub project: Option<PathBuf>,
-    /// The key to the page, for a server that is to be found again by the same page; a new one without it.
+    /// The page's token, for a server that the same page must find again; `None` for a new one.
     pub token: Option<String>,
-    /// How far the hand opens, in pixels of a photo where the part lies; `None` where no camera tells.
+    /// The hand's maximum opening in pixels of a photo, in the part's plane; `None` without a camera's calibration.
     pub max_opening_px: Option<f64>,
 }
 
@@ -57,10 +57,10 @@ fn locked(state: &Mutex<State>) -> MutexGuard<'_, State> {
     state.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// The name of a part as it is kept, without spaces around it.
+/// The name of a part without surrounding spaces.
 ///
 /// # Errors
-/// An empty or endless name.
+/// The name is empty or too long.
 pub(crate) fn check_label(label: &str) -> Result<&str> {
     let label = label.trim();
     let count = label.chars().count();
@@ -74,20 +74,20 @@ pub(crate) fn check_label(label: &str) -> Result<&str> {
     Ok(label)
 }
 
-/// One session.
+/// A session of the page.
 ///
-/// It calls teaching and previews, and they never call it. No other lock is taken while that of `state` is held.
+/// It calls teaching and previews, which never call it. While the lock on `state` is held, no other lock is taken.
 pub struct Session {
     teacher: Arc<dyn GraspTeacher>,
     teaching: Arc<Teaching>,
     previews: Previews,
     model_path: Option<PathBuf>,
-    /// What is written for the person at the page stands beside this: the first picture, or the first photo to be taken.
+    /// The user's files are written beside this path: the first picture, or the first photo to be taken.
     home: PathBuf,
     live: Option<LiveDesk>,
-    /// For pictures that came from the page before there was a photo.
+    /// Folder for pictures added on the page before there is a photo.
     temporary: Option<TempDir>,
-    /// Keep other programs from writing what this one writes.
+    /// Locks that keep other programs from writing the same files.
     locks: Vec<WriterLock>,
     state: Arc<Mutex<State>>,
     id: String,
@@ -96,17 +96,17 @@ pub struct Session {
 }
 
 impl Session {
-    /// The key that the page is to have, where one was given.
+    /// The page's token, if one was given.
     pub(crate) fn token(&self) -> Option<&str> {
         self.token.as_deref()
     }
 
-    /// What the numbers of pictures hold for.
+    /// Identifier of the session; picture numbers are valid within it.
     pub(crate) fn id(&self) -> &str {
         &self.id
     }
 
-    /// Holds locks as long as the session lasts.
+    /// Keeps locks for the lifetime of the session.
     pub fn holding(mut self, locks: Vec<WriterLock>) -> Self {
         self.locks.extend(locks);
         self
@@ -116,7 +116,7 @@ impl Session {
         locked(&self.state)
     }
 
-    /// All that the page starts from.
+    /// The data with which the page starts.
     pub fn view(&self) -> SessionView {
         let mut state = self.state();
         let others = state.others();
@@ -145,10 +145,10 @@ impl Session {
         })
     }
 
-    /// Takes new marks for a picture and writes them, if they are fit to be written; kept they are in any case.
+    /// Stores new marks of a picture, and writes them to the file if they are valid.
     ///
     /// # Errors
-    /// No such picture.
+    /// Unknown picture.
     pub fn set_marks(&self, id: usize, marks: Marks) -> Result<ImageView> {
         let mut state = self.state();
         state.image(id)?;
@@ -157,10 +157,10 @@ impl Session {
         Ok(state.image_view(id))
     }
 
-    /// Renames the object, in every file that is written already.
+    /// Renames the object, also in all files already written.
     ///
     /// # Errors
-    /// An empty or endless name.
+    /// The name is empty or too long.
     pub fn set_label(&self, label: &str) -> Result<SessionView> {
         let label = check_label(label)?;
         let mut state = self.state();
@@ -179,23 +179,23 @@ impl Session {
     /// A marked picture's file.
     ///
     /// # Errors
-    /// No such picture.
+    /// Unknown picture.
     pub fn picture(&self, id: usize) -> Result<Picture> {
         Ok(self.state().image(id)?.picture.clone())
     }
 
-    /// What is marked on a picture.
+    /// The marks on a picture.
     ///
     /// # Errors
-    /// No such picture.
+    /// Unknown picture.
     pub fn marks(&self, id: usize) -> Result<Marks> {
         Ok(self.state().image(id)?.marks.clone())
     }
 
-    /// Takes a photo out of the session. Its file and its marks stay where they are.
+    /// Removes a photo from the session. Its file and its marks are kept.
     ///
     /// # Errors
-    /// No such picture, a project that cannot be written.
+    /// Unknown picture, or the project cannot be written.
     pub fn remove_image(&self, id: usize) -> Result<()> {
         let mut state = self.state();
         state.image(id)?;
@@ -203,10 +203,11 @@ impl Session {
         state.save_project()
     }
 
-    /// Puts a photo back that was taken out in this session. The tried picture that it was made of is a demonstration again.
+    /// Restores a photo that was removed in this session. A tried picture from which it was made becomes a
+    /// demonstration again.
     ///
     /// # Errors
-    /// No such picture, a project that cannot be written.
+    /// Unknown picture, or the project cannot be written.
     pub fn put_back_image(&self, id: usize) -> Result<()> {
         let mut state = self.state();
         let count = state.images.len();
@@ -215,10 +216,10 @@ impl Session {
         state.save_project()
     }
 
-    /// Uses a version of the model: for the pictures to try, and as the file under the model's own name.
+    /// Uses a version of the model for the pictures to try, and as the file under the model's own name.
     ///
     /// # Errors
-    /// No such version, one that cannot be read, a teaching that goes on.
+    /// Unknown version, its file cannot be read, or a teaching is running.
     pub fn use_version(&self, id: usize) -> Result<()> {
         self.teaching.check_idle()?;
         let mut state = self.state();
@@ -232,11 +233,12 @@ impl Session {
         state.save_project()
     }
 
-    /// Searches this part of pictures alone from now on, with the model in use and with those that are taught; all of them with `None`.
+    /// Restricts the search to a region, for the model in use and for models taught later; `None` for the whole
+    /// picture.
     ///
     /// # Errors
-    /// A region that is none, that the model cannot search or, before there is one, that the marked part does not fit in; a teaching that goes
-    /// on, whose model has the region that it began with; a project that cannot be written.
+    /// The region is invalid, the model cannot search it or, without a model, the marked part does not fit into it; a
+    /// teaching is running, whose model has the region set at its start; the project cannot be written.
     pub fn set_region(&self, region: Option<Region>) -> Result<()> {
         self.teaching.check_idle()?;
         if let Some(region) = &region {
@@ -252,14 +254,14 @@ impl Session {
         state.save_project()
     }
 
-    /// Whether the part on the photos that are marked so far fits in a region.
+    /// Whether the part on all marked photos fits into a region.
     fn check_fits(&self, region: &Region) -> Result<()> {
         let (label, marked) = {
             let state = self.state();
             let marked: Vec<_> = state.image_ids().map(|id| state.images[id].clone()).collect();
             (state.label.clone(), marked)
         };
-        // Marks that are not finished say nothing yet.
+        // Incomplete marks are skipped.
         let demonstrations: Vec<_> = marked.iter().filter_map(|image| image.demonstration(&label).ok()).collect();
         if demonstrations.is_empty() {
             return Ok(());
@@ -275,7 +277,7 @@ impl Session {
         self.live.as_ref().ok_or(Error::NoCamera)
     }
 
-    /// The file that the next photo goes to.
+    /// Path of the next photo.
     ///
     /// # Errors
     /// [`Error::NoCamera`].
@@ -283,15 +285,14 @@ impl Session {
         Ok(free_numbered(&self.live_desk()?.options.photo_path))
     }
 
-    /// Writes a frame that was shown as PNG, under a name that is not taken, and makes it a photo of the object.
+    /// Writes a shown frame as PNG, under an unused name, and makes it a photo of the object.
     ///
     /// # Errors
-    /// No camera, or one that shows something else than what is before it; a frame that is not kept any more; a file that
-    /// cannot be written.
+    /// No camera, or a camera with a fault; the frame is no longer kept; the file cannot be written.
     pub fn take_photo(&self, number: u64) -> Result<ImageView> {
         let frame = self.live_desk()?.photo(number)?;
         let bytes = png(&frame)?;
-        // Held until the photo is written: the next one finds its name taken.
+        // Held until the photo is written, so that its name is taken when the next one is chosen.
         let mut state = self.state();
         let path = self.next_photo()?;
         sdg_files::write_atomically(&path, &bytes)?;
@@ -302,10 +303,10 @@ impl Session {
         Ok(state.image_view(id))
     }
 
-    /// One picture with its marks, as teaching takes it.
+    /// A picture with its marks, in the form for teaching.
     ///
     /// # Errors
-    /// No such picture, nothing marked on it, or marks that cannot be taught.
+    /// Unknown picture, no marks, or marks unsuitable for teaching.
     pub fn demonstration(&self, id: usize) -> Result<Demonstration> {
         let (label, marked) = {
             let state = self.state();
@@ -314,10 +315,10 @@ impl Session {
         marked.demonstration(&label)
     }
 
-    /// Sample `index` of `seed` of a marked picture, with the grasp drawn where the marks went, as JPEG.
+    /// Sample `index` of `seed` of a marked picture as JPEG, with the transformed grasp drawn on it.
     ///
     /// # Errors
-    /// No such picture, marks that cannot be taught.
+    /// Unknown picture, or marks unsuitable for teaching.
     pub fn sample(&self, id: usize, seed: u64, index: u64) -> Result<Vec<u8>> {
         let (label, marked) = {
             let state = self.state();
@@ -327,10 +328,10 @@ impl Session {
         self.previews.sample(key, || marked.demonstration(&label), index)
     }
 
-    /// Starts to teach from all marked pictures; [`teaching_news`](Self::teaching_news) tells how it goes.
+    /// Starts teaching from all marked pictures; [`teaching_news`](Self::teaching_news) gives the progress.
     ///
     /// # Errors
-    /// A request without sense, a teaching that goes on already, marks that do not suffice.
+    /// An invalid request, a running teaching, or insufficient marks.
     pub fn start_teaching(&self, request: TeachRequest) -> Result<News> {
         request.check()?;
         let request = TeachRequest { region: self.state().region, ..request };
@@ -364,7 +365,7 @@ impl Session {
     }
 
     /// # Errors
-    /// A teaching goes on.
+    /// A teaching is running.
     pub(crate) fn check_idle(&self) -> Result<()> {
         self.teaching.check_idle()
     }
@@ -374,7 +375,7 @@ impl Session {
         self.teaching.news()
     }
 
-    /// Asks a running teaching to end with what there is.
+    /// Asks a running teaching to end with its current result.
     pub fn stop_teaching(&self) {
         self.teaching.stop();
     }
@@ -387,10 +388,10 @@ impl Session {
         self.teaching.model()
     }
 
-    /// Every picture that is marked for `model`. Pictures without any mark are left out.
+    /// All pictures with marks for `model`. Pictures without any mark are left out.
     ///
     /// # Errors
-    /// None is marked, or one only in part.
+    /// No picture is marked, or one only in part.
     pub fn demonstrations(&self, model: ModelKind) -> Result<Vec<Demonstration>> {
         let (label, marked, max_opening_px) = {
             let state = self.state();

@@ -1,4 +1,4 @@
-//! What a session holds: the object's name, its pictures with their marks, and the pictures to try.
+//! The state of a session: the object's name, its pictures with their marks, and the pictures to try.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -17,32 +17,32 @@ use crate::project_file::{Gone, ProjectFile, ProjectPlace, Searched, Tried, rela
 use crate::region::Region;
 use crate::views::{ImageView, ModelView, Saved, TrialPictureView};
 
-/// The present label, the pictures of the object and the pictures to try, each numbered by its place; what is removed keeps its
-/// number. The versions of the model.
+/// The current label, the object's pictures and the pictures to try, numbered by index; removed ones keep their
+/// numbers. Also the versions of the model.
 pub struct State {
     pub label: String,
-    /// Whether the person, or marks that were there, gave the label; it is a proposal otherwise.
+    /// Whether the label was given by the user or by existing marks; otherwise it is a proposal.
     pub is_named: bool,
     pub images: Vec<MarkedPicture>,
     pub trial_pictures: Vec<TrialPicture>,
     pub models: ModelVersions,
-    /// Where all this is kept; `None` until there is a photo.
+    /// Location of the project; `None` until there is a photo.
     pub place: Option<ProjectPlace>,
-    /// Names of pictures of its folder that were removed earlier.
+    /// Names of pictures of its folder that were removed in earlier sessions.
     pub removed_earlier: BTreeSet<String>,
-    /// What its file names and is not there, which may come back.
+    /// Missing files named in its file, which may reappear.
     pub gone: Gone,
-    /// Pictures of its folder that were offered, in the order in which they were first seen: [`State::others`].
+    /// Pictures of its folder that were offered, in the order of their first listing: [`State::others`].
     pub offered: Vec<PathBuf>,
-    /// How far the hand opens, where a camera tells.
+    /// The hand's maximum opening in pixels, if a calibrated camera gives it.
     pub max_opening_px: Option<f64>,
-    /// The part of pictures that the model in use searches, and that the next one will.
+    /// The region searched by the model in use, and by the next one.
     pub region: Option<Region>,
     /// The file of the model in use cannot be read.
     pub is_model_lost: bool,
 }
 
-/// A picture of the object and what is marked on it.
+/// A picture of the object, and its marks.
 #[derive(Clone)]
 pub struct MarkedPicture {
     pub picture: Picture,
@@ -58,15 +58,15 @@ pub struct MarkedPicture {
 pub struct TrialPicture {
     pub picture: Picture,
     pub uploaded: bool,
-    /// The number of the marked picture that it became, which may have been taken out since: [`State::became`].
+    /// The number of the marked picture that it became, which may have been removed since: [`State::became`].
     pub became: Option<usize>,
-    /// The person said that the part is not there.
+    /// The user stated that the part is not there.
     pub is_absent: bool,
     pub is_removed: bool,
 }
 
 impl TrialPicture {
-    /// One that nothing was said of.
+    /// A picture without statements of the user.
     pub fn new(picture: Picture, uploaded: bool) -> Self {
         Self { picture, uploaded, became: None, is_absent: false, is_removed: false }
     }
@@ -83,12 +83,12 @@ impl State {
         there.ok_or(Error::NoSuchPicture { id, count: self.trial_pictures.len() })
     }
 
-    /// The marked picture that a tried one became, as long as it is there.
+    /// The marked picture that a tried one became, unless it was removed.
     pub fn became(&self, trial_id: usize) -> Option<usize> {
         self.trial_pictures[trial_id].became.filter(|&id| !self.images[id].is_removed)
     }
 
-    /// Adds a picture with marks that are not saved yet, and says its number.
+    /// Adds a picture with unsaved marks and returns its number.
     pub fn add_image(&mut self, picture: Picture, marks: Marks) -> Result<usize> {
         let opened = annotation_file::open(&picture.path, None, picture.size)?;
         let (file, note) = (opened.path, opened.note);
@@ -122,28 +122,28 @@ impl State {
         TrialPictureView { id, name, width, height, became: self.became(id), is_absent: *is_absent }
     }
 
-    /// Numbers of the pictures that are there.
+    /// Numbers of the object's pictures that are not removed.
     pub fn image_ids(&self) -> impl Iterator<Item = usize> + '_ {
         (0..self.images.len()).filter(|&id| !self.images[id].is_removed)
     }
 
-    /// Likewise of those to try.
+    /// Numbers of the pictures to try that are not removed.
     pub fn trial_ids(&self) -> impl Iterator<Item = usize> + '_ {
         (0..self.trial_pictures.len()).filter(|&id| !self.trial_pictures[id].is_removed)
     }
 
-    /// Pictures that the part is not in.
+    /// Pictures without the part.
     pub fn negatives(&self) -> impl Iterator<Item = &Picture> + '_ {
         self.trial_ids().map(|id| &self.trial_pictures[id]).filter(|trial| trial.is_absent).map(|trial| &trial.picture)
     }
 
-    /// [`fingerprint`] of what a teaching would start from now. Coordinates count to a thousandth of a pixel: read back from a file they
-    /// differ in their last digits.
+    /// [`fingerprint`] of the inputs that a teaching would have now. Coordinates are rounded to a thousandth of a
+    /// pixel: after reading from a file their last digits differ.
     pub fn material(&self) -> String {
         let marked = self.image_ids().map(|id| &self.images[id]).filter(|image| image.marks != Marks::default());
         let marked: Vec<_> = marked.map(|image| (&image.picture.path, &image.marks)).collect();
         let negatives: Vec<_> = self.negatives().map(|picture| &picture.path).collect();
-        // Paths that are no text count by what of them is.
+        // Paths that are not UTF-8 are converted lossily.
         let text = |path: &PathBuf| path.to_string_lossy().into_owned();
         let marked: Vec<_> = marked.into_iter().map(|(path, marks)| (text(path), marks)).collect();
         let negatives: Vec<_> = negatives.into_iter().map(text).collect();
@@ -167,10 +167,10 @@ impl State {
         self.models.versions.iter().enumerate().map(view).collect()
     }
 
-    /// Writes the project's file, where there is a photo to be kept.
+    /// Writes the project's file, if there is a photo.
     ///
     /// # Errors
-    /// A folder that cannot be written to.
+    /// The folder cannot be written to.
     pub fn save_project(&self) -> Result<()> {
         let Some(place) = &self.place else { return Ok(()) };
         let folder = &place.folder;
@@ -196,7 +196,7 @@ impl State {
         file.keep_gone(&self.gone);
         file.removed.extend(self.images.iter().filter(|i| i.is_removed).map(|i| name(&i.picture)));
         file.removed.extend(self.trial_pictures.iter().filter(|t| t.is_removed).map(|t| name(&t.picture)));
-        // Taken out once and put in again under the same name.
+        // Removed once and added again under the same name.
         for there in file.photos.iter().chain(file.tried.iter().map(|tried| &tried.file)) {
             file.removed.remove(there);
         }
@@ -208,7 +208,7 @@ impl State {
 fn round(value: &mut Value) {
     match value {
         Value::Number(number) => {
-            // Adding 0 makes −0 the same as 0.
+            // Adding 0 turns −0 into 0.
             let rounded = number.as_f64().map(|number| (1e3 * number).round() / 1e3 + 0.0);
             *value = rounded.map_or(Value::Null, Value::from);
         }
@@ -219,19 +219,19 @@ fn round(value: &mut Value) {
 }
 
 impl MarkedPicture {
-    /// A picture with marks that stand in no file.
+    /// A picture with marks that are in no file.
     pub fn unsaved(picture: Picture, marks: Marks) -> Self {
         Self { picture, marks, file: PathBuf::new(), note: None, saved: Saved::Nothing, is_removed: false }
     }
 
-    /// A picture with the marks that stand beside it, and the object's name there.
+    /// A picture with the marks in the file beside it, and the object's name in that file.
     ///
     /// # Errors
-    /// A picture that cannot be read, marks that belong to another.
+    /// The picture cannot be read, or the marks belong to another picture.
     pub fn open(path: &Path, annotation: Option<&Path>) -> Result<(Self, Option<String>)> {
         let picture = Picture::open(path)?;
         let opened = annotation_file::open(&picture.path, annotation, picture.size)?;
-        // Where they stand, not where changes will go: that file may not be there yet.
+        // The file that was read, not the file for changes, which may not exist yet.
         let found = opened.found.filter(|_| opened.marks.has_object());
         let saved = found.map_or(Saved::Nothing, |path| Saved::Written { file: file_name(&path) });
         let marked =
@@ -239,10 +239,10 @@ impl MarkedPicture {
         Ok((marked, opened.label))
     }
 
-    /// The picture with its marks, as teaching takes it.
+    /// The picture with its marks, in the form for teaching.
     ///
     /// # Errors
-    /// Nothing marked on it, or marks that cannot be taught.
+    /// No marks, or marks unsuitable for teaching.
     pub fn demonstration(&self, label: &str) -> Result<Demonstration> {
         let Self { picture, marks, .. } = self;
         let [width, height] = picture.size;
@@ -250,7 +250,7 @@ impl MarkedPicture {
         let complain = |source| Error::Demonstration { name: picture.name.clone(), source };
         let coco = marks.to_coco(label, &facts).map_err(complain)?;
         let mut objects = Annotation::read(coco.as_bytes(), &facts).map_err(complain)?;
-        // A file without an object is refused on reading, so there is one.
+        // Reading rejects a file without an object, so there is one.
         Ok(Demonstration { image: picture.pixels()?, annotation: objects.remove(0) })
     }
 }

@@ -1,4 +1,4 @@
-//! What the page needs of grasp models, which this crate does not depend on: the caller implements these traits.
+//! Interface to grasp models, which this crate does not depend on: the caller implements these traits.
 
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -11,16 +11,16 @@ use serde::{Deserialize, Serialize};
 use crate::error::{Error, TeacherError};
 use crate::region::Region;
 
-/// More steps than any teaching has.
+/// Maximum number of steps of a teaching.
 const MAX_STEPS: usize = 1_000_000;
 
 /// Teaches grasp models.
 pub trait GraspTeacher: Send + Sync + 'static {
-    /// Teaches a model; half a minute and more for one with a network. `observe` is called with the progress and may end the teaching, which
-    /// then keeps what there is.
+    /// Teaches a model; with a network this takes half a minute or more. `observe` receives the progress and may end
+    /// the teaching, which then keeps its current result.
     ///
     /// # Errors
-    /// Whatever teaching complains of, in one line for the person at the page.
+    /// Any error of teaching, as one line for the user.
     fn teach(
         &self,
         material: &TeachingMaterial,
@@ -28,8 +28,8 @@ pub trait GraspTeacher: Send + Sync + 'static {
         observe: &mut dyn FnMut(TeachingStep) -> ControlFlow<()>,
     ) -> Result<Box<dyn TaughtModel>, TeacherError>;
 
-    /// Teaches a model of those without a network, to see what a further demonstration would change: it takes a second, is not tried on samples
-    /// and has no figures.
+    /// Teaches a model without a network, to see the effect of an additional demonstration. This takes a second; the
+    /// model is not tested on samples and has no figures.
     ///
     /// # Errors
     /// As [`Self::teach`].
@@ -39,55 +39,56 @@ pub trait GraspTeacher: Send + Sync + 'static {
         request: &TeachRequest,
     ) -> Result<Box<dyn TaughtModel>, TeacherError>;
 
-    /// Says whether the part of these demonstrations can be looked for in a region, before a model is taught of them.
+    /// Checks, before a model is taught from these demonstrations, whether their part can be detected in a region.
     ///
     /// # Errors
-    /// A region that the part does not fit in, or that is not of the camera's pictures.
+    /// The part does not fit into the region, or the region exceeds the camera's pictures.
     fn check_region(&self, region: &Region, demonstrations: &[Demonstration]) -> Result<(), TeacherError>;
 
-    /// Reads a model that was taught before; `summary` is what was said of it then.
+    /// Reads a model that was taught before, with its summary.
     ///
     /// # Errors
-    /// Bytes that are no model file.
+    /// The bytes are not a model file.
     fn open(&self, bytes: &[u8], summary: &TaughtSummary) -> Result<Box<dyn TaughtModel>, TeacherError>;
 }
 
-/// What a model is taught from.
+/// The inputs of a teaching.
 #[derive(Debug, Clone, Default)]
 pub struct TeachingMaterial {
     /// Photos of the part with their marks.
     pub demonstrations: Vec<Demonstration>,
-    /// Pictures without it.
+    /// Pictures without the part.
     pub negatives: Vec<RgbImage>,
 }
 
-/// A model, ready to look for the part.
+/// A model that detects the part.
 pub trait TaughtModel: Send + Sync {
-    /// What it is and how good it was found to be.
+    /// The model's facts and measured quality.
     fn summary(&self) -> TaughtSummary;
 
     /// The model file.
     ///
     /// # Errors
-    /// A model that cannot be written down.
+    /// The model cannot be serialised.
     fn to_bytes(&self) -> Result<Vec<u8>, TeacherError>;
 
-    /// The part of pictures that is searched; all of them where `None`.
+    /// The searched region; `None` for the whole picture.
     fn region(&self) -> Option<Region>;
 
-    /// Searches this part of pictures alone from now on; all of them with `None`. The model file stays as it is.
+    /// Restricts the search to a region; `None` for the whole picture. The model's file is not changed.
     ///
     /// # Errors
-    /// A region that the part does not fit in, or that is not of the camera's pictures.
+    /// The part does not fit into the region, or the region exceeds the camera's pictures.
     fn look_in(&self, region: Option<Region>) -> Result<(), TeacherError>;
 
-    /// Finds the part, best score first; those below 0.5 are listed too.
+    /// Detects the part, best score first; detections below 0.5 are included.
     ///
     /// # Errors
-    /// An image that cannot be looked at.
+    /// The image cannot be searched.
     fn detect(&self, image: &RgbImage) -> Result<Vec<FoundGrasp>, TeacherError>;
 
-    /// The same, with the places where picture and demonstration differ under the best refused ones, which takes longer.
+    /// The same, and for the best refused detections the positions at which picture and demonstration differ, which
+    /// takes longer.
     ///
     /// # Errors
     /// As [`Self::detect`].
@@ -96,28 +97,28 @@ pub trait TaughtModel: Send + Sync {
     }
 }
 
-/// How to teach, as asked on the page.
+/// Settings of a teaching, as given on the page.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TeachRequest {
     /// The grasp model to teach.
     pub model: ModelKind,
-    /// Seconds that the training may take at most.
+    /// Maximum seconds of training.
     #[serde(default)]
     pub time_budget_secs: Option<f64>,
-    /// Optimiser steps instead of the preset's.
+    /// Number of optimiser steps, in place of the preset's.
     #[serde(default)]
     pub steps: Option<usize>,
-    /// Equal turns in a whole one; 0 for a part whose turn cannot be seen.
+    /// Number of equivalent turns in a full rotation; 0 for a part whose rotation is not visible.
     #[serde(default = "one")]
     pub symmetry: u32,
-    /// The camera is always as far from the part as it was for the photo, so that parts of another size are refused.
+    /// The camera's distance to the part is always that of the photo, so parts of another size are refused.
     #[serde(default)]
     pub fixed_height: bool,
-    /// Decides every random choice.
+    /// Seed of all random choices.
     #[serde(default = "one_seed")]
     pub seed: u64,
-    /// The part of pictures that the model searches. The session says it, not the page.
+    /// The region that the model searches. It is set by the session, not by the page.
     #[serde(skip)]
     pub region: Option<Region>,
 }
@@ -131,13 +132,13 @@ fn one_seed() -> u64 {
 }
 
 impl TeachRequest {
-    /// The time budget, if it is one.
+    /// The time budget, if it is valid.
     pub fn time_budget(&self) -> Option<Duration> {
         self.time_budget_secs.and_then(|secs| Duration::try_from_secs_f64(secs).ok())
     }
 
     /// # Errors
-    /// A time limit or a number of steps or turns that no teaching can have.
+    /// The time limit, the number of steps or the number of turns is out of range.
     pub(crate) fn check(&self) -> crate::error::Result<()> {
         let refuse =
             |what, expected: &str, found: String| Err(Error::Request { what, expected: expected.into(), found });
@@ -158,25 +159,25 @@ impl TeachRequest {
     }
 }
 
-/// One piece of news from a teaching.
+/// A progress report of a teaching.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum TeachingStep {
     /// An optimiser step was done.
     Step {
-        /// What is being taught: `the network`, `its angles`.
+        /// The network being trained: `the network`, `its angles`.
         of: &'static str,
-        /// Whether no other network is to be taught after it.
+        /// Whether it is the last network of this teaching.
         is_last: bool,
-        /// Steps done.
+        /// Number of finished steps.
         done: usize,
-        /// Steps that there will be, as known now.
+        /// Number of planned steps, as far as known.
         planned: usize,
         /// The loss before the step.
         loss: f64,
     },
-    /// The model was tried on held-back samples.
+    /// The model was tested on held-back samples.
     Validated {
-        /// Steps done before it.
+        /// Steps done before the test.
         done: usize,
         /// Share of the parts that were found, in `[0, 1]`.
         hit_rate: f64,
@@ -190,94 +191,94 @@ pub struct TaughtSummary {
     pub model: ModelKind,
     /// The object's name.
     pub object: String,
-    /// Wall-clock time of the teaching, with that of trying the model on held-back samples.
+    /// Wall-clock time of the teaching and of the test on held-back samples.
     pub seconds: f64,
-    /// What the finished model made of held-back samples; `None` where it was not tried on any.
+    /// Results of the finished model on held-back samples; `None` if it was not tested.
     pub figures: Option<Figures>,
-    /// What came of the pictures without the part.
+    /// Results on the pictures without the part.
     pub negatives: Option<NegativesRefused>,
 }
 
-/// What a finished model made of held-back samples.
+/// Results of a finished model on held-back samples.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Figures {
-    /// Parts found, and out of how many.
+    /// Number of detected parts, and of all parts.
     pub found: [usize; 2],
-    /// Between which shares the true one lies, with 95 % confidence.
+    /// 95 % confidence interval of their share.
     pub found_interval: [f64; 2],
     /// Detections beside the part.
     pub wrong: usize,
-    /// Samples without the part in which something was accepted, and out of how many.
+    /// Number of samples without the part in which something was accepted, and of all such samples.
     pub false_alarms: [usize; 2],
-    /// Their share, likewise.
+    /// 95 % confidence interval of their share.
     pub false_alarms_interval: [f64; 2],
-    /// Median error of the place, and its unit: px of the photo, or mm.
+    /// Median error of the position, and its unit: px of the photo, or mm.
     pub error: Option<(f64, String)>,
     /// Median error of the turn.
     pub error_degrees: Option<f64>,
-    /// Parts that it finds in the photos beside those that are marked; they were taken out of the samples.
+    /// Number of unmarked parts detected in the photos; they were removed from the samples.
     #[serde(default)]
     pub others_in_photo: usize,
 }
 
-/// How many of the person's pictures without the part are refused.
+/// Number of the user's pictures without the part that are refused.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct NegativesRefused {
     /// Pictures in which nothing is accepted.
     pub refused: usize,
-    /// All of them.
+    /// Number of these pictures.
     pub pictures: usize,
 }
 
-/// Why a grasp is refused, for the person at the page.
+/// Why a grasp is refused, for display.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Refusal {
     /// The strongest reasons.
     pub reason: String,
-    /// What would help.
+    /// Advice.
     pub remedy: Option<String>,
-    /// Places of the picture where edges differ from the photo's, in pixels.
+    /// Positions at which edges differ from the photo's, in pixels of the picture.
     pub edges: Vec<[f64; 2]>,
-    /// Places where the surface differs.
+    /// Positions at which the surface differs.
     pub surface: Vec<[f64; 2]>,
 }
 
-/// One grasp that a model found, in pixels of the image.
+/// A detected grasp, in pixels of the image.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FoundGrasp {
     /// Calibrated, in `[0, 1]`: at least 0.5 is accepted.
     pub score: f64,
-    /// Whether the part is there.
+    /// Whether it is accepted.
     pub is_accepted: bool,
     /// The box around the part.
     pub bbox: BoundingBox,
-    /// Its outline as the demonstration lies in the image.
+    /// The demonstration's outline, placed in the image.
     pub outline: Option<Polygon>,
     /// Grasp point, direction and width, in pixels.
     pub grasp: PlanarGrasp,
-    /// Length of the marked line in this image.
+    /// Length of the marked line, transformed to this image.
     pub line_length: f64,
-    /// Where that is over the table, if the camera is calibrated.
+    /// Its pose over the table, if the camera is calibrated.
     pub pose: Option<GraspPose>,
-    /// Why it is not accepted; `None` for what is.
+    /// Why it is refused; `None` if it is accepted.
     pub refusal: Option<Refusal>,
-    /// Numbers, in the picture's list, of those whose parts its jaws touch, found ones or not.
+    /// Indices, in the picture's list, of detections whose parts the jaws touch, accepted or not.
     pub touches: Vec<usize>,
 }
 
-/// A grasp in millimetres and degrees, for people.
+/// A grasp in millimetres and degrees, for display.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct GraspPose {
-    /// What positions are given in: `table`, `base`.
+    /// Frame of the position: `table`, `base`.
     pub frame: &'static str,
     /// The middle between the jaws.
     pub position_mm: [f64; 3],
-    /// The turn about the frame's z.
+    /// Rotation about the frame's z.
     pub yaw_deg: f64,
     /// Opening of the jaws, mm.
     pub opening_mm: f64,
-    /// One standard deviation of the position.
+    /// Standard deviation of the position, mm.
     pub sigma_mm: f64,
-    /// One standard deviation of the turn.
+    /// Standard deviation of the rotation, degrees.
     pub sigma_deg: f64,
 }

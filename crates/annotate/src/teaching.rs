@@ -13,7 +13,7 @@ use serde::Serialize;
 use crate::error::{Error, Result};
 use crate::teacher::{GraspTeacher, TaughtModel, TaughtSummary, TeachRequest, TeachingMaterial, TeachingStep};
 
-/// Points of the loss curve that the page gets; a longer run keeps every second, fourth … of its own.
+/// Maximum number of points of the loss curve on the page; a longer run keeps every second, fourth … point.
 const MAX_POINTS: usize = 240;
 
 /// State of a teaching.
@@ -23,13 +23,13 @@ pub enum Status {
     /// No teaching was started yet.
     #[default]
     Idle,
-    /// Not ended yet.
+    /// The teaching is running.
     Running,
-    /// It was asked to end with what there is.
+    /// A running teaching was asked to end with its current result.
     Stopping,
-    /// It has ended with a model.
+    /// The teaching has ended with a model.
     Done,
-    /// It failed; there is no model.
+    /// The teaching failed; there is no model.
     Failed,
 }
 
@@ -40,7 +40,7 @@ pub struct News {
     pub status: Status,
     /// The model being taught.
     pub model: Option<ModelKind>,
-    /// What is being taught just now.
+    /// The network being trained.
     pub of: &'static str,
     /// Steps done.
     pub done: usize,
@@ -48,8 +48,8 @@ pub struct News {
     pub planned: usize,
     /// Seconds since the start.
     pub elapsed_secs: f64,
-    /// Seconds that are left, by the pace so far; `None` where that is not known: before the first step, while another network
-    /// is to follow, and after the last step, when what was taught is tried.
+    /// Estimated remaining seconds at the pace so far. `None` if unknown: before the first step, if another network
+    /// follows, and after the last step, while the model is tested.
     pub left_secs: Option<f64>,
     /// `[step, loss]`, thinned.
     pub losses: Vec<(usize, f64)>,
@@ -63,11 +63,11 @@ pub struct News {
     pub error: Option<String>,
 }
 
-/// How one network's teaching goes.
+/// The pace of one network's training.
 struct Pace {
-    /// Every so many points of the loss curve are kept.
+    /// Every `stride`-th point of the loss curve is kept.
     stride: usize,
-    /// When its first step was reported, and how many were done then.
+    /// Time at which its first step was reported, and the number of steps done then.
     since_secs: f64,
     since_done: usize,
 }
@@ -79,7 +79,7 @@ impl Pace {
     }
 }
 
-/// The one teaching that may go on.
+/// The teaching of a session; one at a time.
 #[derive(Default)]
 pub struct Teaching {
     news: Mutex<News>,
@@ -105,7 +105,7 @@ impl Teaching {
         locked(&self.model).clone().ok_or(Error::NotTaught)
     }
 
-    /// Asks a running teaching to end with what there is.
+    /// Asks a running teaching to end with its current result.
     pub fn stop(&self) {
         let mut news = locked(&self.news);
         if news.status == Status::Running {
@@ -120,7 +120,7 @@ impl Teaching {
         match step {
             TeachingStep::Step { of, is_last, done, planned, loss } => {
                 if news.of != of {
-                    // Another network: its loss is on another scale, and it has a pace of its own.
+                    // Another network has another scale of the loss, and its own pace.
                     news.losses.clear();
                     *pace = Pace { stride: 1, since_secs: news.elapsed_secs, since_done: done };
                 }
@@ -140,15 +140,15 @@ impl Teaching {
         if self.stop.load(Ordering::SeqCst) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
     /// # Errors
-    /// [`Error::Busy`] while a teaching goes on.
+    /// [`Error::Busy`] while a teaching is running.
     pub fn check_idle(&self) -> Result<()> {
         idle(&locked(&self.news))
     }
 
-    /// Starts to teach on a thread; `keep` writes the model down and says where. The news tell how it goes.
+    /// Starts a teaching on a thread; `keep` writes the model and returns its path. `news` gives the progress.
     ///
     /// # Errors
-    /// [`Error::Busy`] while a teaching goes on.
+    /// [`Error::Busy`] while a teaching is running.
     pub fn start(
         self: &Arc<Self>,
         teacher: Arc<dyn GraspTeacher>,
@@ -169,8 +169,8 @@ impl Teaching {
             let mut pace = Pace { stride: 1, since_secs: 0.0, since_done: 0 };
             let mut observe = |step| teaching.record(step, start, &mut pace);
             let taught = catch_unwind(AssertUnwindSafe(|| teacher.teach(&material, &request, &mut observe)));
-            // A page that waited for a teaching which broke off would wait for ever.
-            let taught = taught.unwrap_or_else(|_| Err("teaching broke off inside; the terminal says more".into()));
+            // Reported as an error, because a page that waits for the result would otherwise wait for ever.
+            let taught = taught.unwrap_or_else(|_| Err("teaching failed internally; the terminal says more".into()));
             let outcome = taught.map_err(Error::Teacher).and_then(|model| {
                 let written_to = keep(&*model)?;
                 let summary = model.summary();
@@ -194,7 +194,7 @@ impl Teaching {
         Ok(begun)
     }
 
-    /// Keeps a model for the pictures to try.
+    /// Sets the model for the pictures to try.
     pub fn set_model(&self, model: Arc<dyn TaughtModel>) {
         *locked(&self.model) = Some(model);
     }
@@ -221,9 +221,9 @@ mod tests {
             assert!(teaching.record(step, start, &mut pace).is_continue());
             teaching.news().left_secs
         };
-        // Another network follows, so nothing of it tells when all is done.
+        // Another network follows with an unknown pace, so the total time is unknown.
         assert_eq!([1, 2, 3].map(|done| left_after("its turns", false, done)), [None; 3]);
-        // One step tells no pace, and after the last one what was taught is tried.
+        // One step does not give a pace, and after the last one the model is tested.
         assert_eq!(left_after("the network", true, 1), None);
         assert!(left_after("the network", true, 2).is_some());
         assert_eq!(left_after("the network", true, 3), None);

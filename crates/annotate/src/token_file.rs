@@ -1,4 +1,4 @@
-//! The key to the page in a file, which stays the same from one page to the next.
+//! A file with the page's token, which stays the same when the program is restarted.
 
 use std::io::Write;
 use std::path::Path;
@@ -6,10 +6,10 @@ use std::path::Path;
 use crate::error::{Error, Result};
 use crate::guard::new_token;
 
-/// Reads the key to the page, or makes one that only its owner can read.
+/// Reads the page's token, or creates one that only its owner can read.
 ///
 /// # Errors
-/// A file that cannot be read or written, or holds no key.
+/// The file cannot be read or written, or contains no token.
 pub fn token_of_file(path: &Path) -> Result<String> {
     const MAX_BYTES: u64 = 4096;
     if !path.exists() {

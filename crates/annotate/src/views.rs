@@ -1,4 +1,4 @@
-//! The session as the page gets it, as JSON.
+//! The JSON views of the session for the page.
 
 use serde::Serialize;
 
@@ -7,7 +7,7 @@ use crate::marks::Marks;
 use crate::region::Region;
 use crate::teacher::TaughtSummary;
 
-/// Whether the marks stand on the disk.
+/// Whether the marks are saved.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case", tag = "state")]
 pub enum Saved {
@@ -18,16 +18,16 @@ pub enum Saved {
         /// The file's name.
         file: String,
     },
-    /// The marks were refused.
+    /// The marks could not be saved.
     Refused {
-        /// One line for the person at the page.
+        /// One line for the user.
         why: String,
-        /// Whether the file could not be written, so that the same marks may be saved later.
+        /// Whether writing the file failed, so that the same marks may be saved later.
         by_disk: bool,
     },
 }
 
-/// A marked picture as the page sees it.
+/// A marked picture, for the page.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ImageView {
     /// Its index in the session.
@@ -40,15 +40,15 @@ pub struct ImageView {
     pub height: u32,
     /// The marks on it.
     pub marks: Marks,
-    /// Whether that stands on the disk.
+    /// Whether the marks are saved.
     pub saved: Saved,
-    /// What the marks are good for.
+    /// Result of checking the marks.
     pub advice: Advice,
-    /// What the person should know about the file.
+    /// A note about the file for the user.
     pub note: Option<String>,
 }
 
-/// A picture to try, as the page sees it.
+/// A picture to try, for the page.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct TrialPictureView {
     /// Its index in the session.
@@ -61,28 +61,28 @@ pub struct TrialPictureView {
     pub height: u32,
     /// The number of the marked picture that it became.
     pub became: Option<usize>,
-    /// The person said that the part is not there.
+    /// The user stated that the part is not there.
     pub is_absent: bool,
 }
 
-/// A version of the model, as the page sees it.
+/// A version of the model, for the page.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ModelView {
     /// Its index in the session.
     pub id: usize,
     /// Its file's name.
     pub file: String,
-    /// When it was taught: seconds since 1970.
+    /// Time of the teaching: seconds since 1970.
     pub taught_secs: u64,
-    /// What it is and how good it was found to be.
+    /// The model's facts and measured quality.
     pub summary: TaughtSummary,
-    /// Photos that it was taught from.
+    /// Number of photos that it was taught from.
     pub photos: usize,
-    /// Pictures without the part that it was taught from.
+    /// Number of pictures without the part that it was taught from.
     pub negatives: usize,
-    /// Whether it is the one in use.
+    /// Whether this version is in use.
     pub is_current: bool,
-    /// Whether marks, photos or negatives have changed since.
+    /// Whether marks, photos or negatives have changed since its teaching.
     pub is_stale: bool,
 }
 
@@ -95,47 +95,47 @@ pub struct OtherView {
     pub name: String,
 }
 
-/// What two versions found in one picture to try.
+/// The detections of two versions in one picture to try.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ComparedPicture {
     /// The picture's index.
     pub id: usize,
     /// Its name.
     pub name: String,
-    /// Whether the part is there, as far as the person said so.
+    /// Whether the part is there, if the user stated it.
     pub is_there: Option<bool>,
-    /// For each version the number of accepted detections and the best score of all.
+    /// For each version, the number of accepted detections and the best score of all.
     pub found: [(usize, f64); 2],
 }
 
-/// All that the page starts from.
+/// The data with which the page starts.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SessionView {
-    /// What the numbers of its pictures hold for: a session that is opened again has another id.
+    /// Identifier for which the picture numbers are valid; a reopened session has another.
     pub id: String,
     /// The object's name.
     pub label: String,
-    /// Whether somebody gave that name; it is a proposal otherwise.
+    /// Whether the user gave that name; otherwise it is a proposal.
     pub is_named: bool,
     /// Pictures of the folder that are not in the project.
     pub others: Vec<OtherView>,
-    /// The pictures of it.
+    /// Photos of the object.
     pub images: Vec<ImageView>,
     /// Pictures to try.
     pub trial_pictures: Vec<TrialPictureView>,
-    /// Where a taught model is written.
+    /// File for a taught model.
     pub model_path: String,
     /// Versions of the model, oldest first.
     pub models: Vec<ModelView>,
-    /// The part of pictures that is searched; all of them where `None`.
+    /// The searched region; `None` for the whole picture.
     pub region: Option<Region>,
     /// Whether the camera of the photos is calibrated, so that the part's size is known.
     pub is_calibrated: bool,
-    /// The project: its folder, or the file of a photo's; `None` until there is a photo.
+    /// The project: its folder, or the file of a photo's project; `None` until there is a photo.
     pub project: Option<String>,
-    /// Whether the page can leave this project for another.
+    /// Whether the page can close this project and choose another.
     pub can_close: bool,
-    /// What the person should know of the project; pictures that are gone.
+    /// Notes about the project for the user, for example on missing pictures.
     pub notes: Vec<String>,
     /// The camera's address, if there is one.
     pub camera: Option<String>,

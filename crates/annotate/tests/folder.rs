@@ -1,4 +1,4 @@
-//! A photo's own project, the other pictures of its folder, and projects that are chosen on the page.
+//! A photo's own project, the other pictures of its folder, and projects chosen on the page.
 
 use crate::served::{Served, photo_png};
 use serde_json::{Value, json};
@@ -52,7 +52,7 @@ fn a_photo_is_opened_again_with_its_models_corrections_and_tried_pictures() {
     assert_eq!(names(&again["images"]), ["rod.png", "found.png"]);
     assert_eq!(again["trial_pictures"][0]["became"], 1);
     assert_eq!(again["models"][0]["is_current"], true);
-    // Another photo of the folder knows nothing of it.
+    // The project of another photo in the folder is independent.
     let served = Served::of_photo(served.end(), "other.png");
     let other = session(&served);
     assert_eq!((names(&other["images"]), other["models"].as_array().unwrap().len()), (vec!["other.png"], 0));
@@ -61,7 +61,7 @@ fn a_photo_is_opened_again_with_its_models_corrections_and_tried_pictures() {
 #[test]
 fn a_model_is_not_old_because_its_marks_were_read_from_the_file() {
     let served = Served::of_photo(folder_of(&["rod.png"]), "rod.png");
-    // Left edge and width do not add up to the right edge's bits.
+    // Rounding: left edge plus width is not bit-identical to the right edge.
     let marks = r#"{"box": [34.42, 34.09, 137.81, 75.91], "grasp": {"start": [80.18, 50.21], "end": [104.7, 46.3], "jaw_width": 24.04}}"#;
     served.ask("PUT", "/api/images/0/marks", marks.as_bytes()).json();
     teach(&served);
@@ -88,7 +88,7 @@ fn what_is_not_there_for_a_while_stays_in_the_project() {
     let served = Served::of_photo(folder, "rod.png");
     let without = session(&served);
     assert_eq!((names(&without["images"]), &without["trial_pictures"]), (vec!["rod.png"], &json!([])));
-    assert!(without["notes"][0].as_str().unwrap().starts_with("found.png is not there now"), "{}", without["notes"]);
+    assert!(without["notes"][0].as_str().unwrap().starts_with("found.png does not exist now"), "{}", without["notes"]);
     served.ask("PUT", "/api/label", b"{\"label\": \"rod\"}");
     let folder = served.end();
     std::fs::rename(&away, &there).unwrap();
@@ -139,13 +139,13 @@ fn in_a_new_folder_the_photo_is_chosen_and_others_are_added_and_removed() {
     assert_eq!(names(&session(&served)["others"]), ["a.png"]);
     served.ask("DELETE", "/api/trial-pictures/0", b"").json();
     assert_eq!(names(&session(&served)["others"]), ["a.png", "c.png"]);
-    // A photo from elsewhere is copied beside the others.
+    // A photo from another folder is copied beside the others.
     let uploaded = served.ask("POST", "/api/images?name=../b.png", &photo_png()).json();
     assert_eq!(uploaded["name"], "b-2.png");
     assert_eq!(served.ask("POST", "/api/images?name=no.png", b"no picture").status, 422);
     assert!(!served.folder.path().join("no.png").exists());
 
-    // What was not taken in is not taken in by opening the folder again.
+    // Reopening the folder does not add pictures that were not added before.
     let again = session(&Served::of_project(served.end()));
     assert_eq!((names(&again["images"]), names(&again["others"])), (vec!["b.png", "b-2.png"], vec!["a.png", "c.png"]));
 }
@@ -171,7 +171,7 @@ fn without_a_project_one_is_made_of_a_photo_and_opened_again() {
     let taken = served.ask("POST", "/api/projects?name=wing%20bolt&photo=a.png", &photo_png());
     assert!(taken.status == 500 && taken.text().contains("wing_bolt"), "{}", taken.text());
     let id = start["recent"][0]["id"].as_str().unwrap();
-    // What is gone is not taken for another.
+    // A missing project is not replaced by another.
     let away = served.folder.path().join("away");
     std::fs::rename(served.folder.path().join("wing_bolt"), &away).unwrap();
     let gone = served.ask("POST", &format!("/api/projects/{id}/open"), b"");
@@ -182,6 +182,6 @@ fn without_a_project_one_is_made_of_a_photo_and_opened_again() {
         (&again["label"], again["images"][0]["marks"]["box"].clone()),
         (&json!("wing bolt"), json!([40.0, 40.0, 140.0, 60.0]))
     );
-    // A page of one project offers no others.
+    // A page opened for one project offers no others.
     assert_eq!(Served::start().ask("DELETE", "/api/projects", b"").status, 409);
 }

@@ -1,4 +1,4 @@
-//! Photos taken with a camera, and the model tried on its pictures, on the real server.
+//! Photos taken with a camera, and detections in its pictures, on the real server.
 
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -8,7 +8,7 @@ use image::RgbImage;
 use sdg_annotate::{Live, LiveFault, LiveFaultKind, LiveFrame, LivePictures};
 use serde_json::{Value, json};
 
-/// A camera that shows what the test puts before it.
+/// A camera whose pictures the test sets.
 #[derive(Debug, Default)]
 struct Camera(Mutex<Live>);
 
@@ -64,7 +64,7 @@ fn a_page_without_photos_takes_the_frame_that_was_shown() {
     camera.show(7, photo());
     let shown = get(&served, "/api/live");
     assert_eq!(shown["frame"], json!({"number": 7, "width": 200, "height": 100, "age_secs": 0.04}));
-    // The camera goes on; the photo is of what was seen.
+    // The camera continues; the photo is the frame that was shown.
     camera.show(8, RgbImage::new(200, 100));
     let jpeg = served.ask("GET", "/api/live/7/picture", b"");
     assert!(jpeg.head.to_lowercase().contains("content-type: image/jpeg"), "{}", jpeg.head);
@@ -75,7 +75,7 @@ fn a_page_without_photos_takes_the_frame_that_was_shown() {
     assert_eq!(written, photo(), "as PNG, without loss");
     assert_eq!(post(&served, "/api/live/8/photo").status, 404, "nobody has seen frame 8");
 
-    // Another one gets a number, and the first stays.
+    // A second photo gets a number, and the first one is kept.
     assert_eq!(get(&served, "/api/live")["next_photo"], "photo-2.png");
     let again = post(&served, "/api/live/8/photo").json();
     assert_eq!((&again["id"], &again["name"]), (&json!(1), &json!("photo-2.png")));

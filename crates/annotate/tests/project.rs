@@ -1,4 +1,4 @@
-//! A project's folder: left and opened again, versions of the model, pictures without the part, pictures taken out.
+//! A project's folder: closing and reopening, versions of the model, pictures without the part, removed pictures.
 
 use std::time::{Duration, Instant};
 
@@ -47,7 +47,7 @@ fn a_project_is_opened_again_where_it_was_left() {
     let again = get(&served);
     for what in ["label", "images", "trial_pictures", "models"] {
         let mut left = left[what].clone();
-        // What the page calls a model path and a saved file stays; nothing else may differ.
+        // Paths of the model and of saved files may differ; everything else must be equal.
         if what == "images" {
             left.as_array_mut().unwrap().iter_mut().for_each(|image| image["note"] = again[what][0]["note"].clone());
         }
@@ -55,7 +55,7 @@ fn a_project_is_opened_again_where_it_was_left() {
     }
     assert_eq!(again["images"][1]["name"], "table.png");
     assert_eq!(again["trial_pictures"][0]["became"], 1);
-    // The model is there, too: it was read from its file.
+    // The model is also there: it was read from its file.
     let found = served.ask("POST", "/api/trial-pictures/2/detect", b"").json();
     assert_eq!(found["detections"], json!([]));
     assert!(served.folder.path().join("tried/other.png").exists() && served.folder.path().join("rod.sdg").exists());
@@ -106,7 +106,7 @@ fn a_picture_without_the_part_is_taught_as_such() {
     teach(&served);
     assert_eq!(is_accepted(), false);
     assert_eq!(get(&served)["models"][1]["negatives"], 1);
-    // Taken back, it is one no more; a demonstration cannot be one.
+    // After revoking, it is no negative any more; a demonstration cannot become one.
     served.ask("PUT", "/api/trial-pictures/0/absent", b"{\"absent\": false}").json();
     served.ask("POST", "/api/trial-pictures/0/accept", MARKS.as_bytes()).json();
     assert_eq!(served.ask("PUT", "/api/trial-pictures/0/absent", b"{\"absent\": true}").status, 409);
@@ -123,7 +123,7 @@ fn what_is_taken_out_stays_out_and_its_file_stays() {
     let view = served.ask("DELETE", "/api/images/1", b"").json();
     assert_eq!((view["images"].as_array().unwrap().len(), &view["trial_pictures"][0]["became"]), (1, &Value::Null));
     assert_eq!(served.ask("GET", "/api/images/1/picture", b"").status, 404);
-    // Put back, each is what it was; the photo's picture is a demonstration again.
+    // Restored pictures have their former roles; the photo's picture is a demonstration again.
     let view = served.ask("POST", "/api/images/1/put-back", b"").json();
     assert_eq!((&view["images"][1]["name"], &view["trial_pictures"][0]["became"]), (&json!("table.png"), &json!(1)));
     served.ask("DELETE", "/api/trial-pictures/1", b"").json();
@@ -148,7 +148,7 @@ fn a_picture_that_is_gone_is_told_and_the_rest_opens() {
     let folder = served.end();
     std::fs::remove_file(folder.path().join("tried/table.png")).unwrap();
     let again = get(&Served::of_project(folder));
-    assert_eq!(again["notes"], json!(["tried/table.png is not there now; the project goes on naming it."]));
+    assert_eq!(again["notes"], json!(["tried/table.png does not exist now; the project still names it."]));
     assert_eq!(again["images"].as_array().unwrap().len(), 1);
 }
 

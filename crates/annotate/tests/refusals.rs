@@ -1,4 +1,4 @@
-//! Requests that are refused, on the real server.
+//! Requests that the real server refuses.
 
 use crate::served;
 use served::Served;
@@ -108,7 +108,7 @@ fn oversized_bodies_are_refused() {
     }
     let picture = vec![0; (64 << 20) + 1];
     assert_eq!(served.ask("POST", "/api/trial-pictures?name=a.png", &picture).status, 413);
-    // Pictures may be larger than marks: what follows the end of a PNG does not count.
+    // Pictures may be larger than marks: bytes after the end of a PNG are ignored.
     let mut photo = served::photo_png();
     photo.resize(3 << 20, 0);
     assert_eq!(served.ask("POST", "/api/trial-pictures?name=a.png", &photo).status, 200);

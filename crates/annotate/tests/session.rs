@@ -1,4 +1,4 @@
-//! A session from the first mark to another demonstration, on the real server.
+//! A session from the first mark to a second demonstration, on the real server.
 
 use std::time::{Duration, Instant};
 
@@ -146,14 +146,14 @@ fn a_region_holds_for_what_is_detected_and_what_is_taught() {
     }
     assert_eq!(served.ask("GET", "/api/session", b"").json()["region"], Value::Null);
 
-    // Before there is a model the part has to fit in, and it is that of the first one.
+    // Before there is a model the part must fit into the region, which becomes that of the first model.
     let small = put(&region(0, 20));
     assert!(small.status == 422 && small.text().contains("does not fit in"), "{}", small.text());
     assert_eq!(put(&region(0, 120)).json()["region"], region(0, 120));
     served.ask("POST", "/api/teaching", b"{\"model\": \"S\"}").json();
     assert_eq!(wait_for(&served, &["done", "failed"])["status"], "done");
     assert_eq!(num_found(), 1);
-    // What the model refuses changes nothing.
+    // A region rejected by the model changes nothing.
     let small = put(&region(0, 20));
     assert!(small.status == 422 && small.text().contains("does not fit in"), "{}", small.text());
     assert_eq!(served.ask("GET", "/api/session", b"").json()["region"], region(0, 120));

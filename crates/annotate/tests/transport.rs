@@ -1,4 +1,4 @@
-//! What the server makes of bytes that are no good request, and of clients that are slow.
+//! The server's responses to malformed requests and to slow clients.
 
 use std::time::{Duration, Instant};
 
@@ -49,7 +49,7 @@ fn silent_connections_are_closed() {
         (String::new(), vec![]),
         (head.clone(), vec![]),
         (format!("{head}Content-Length: 3\r\n\r\n{{"), vec![]),
-        // After an answer too, where another request might follow.
+        // Also after a response, when another request might follow.
         (whole, vec![404]),
     ] {
         let start = Instant::now();
@@ -83,7 +83,7 @@ fn nothing_is_kept_open_after_a_refusal_and_after_http_1_0() {
         (format!("GET / HTTP/1.1\r\nHost: {}\r\n\r\n", served.host()), 401),
         (format!("GET /nowhere HTTP/1.0\r\nHost: {}\r\nCookie: {}\r\n\r\n", served.host(), served.cookie()), 404),
     ] {
-        // Ends before the server's patience does, or fails.
+        // Ends before the server's timeout, or fails.
         let answer = served.exchange(request.as_bytes(), Then::StaySilent).replace("HTTP/1.0", "HTTP/1.1");
         assert_eq!(statuses(&answer), [status]);
     }

@@ -1,5 +1,5 @@
-//! Detections as Rust has them, with every digit: a JSON line for each picture. The Python package's and the C library's are compared with
-//! these; nothing of `sdg-bindings` is used.
+//! Prints detections as JSON with all digits, one line per picture: the reference for tests of the Python package and
+//! the C library. It does not use `sdg-bindings`.
 //!
 //! `reference MODEL CAMERA|- PICTURE…`
 

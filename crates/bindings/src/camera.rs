@@ -15,10 +15,10 @@ use crate::fault::{Fault, FaultKind, Result};
 pub struct Camera(Arc<CalibratedCamera>);
 
 impl Camera {
-    /// Reads a camera's file: ROS's camera_info YAML, with `table:` for the camera's pose.
+    /// Reads a camera's file: ROS camera_info YAML, with `table:` for the camera's pose.
     ///
     /// # Errors
-    /// A file that cannot be read, and one without the camera's pose.
+    /// The file cannot be read, or has no pose of the camera.
     pub fn read(path: &Path) -> Result<Self> {
         let read = || {
             let (camera, _) = camera_files::read(path)?;
@@ -28,7 +28,7 @@ impl Camera {
         read().map_err(Fault::of_kind_or(FaultKind::Camera))
     }
 
-    /// The same from the file's text.
+    /// The same from the text of a file.
     ///
     /// # Errors
     /// As [`Self::read`].

@@ -1,4 +1,4 @@
-//! A model on labelled pictures.
+//! Evaluation of a model on labelled pictures.
 
 use std::path::Path;
 
@@ -10,11 +10,11 @@ use crate::fault::{Fault, FaultKind, Result};
 use crate::model::{Model, View};
 use crate::threads::on_threads;
 
-/// Counts a model on a folder of labelled pictures as `sdg evaluate --pictures` does, writes its page into `report`, and gives the figures
-/// as JSON.
+/// Evaluates a model on a folder of labelled pictures like `sdg evaluate --pictures`, writes the page to `report`, and
+/// returns the figures as JSON.
 ///
 /// # Errors
-/// Labels that cannot be read or are of other pictures, errors of detection, a page that cannot be written.
+/// Labels cannot be read or belong to other pictures, detection fails, or the page cannot be written.
 pub fn evaluate(
     model: &Model,
     folder: &Path,
@@ -37,7 +37,7 @@ pub fn evaluate(
             let file = picture.name();
             match Tested::detect(picture, &perception, verification) {
                 Ok(of_picture) => tested.push(of_picture),
-                // The model searches a region of pictures of another size.
+                // The model's region is for pictures of another size.
                 Err(error) if matches!(error.downcast_ref(), Some(CellError::Grasp(GraspError::Region(_)))) => {
                     labelled.left_out.push(LeftOut { file, why: error.root_cause().to_string() });
                 }
@@ -46,7 +46,7 @@ pub fn evaluate(
         }
         let evaluated = Evaluated {
             folder,
-            // The model may never have been a file.
+            // The model may not come from a file.
             model_file: Path::new(""),
             model: perception.model(),
             verification,

@@ -1,4 +1,4 @@
-//! Errors as other languages have them: a kind and a text.
+//! Errors in a form for other languages: a kind and a text.
 
 use std::fmt;
 
@@ -11,23 +11,23 @@ use sdg_grasp::GraspError;
 /// Result of this crate.
 pub type Result<T> = std::result::Result<T, Fault>;
 
-/// What an error is about; a class in Python, a number in C.
+/// The kind of an error; a class in Python, a number in C.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(i32)]
 pub enum FaultKind {
-    /// A value that a function does not take.
+    /// A value that a function does not accept.
     Argument = 1,
-    /// A file that is not there, or that the system does not read or write.
+    /// A file that does not exist, or that the system cannot read or write.
     File = 2,
-    /// A file that is no grasp model, a damaged one, or one of another version.
+    /// A file that is not a grasp model, is damaged, or has another version.
     ModelFile = 3,
-    /// A picture or an array that cannot be looked at.
+    /// An invalid picture or array.
     Picture = 4,
-    /// A camera's file, a camera without place, a model without lengths.
+    /// An invalid camera file, a camera without a pose, or a model without lengths.
     Camera = 5,
     /// A region that cannot be searched.
     Region = 6,
-    /// A photo and marks that nothing can be taught from.
+    /// A photo or marks unsuitable for teaching.
     Teaching = 7,
     /// No part to grasp.
     NothingToGrasp = 8,
@@ -35,18 +35,18 @@ pub enum FaultKind {
     Closed = 9,
     /// A caller that was built for another version of this library.
     Version = 10,
-    /// A fault of this library.
+    /// An internal error of this library.
     Internal = 11,
-    /// A process that was forked from one that had threads of this library.
+    /// A process that was forked from one with threads of this library.
     Forked = 12,
 }
 
 /// An error with the program's text.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Fault {
-    /// What it is about.
+    /// The kind of error.
     pub kind: FaultKind,
-    /// What was expected, what was found.
+    /// The expected and the found value.
     pub text: String,
 }
 
@@ -56,12 +56,12 @@ impl Fault {
         Self { kind, text: text.into() }
     }
 
-    /// Whatever error it is, of this kind.
+    /// Assigns this kind to any error.
     pub(crate) fn of_kind(kind: FaultKind) -> impl FnOnce(anyhow::Error) -> Self {
         move |error| Self { kind, text: sdg_inputs::one_line(&error) }
     }
 
-    /// Of this kind unless its causes have one.
+    /// Assigns this kind, unless one of the causes has a kind.
     pub(crate) fn of_kind_or(kind: FaultKind) -> impl FnOnce(anyhow::Error) -> Self {
         move |error| {
             let kind = error.chain().find_map(kind_of).unwrap_or(kind);

@@ -1,12 +1,12 @@
-//! What the Python package and the C library share: a taught model behind a camera, trackers, teaching and evaluation, with every error
-//! as a kind and a text.
+//! Shared by the Python package and the C library: a taught model with a camera, trackers, teaching and evaluation;
+//! every error has a kind and a text.
 //!
 //! ```text
 //! file ─ Model::read ─┐
 //! file ─ Camera::read ┴─ Model::detect(picture, View) ─ Detections: the records of `sdg detect --json`
 //! photo, marks ─ teach ─ Model         Tracker::frame(picture, time) ─ tracked parts         evaluate(folder) ─ figures
 //! ```
-//! Deliberately absent: another language's objects, pointers, options of a command line.
+//! Deliberately absent: objects of other languages, pointers, command-line options.
 //!
 //! ```no_run
 //! use std::path::Path;

@@ -1,4 +1,4 @@
-//! A grasp model, and what it finds in a picture.
+//! A grasp model, and its detections in a picture.
 
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -13,38 +13,38 @@ use crate::camera::Camera;
 use crate::fault::{Fault, FaultKind, Result};
 use crate::threads::on_threads;
 
-/// The part of pictures that is searched.
+/// The searched region of pictures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum RegionChoice {
-    /// The one that the model was taught with; all of the picture where it has none.
+    /// The region that the model was taught with; the whole picture if it has none.
     #[default]
     OfModel,
-    /// All of the picture.
+    /// The whole picture.
     All,
     /// Left edge, upper edge, width and height, in pixels.
     Part([u32; 4]),
 }
 
-/// How a picture is looked at.
+/// Search options for a picture.
 #[derive(Debug, Clone, Default)]
 pub struct View {
     /// The calibrated camera that took it.
     pub camera: Option<Camera>,
-    /// Where parts are looked for.
+    /// The searched region.
     pub region: RegionChoice,
-    /// Threads that compute; as many as there are cores with `None`.
+    /// Number of threads; `None` for one per core.
     pub threads: Option<usize>,
 }
 
-/// A grasp model, with the perception that was used last; shared among threads.
+/// A grasp model, with the perception that was used last; can be shared among threads.
 #[derive(Debug)]
 pub struct Model {
     model: GraspModel,
-    /// Plan views take milliseconds to set up.
+    /// Cached, because plan views take milliseconds to set up.
     last: Mutex<Option<LastPerception>>,
 }
 
-/// What a model looked through last, and what it was made for.
+/// The last perception, and the inputs it was made for.
 #[derive(Debug)]
 struct LastPerception {
     camera: Option<Camera>,
@@ -62,20 +62,20 @@ impl LastPerception {
     }
 }
 
-/// What was found in a picture, best score first, the refused ones too.
+/// The detections in a picture, best score first, including refused ones.
 #[derive(Debug, Clone, Serialize)]
 #[serde(transparent)]
 pub struct Detections {
     records: Vec<Record>,
 }
 
-/// A record of `sdg detect --json`, without advice, whose words are the command line's.
+/// A record of `sdg detect --json`, without advice, whose text is for the command line.
 #[derive(Debug, Clone, Serialize)]
 pub struct Record {
-    /// In pixels, and in metres with a camera.
+    /// In pixels, and with a camera also in metres.
     #[serde(flatten)]
     pub found: FoundRecord,
-    /// The part's size over its nominal size; absent with a camera.
+    /// The part's size relative to its nominal size; absent with a camera.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size: Option<f64>,
 }
@@ -84,19 +84,19 @@ impl Model {
     /// Reads a model's file.
     ///
     /// # Errors
-    /// A file that cannot be read, or is no grasp model, damaged, or of another version.
+    /// The file cannot be read, is not a grasp model, is damaged, or has another version.
     pub fn read(path: &Path) -> Result<Self> {
         sdg_inputs::read_model(path, &Device::flex()).map(Self::from).map_err(|error| {
             let fault = Fault::from(error);
-            // A damaged photo in it is a damaged model.
+            // A damaged photo in the file counts as a damaged model.
             if fault.kind == FaultKind::File { fault } else { Fault { kind: FaultKind::ModelFile, ..fault } }
         })
     }
 
-    /// Writes it, whole or not at all, over a grasp model or nothing.
+    /// Writes the model's file atomically; it replaces only an existing grasp model.
     ///
     /// # Errors
-    /// A file of another kind, and one that cannot be written.
+    /// The path is a file of another kind, or cannot be written.
     pub fn write(&self, path: &Path) -> Result<()> {
         check_replaces_a_model(path).map_err(Fault::of_kind(FaultKind::File))?;
         Ok(sdg_files::write(path, &self.model.to_bytes()?)?)
@@ -107,11 +107,11 @@ impl Model {
         &self.model
     }
 
-    /// Finds the part in a picture.
+    /// Detects the part in a picture.
     ///
     /// # Errors
-    /// A picture of another size than the camera's, a region that does not lie in it, a model that was taught without a camera where one is
-    /// given.
+    /// The picture's size differs from the camera's, the region is not inside it, or a camera is given to a model that
+    /// was taught without one.
     pub fn detect(&self, picture: &RgbImage, view: &View) -> Result<Detections> {
         on_threads(view.threads, || {
             let perception = self.perception(view.camera.as_ref(), view.region)?;
@@ -125,7 +125,7 @@ impl Model {
         })?
     }
 
-    /// The model behind a camera, or behind any.
+    /// The model with a camera, or for pictures of any camera.
     ///
     /// # Errors
     /// As [`Self::detect`].
@@ -157,21 +157,21 @@ impl From<GraspModel> for Model {
 }
 
 impl Detections {
-    /// As JSON, with every digit of every number.
+    /// All detections as JSON with all digits.
     pub fn to_json(&self) -> String {
-        // Numbers and names alone, whose serialisation cannot fail.
+        // The records contain only numbers and names, so serialisation cannot fail.
         serde_json::to_string(self).unwrap_or_default()
     }
 
-    /// The detection of this number, the best being 0.
+    /// The detection with this index; 0 is the best.
     pub fn get(&self, idx: usize) -> Option<&Record> {
         self.records.get(idx)
     }
 
-    /// The best of those that are accepted.
+    /// The best accepted detection.
     ///
     /// # Errors
-    /// No detection, and none that is accepted.
+    /// There is no detection, or none is accepted.
     pub fn best(&self) -> Result<&Record> {
         let nothing = |text: String| Err(Fault::new(FaultKind::NothingToGrasp, text));
         let Some(first) = self.get(0) else {
@@ -185,12 +185,12 @@ impl Detections {
         nothing(format!("expected a part to grasp, found none: the best place scores {:.2}{why}", detection.score))
     }
 
-    /// How many there are.
+    /// Number of detections.
     pub fn len(&self) -> usize {
         self.records.len()
     }
 
-    /// Whether there is none.
+    /// Whether there are no detections.
     pub fn is_empty(&self) -> bool {
         self.records.is_empty()
     }

@@ -1,4 +1,4 @@
-//! Pixels of other languages' arrays, and pictures of files.
+//! Pixels from arrays of other languages, and pictures from files.
 
 use std::path::Path;
 
@@ -13,16 +13,16 @@ use crate::fault::{Fault, FaultKind, Result};
 pub enum PixelOrder {
     /// Red first.
     Rgb,
-    /// Blue first, as OpenCV has it.
+    /// Blue first, as in OpenCV.
     Bgr,
 }
 
-/// Rows, columns and channels of an array that was checked; grey has one channel.
+/// Height, width and number of channels of a checked array; grey has one channel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PixelShape {
-    /// Pixels down.
+    /// Height in pixels.
     pub height: u32,
-    /// Pixels to the right.
+    /// Width in pixels.
     pub width: u32,
     /// One or three.
     pub channels: usize,
@@ -32,7 +32,7 @@ impl PixelShape {
     /// Checks an array's shape: (height, width, 3), or (height, width) for grey.
     ///
     /// # Errors
-    /// Another shape, no pixels, more pixels than a picture's file may have.
+    /// Another shape, no pixels, or more pixels than allowed in a picture's file.
     pub fn new(shape: &[usize]) -> Result<Self> {
         let fault = |text: String| Err(Fault::new(FaultKind::Picture, text));
         let (height, width, channels) = match *shape {
@@ -59,7 +59,7 @@ impl PixelShape {
         }
     }
 
-    /// The picture, copied once; `at` gives the byte of a row, a column and a channel.
+    /// Copies the pixels to a picture; `at` returns the byte of a row, a column and a channel.
     pub fn copy(self, order: PixelOrder, at: impl Fn(usize, usize, usize) -> u8) -> RgbImage {
         let Self { height, width, channels } = self;
         let [red, green, blue] = match (channels, order) {
@@ -73,15 +73,15 @@ impl PixelShape {
                 bytes.extend([at(row, column, red), at(row, column, green), at(row, column, blue)]);
             }
         }
-        // As many bytes as the size asks for.
+        // The number of bytes follows from the size.
         RgbImage::from_raw(width, height, bytes).unwrap_or_default()
     }
 }
 
-/// Reads a picture of any format that the program reads: upright, or as the sensor of a calibrated camera has its pixels.
+/// Reads a picture of any supported format: upright, or with the sensor's orientation for a calibrated camera.
 ///
 /// # Errors
-/// A file that cannot be read or is no picture.
+/// The file cannot be read or is not a picture.
 pub fn read_picture(path: &Path, camera: Option<&Camera>) -> Result<RgbImage> {
     let frame = if camera.is_some() { PixelFrame::Sensor } else { PixelFrame::Upright };
     Ok(sdg_inputs::read_image_in(path, frame)?)

@@ -22,7 +22,7 @@ pub struct CameraTeaching {
     pub grasp_height_m: f64,
 }
 
-/// What a model is taught from.
+/// The inputs of a teaching.
 #[derive(Debug, Clone)]
 pub struct Teaching {
     /// Photo and marks of each demonstration.
@@ -33,10 +33,11 @@ pub struct Teaching {
     pub camera: Option<CameraTeaching>,
 }
 
-/// Teaches as `sdg teach` does; `observe` may end it early. The model is that of the file, whose weights are rounded.
+/// Teaches like `sdg teach`; `observe` may end the teaching early. The model equals the one in the file, whose weights
+/// are rounded.
 ///
 /// # Errors
-/// Files that cannot be read, photos and marks that nothing can be taught from, a teaching that was ended before there was a model.
+/// Files cannot be read, photos or marks are unsuitable for teaching, or the teaching was ended before there was a model.
 pub fn teach(
     from: &Teaching,
     mut options: TeachOptions,

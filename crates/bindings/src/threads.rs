@@ -1,4 +1,4 @@
-//! Pools of threads by their number.
+//! Thread pools by number of threads.
 
 use std::process;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -8,17 +8,18 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::fault::{Fault, FaultKind, Result};
 
-/// Pools at rest: callers beside each other have one each.
+/// Idle pools: concurrent callers use one each.
 static AT_REST: Mutex<Vec<ThreadPool>> = Mutex::new(Vec::new());
-/// The process that computed first, which has the threads; 0 before.
+/// Id of the process that computed first and has the threads; 0 before.
 static COMPUTES_IN: AtomicU32 = AtomicU32::new(0);
-/// More than any machine has cores for.
+/// Maximum number of threads.
 const MAX_THREADS: usize = 1024;
 
-/// Does some work on so many threads; on as many as there are cores with `None`, which all callers share.
+/// Runs work on this number of threads; with `None` on one thread per core, shared by all callers.
 ///
 /// # Errors
-/// No thread, too many, or threads that the system refuses; a process that was forked from one with threads of ours.
+/// The number is 0 or too large, the system refuses threads, or the process was forked from one with threads of this
+/// library.
 pub fn on_threads<T: Send>(threads: Option<usize>, work: impl FnOnce() -> T + Send) -> Result<T> {
     check_process()?;
     let Some(count) = threads else { return Ok(work()) };
@@ -45,10 +46,10 @@ pub fn on_threads<T: Send>(threads: Option<usize>, work: impl FnOnce() -> T + Se
     Ok(done)
 }
 
-/// A forked process has none of the threads of the other, and would wait for them for ever.
+/// A forked process does not have the threads of its parent, and would wait for them for ever.
 ///
 /// # Errors
-/// A process that was forked from one that had computed.
+/// The process was forked from one that had computed.
 pub(crate) fn check_process() -> Result<()> {
     let own = process::id();
     match COMPUTES_IN.compare_exchange(0, own, Ordering::Relaxed, Ordering::Relaxed) {

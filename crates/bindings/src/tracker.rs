@@ -1,4 +1,4 @@
-//! Parts followed from frame to frame.
+//! Parts tracked from frame to frame.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -12,7 +12,7 @@ use crate::fault::{Fault, FaultKind, Result};
 use crate::model::{Model, View};
 use crate::threads::{check_process, on_threads};
 
-/// A tracker of one camera's frames; a thread of its own searches beside.
+/// A tracker for one camera's frames; searches run on a separate thread.
 pub struct Tracker {
     perception: Arc<Perception>,
     tracker: LiveTracker,
@@ -30,11 +30,11 @@ struct Record {
 }
 
 impl Tracker {
-    /// A tracker that knows no part yet. With `search_frames` what a search found is known so many frames later, on any machine the same;
-    /// else as soon as it has ended.
+    /// A tracker without known parts. With `search_frames`, a search's result is used this number of frames later,
+    /// identically on every machine; otherwise as soon as the search has ended.
     ///
     /// # Errors
-    /// As [`Model::detect`]; a thread that the system refuses.
+    /// Those of [`Model::detect`]; the system refuses a thread.
     pub fn new(model: &Model, view: &View, search_frames: Option<u32>) -> Result<Self> {
         check_process()?;
         let perception = model.perception(view.camera.as_ref(), view.region)?;
@@ -43,11 +43,11 @@ impl Tracker {
         Ok(Self { perception, tracker, threads: view.threads, last_secs: 0.0 })
     }
 
-    /// The parts in a frame as JSON, with the names of `sdg detect --from --json`; `captured_secs` counts from any moment that is the same
-    /// for all frames.
+    /// The parts in a frame as JSON, with the fields of `sdg detect --from --json`; `captured_secs` is measured from
+    /// any fixed time.
     ///
     /// # Errors
-    /// A time before that of the last frame, a picture of another size than the camera's.
+    /// The time is before that of the last frame, or the picture's size differs from the camera's.
     pub fn frame(&mut self, picture: RgbImage, captured_secs: f64) -> Result<String> {
         let Some(captured) =
             Duration::try_from_secs_f64(captured_secs).ok().filter(|_| captured_secs >= self.last_secs)

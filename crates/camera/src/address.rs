@@ -1,4 +1,4 @@
-//! Where a camera is, as text.
+//! The address of a camera, as text.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -9,7 +9,7 @@ use crate::command_line::CommandLine;
 use crate::error::CameraError;
 use crate::http::Url;
 
-/// Where a camera is.
+/// The address of a camera.
 ///
 /// | text | camera |
 /// |---|---|
@@ -22,9 +22,9 @@ use crate::http::Url;
 /// | `sim:REST` | the simulated camera, which another crate opens |
 /// | `ros2:TOPIC`, `ros2:TOPIC?OPTIONS` | a topic of ROS 2 with sensor_msgs/Image or CompressedImage, which another crate opens |
 ///
-/// Options of `dir:` and `file:` follow the last `?`, joined by `&`: `fps=10` (pictures a second; without it as fast as they are
-/// read), `loop` (begins again after the last), `follow` (`dir:` alone: waits for new files). A path that contains `?` itself
-/// must be followed by one more `?`.
+/// Options of `dir:` and `file:` follow the last `?`, joined by `&`: `fps=10` (pictures per second; default: as fast as
+/// they are read), `loop` (starts again after the last picture), `follow` (`dir:` only: waits for new files). A path
+/// that contains `?` must be followed by another `?`.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Address {
     /// `v4l:`, a camera of Video4Linux 2.
@@ -35,57 +35,57 @@ pub enum Address {
     Command(CommandLine),
     /// The pictures in a folder.
     Folder {
-        /// Where the pictures are; read in the order of their names.
+        /// The folder; its pictures are read in the order of their names.
         path: PathBuf,
-        /// How they are played.
+        /// Playback settings.
         playback: Playback,
     },
     /// `file:`, a single picture.
     File {
-        /// A picture in any of the formats that are read.
+        /// A picture in any supported format.
         path: PathBuf,
-        /// How it is played.
+        /// Playback settings.
         playback: Playback,
     },
-    /// The simulated camera: what follows `sim:`.
+    /// The simulated camera: the text after `sim:`.
     Sim(String),
-    /// A topic of ROS 2: what follows `ros2:`.
+    /// A topic of ROS 2: the text after `ros2:`.
     Ros2(String),
 }
 
-/// Which V4L2 node.
+/// Selects a V4L2 node.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum NodeName {
-    /// The first that has a format which is read here.
+    /// The first node with a supported format.
     Any,
-    /// The one with this path.
+    /// The node with this path.
     Path(PathBuf),
-    /// The first whose card's name contains this, whatever the case.
+    /// The first node whose card name contains this text, ignoring case.
     Card(String),
 }
 
-/// How the pictures of files are played.
+/// Playback settings of picture files.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Playback {
     /// Time between pictures; `None`: as fast as they are read.
     pub interval: Option<Duration>,
-    /// Begins again after the last.
+    /// Starts again after the last picture.
     pub is_looped: bool,
-    /// Waits for new files after the last.
+    /// Waits for new files after the last picture.
     pub is_followed: bool,
 }
 
 impl Address {
-    /// Whether what shows now is taken, so that a frame that was not fetched is lost; files and folders wait.
+    /// Whether the source is live, so that frames that are not fetched are lost; files and folders wait.
     pub fn is_live(&self) -> bool {
         !matches!(self, Self::Folder { .. } | Self::File { .. })
     }
 }
 
-/// What [`Address::from_str`] expects.
+/// The input that [`Address::from_str`] expects.
 const EXPECTED: &str = "an address of a camera: v4l:, v4l:/dev/video0, http://HOST/PATH, cmd:PROGRAM ARGUMENTS, dir:FOLDER, \
                         file:PATH, sim: or ros2:TOPIC";
-/// Frames a second that `fps=` takes.
+/// Range of `fps=`, in frames per second.
 const FPS: std::ops::RangeInclusive<f64> = 0.1..=1000.0;
 
 impl FromStr for Address {
@@ -154,7 +154,7 @@ fn parse_playback(rest: &str, text: &str) -> Result<(PathBuf, Playback), CameraE
 }
 
 impl fmt::Display for Address {
-    /// The address as it is parsed, but without the password.
+    /// The address in parsable form, without the password.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::V4l(NodeName::Any) => f.write_str("v4l:"),

@@ -1,4 +1,4 @@
-//! A program and its arguments in one line, split as a shell does, without a shell.
+//! A program and its arguments on one line, split as by a shell, but without a shell.
 
 use std::fmt;
 use std::str::FromStr;
@@ -7,8 +7,8 @@ use crate::error::CameraError;
 
 /// A program and its arguments.
 ///
-/// Words are separated by blanks; `'…'` and `"…"` keep blanks, a backslash keeps the next character (within `'…'` it is an ordinary
-/// one). There are no variables, wildcards, pipes or redirections: `sh -c '…'` has those.
+/// Words are separated by blanks; `'…'` and `"…"` keep blanks, a backslash keeps the next character (within `'…'` it is
+/// an ordinary character). Variables, wildcards, pipes and redirections are not supported; use `sh -c '…'` for them.
 ///
 /// ```
 /// let line: sdg_camera::CommandLine = r#"ffmpeg -i 'my film.mp4' -f mjpeg -"#.parse()?;

@@ -1,20 +1,20 @@
-//! Bytes of one picture to pixels.
+//! Decoding the bytes of one picture to pixels.
 
 use image::RgbImage;
 use sdg_picture::{ImageLimits, PixelFrame, decode_image_in};
 
-/// Pixels in a row, or rows, of a V4L2 camera.
+/// Maximum width and height of a V4L2 camera's frames.
 pub(crate) const MAX_SIDE: u32 = 1 << 14;
-/// More than a JPEG or PNG of a camera has.
+/// Maximum size of a camera's JPEG or PNG.
 pub(crate) const MAX_ENCODED_BYTES: usize = 32 << 20;
 
-/// A PNG's first bytes.
+/// The signature of PNG files.
 pub(crate) const PNG_START: [u8; 8] = *b"\x89PNG\r\n\x1a\n";
 
-/// Decodes one picture, whose kind its first bytes tell, as files are decoded.
+/// Decodes one picture like a file of the same format; the format is recognised by the first bytes.
 ///
 /// # Errors
-/// In words, what was found instead of a whole picture.
+/// Text that says what was found in place of a complete picture.
 pub fn decode(bytes: &[u8], frame: PixelFrame) -> Result<RgbImage, String> {
     decode_image_in(bytes, &ImageLimits::default(), frame).map_err(|error| error.to_string())
 }

@@ -1,4 +1,4 @@
-//! What can be wrong with a camera.
+//! Errors of cameras.
 
 use crate::fault::Fault;
 
@@ -7,17 +7,17 @@ use crate::fault::Fault;
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum CameraError {
-    /// Text that is no camera's address.
+    /// Text that is not a camera address.
     #[error("expected {expected}, found \"{found}\"")]
     Address {
-        /// What it should have been.
+        /// The expected form.
         expected: String,
         found: String,
     },
     /// An address that another crate opens.
     #[error("{address}: expected a caller that opens simulated cameras and topics of ROS 2; the crate camera does not")]
     OpenedElsewhere { address: String },
-    /// The camera does not open.
+    /// The camera cannot be opened.
     #[error("{address}: {why}")]
     Open {
         /// The address, without a password.
@@ -25,22 +25,22 @@ pub enum CameraError {
         /// What was expected and found.
         why: String,
     },
-    /// A setting that the camera does not have or does not take.
+    /// A setting that the camera does not have or rejects.
     #[error("{address}: expected a camera with the setting {setting}, found {found}")]
     Setting {
         address: String,
-        /// What was to be set.
+        /// The setting.
         setting: &'static str,
         found: String,
     },
-    /// What is wrong for now; the next call goes on.
+    /// A temporary fault; the next call continues.
     #[error("{camera}: {fault}")]
     Fault {
         /// The camera's address, without a password.
         camera: String,
         fault: Fault,
     },
-    /// The camera ended for good: to open it again would end likewise.
+    /// The camera has ended permanently: reopening it would end in the same way.
     #[error("{camera}: {why}")]
     Ended { camera: String, why: String },
     /// A port of 127.0.0.1 cannot be taken.
@@ -53,12 +53,12 @@ pub enum CameraError {
 }
 
 impl CameraError {
-    /// Whether the camera may deliver frames again: the next call tries.
+    /// Whether the camera may deliver frames again; the next call tries.
     pub fn is_passing(&self) -> bool {
         self.fault().is_some()
     }
 
-    /// The fault, where it is one.
+    /// The fault, if the error is one.
     pub fn fault(&self) -> Option<&Fault> {
         match self {
             Self::Fault { fault, .. } => Some(fault),

@@ -1,8 +1,8 @@
-//! What can be wrong with a camera that is open.
+//! Faults of an open camera.
 
 use std::fmt;
 
-/// One thing that is wrong with a camera or a frame.
+/// A fault of a camera or a frame.
 ///
 /// | fault | where |
 /// |---|---|
@@ -16,24 +16,24 @@ pub enum Fault {
         /// Seconds since the last frame, or since the camera was opened.
         silent_secs: f64,
     },
-    /// A frame that did not arrive whole, or that cannot be decoded; it is not delivered.
+    /// A frame that is incomplete or cannot be decoded; it is not delivered.
     Torn {
-        /// What arrived.
+        /// The data received.
         found: String,
     },
-    /// The connection is lost; each further call tries to open it again.
+    /// The connection is lost; each further call tries to reopen it.
     Gone {
-        /// What ended it, or why it cannot be opened again.
+        /// The cause of the loss, or why reopening failed.
         why: String,
     },
-    /// The same bits many times in a row; a sensor's noise differs in every frame.
+    /// Bit-identical frames many times in a row; the noise of a real sensor differs in every frame.
     Frozen {
-        /// How many frames in a row, this one included.
+        /// Number of identical frames in a row, including this one.
         num_frames: u32,
     },
-    /// Hardly a pixel that is not near 0, as with a cap on the lens.
+    /// Nearly all pixels are close to 0, as with a lens cap.
     Black,
-    /// The picture has another size than the frame before.
+    /// The picture's size differs from that of the frame before.
     OtherSize {
         /// Width and height before.
         before: (u32, u32),
@@ -48,7 +48,7 @@ pub enum Fault {
 }
 
 impl Fault {
-    /// The name in JSON: one word in small letters.
+    /// The name in JSON: one word in lower case.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Stale { .. } => "stale",

@@ -1,4 +1,4 @@
-//! `dir:` and `file:`: pictures in files.
+//! `dir:` and `file:`: pictures from files.
 
 use std::collections::BTreeSet;
 use std::ffi::OsString;
@@ -15,18 +15,19 @@ use crate::decode::{MAX_ENCODED_BYTES, decode};
 use crate::error::CameraError;
 use crate::source::{Missing, Source, Taken};
 
-/// Between looks at a folder for new files.
+/// Interval of checks for new files.
 const LOOK_EVERY: Duration = Duration::from_millis(20);
-/// A file that does not decode is taken to be still written until its length stays the same for so long.
+/// Time for which the length of an undecodable file must not change; until then the file is assumed to be still
+/// written.
 const UNCHANGED_TIME: Duration = Duration::from_millis(500);
-/// What is read as a picture.
+/// Extensions of files that are read as pictures.
 const EXTENSIONS: [&str; 8] = ["png", "jpg", "jpeg", "ppm", "webp", "bmp", "tif", "tiff"];
 
 /// The pictures of a folder in the order of their names, or one file.
 pub(crate) struct Folder {
     place: Place,
     playback: Playback,
-    /// Names that were played; with `follow`, a name that comes later is played whatever its order.
+    /// Names already played; with `follow`, a name that appears later is played regardless of its order.
     played: BTreeSet<OsString>,
     num_played: u64,
     next_at: Instant,
@@ -42,7 +43,7 @@ impl Folder {
     /// The pictures of a folder.
     ///
     /// # Errors
-    /// [`CameraError::Open`] for what is no folder, or has no pictures and is not followed.
+    /// [`CameraError::Open`] if the path is not a folder, or has no pictures and is not followed.
     pub(crate) fn open(path: &Path, playback: Playback, address: &str) -> Result<Self, CameraError> {
         let refused = |why: String| CameraError::Open { address: address.to_owned(), why };
         let names = names(path).map_err(|error| refused(format!("expected a folder, found: {error}")))?;
@@ -52,10 +53,10 @@ impl Folder {
         Ok(Self::at(Place::Folder(path.to_owned()), playback))
     }
 
-    /// One picture.
+    /// A single picture.
     ///
     /// # Errors
-    /// [`CameraError::Open`] for what is no file.
+    /// [`CameraError::Open`] if the path is not a file.
     pub(crate) fn open_file(path: &Path, playback: Playback, address: &str) -> Result<Self, CameraError> {
         let refused = |found: String| CameraError::Open {
             address: address.to_owned(),
@@ -79,7 +80,7 @@ impl Folder {
         }
     }
 
-    /// The same with pictures that way up.
+    /// Sets the orientation of the pictures.
     pub(crate) fn in_frame(self, frame: PixelFrame) -> Self {
         Self { frame, ..self }
     }
@@ -89,7 +90,7 @@ impl Folder {
         match &self.place {
             Place::File(path) => Ok((self.num_played == 0 || self.playback.is_looped).then(|| path.clone())),
             Place::Folder(folder) => {
-                // Read anew for each picture: files may come and go.
+                // The folder is listed again for each picture: files may appear and disappear.
                 let names =
                     names(folder).map_err(|error| Missing::Gone(format!("the folder cannot be read: {error}")))?;
                 let mut next = names.iter().find(|name| !self.played.contains(*name));
@@ -114,7 +115,7 @@ impl Source for Folder {
     fn take(&mut self, deadline: Instant) -> Result<Option<Taken>, Missing> {
         let wait = self.next_at.saturating_duration_since(Instant::now());
         sleep(wait);
-        // The time between pictures, which was asked for, is not late.
+        // Waiting for the requested interval is not a stall.
         let deadline = deadline + wait;
         let path = loop {
             match self.next_path()? {
@@ -138,7 +139,8 @@ impl Source for Folder {
     }
 }
 
-/// The names of pictures in a folder, sorted. Hidden files are left out: programs write under such names first.
+/// The sorted names of the pictures in a folder. Hidden files are left out: programs often write under a hidden name
+/// first.
 fn names(folder: &Path) -> std::io::Result<Vec<OsString>> {
     let is_picture = |name: &OsString| {
         let path = Path::new(name);
@@ -152,7 +154,8 @@ fn names(folder: &Path) -> std::io::Result<Vec<OsString>> {
     Ok(names)
 }
 
-/// Reads a picture; where it does not decode and still grows, again until it does. With the time of its last change.
+/// Reads a picture; if it cannot be decoded and still grows, reads it again until it can. Also returns its modification
+/// time.
 fn read_finished(path: &Path, frame: PixelFrame) -> Result<(image::RgbImage, SystemTime), String> {
     let mut unchanged: Option<(u64, Instant)> = None;
     loop {
@@ -170,7 +173,7 @@ fn read_finished(path: &Path, frame: PixelFrame) -> Result<(image::RgbImage, Sys
             Some((length, _)) if length == read as u64 => {}
             _ => unchanged = Some((read as u64, Instant::now())),
         }
-        // A file that was finished long ago is not being written.
+        // A file that was modified long ago is not being written.
         let age = changed.ok().and_then(|changed| changed.elapsed().ok());
         if age.is_some_and(|age| age > UNCHANGED_TIME * 4) {
             return Err(found);
@@ -229,7 +232,7 @@ mod tests {
         assert!(matches!(followed.take(soon()), Err(Missing::Late)));
         write(&files, "b.png", &png(2));
         assert_eq!(level(&mut followed), Some(2));
-        // An earlier name that comes later; the first half of the file first.
+        // A name that sorts earlier appears later; at first only half of the file exists.
         let bytes = png(1);
         let (half, rest) = bytes.split_at(bytes.len() / 2);
         write(&files, "a.png", half);

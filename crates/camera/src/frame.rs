@@ -1,4 +1,4 @@
-//! A picture with its origin, and the trait of all cameras.
+//! A picture with its origin, and the trait implemented by all cameras.
 
 use std::fmt;
 use std::sync::Arc;
@@ -9,18 +9,18 @@ use image::RgbImage;
 use crate::error::CameraError;
 use crate::fault::Fault;
 
-/// A picture, when it was taken and by which camera.
+/// A picture with its capture time and camera.
 #[derive(Clone)]
 pub struct Frame {
     /// The pixels, decoded to RGB.
     pub picture: RgbImage,
-    /// Counted by the camera from 0; a gap means frames that were not delivered.
+    /// Number assigned by the camera, from 0; a gap means frames that were not delivered.
     pub number: u64,
-    /// When it was taken; where the camera does not say, when it arrived.
+    /// Capture time; arrival time if the camera does not give one.
     pub captured: SystemTime,
-    /// The camera's address as it was given, but without the password.
+    /// The camera's address as given, without the password.
     pub camera: Arc<str>,
-    /// What is wrong with it; empty where nothing is.
+    /// Faults of this frame; empty if there are none.
     pub faults: Vec<Fault>,
 }
 
@@ -32,7 +32,7 @@ impl Frame {
 }
 
 impl fmt::Debug for Frame {
-    /// Without the pixels.
+    /// Omits the pixels.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (width, height) = self.picture.dimensions();
         write!(f, "frame {} of {}, {width} × {height} pixels, faults {:?}", self.number, self.camera, self.faults)
@@ -41,13 +41,14 @@ impl fmt::Debug for Frame {
 
 /// A source of frames.
 pub trait Camera: Send {
-    /// Waits for the next frame; `None` where there will be none, as at the end of a folder.
+    /// Waits for the next frame; `None` if there are no more, as at the end of a folder.
     ///
     /// # Errors
-    /// What went wrong with this frame or this camera. After an error that [`CameraError::is_passing`] the next call goes on.
+    /// A fault of this frame or camera. After an error with [`CameraError::is_passing`], the next call continues.
     fn next_frame(&mut self) -> Result<Option<Frame>, CameraError>;
 
-    /// Whether a picture is only taken or read when it is asked for, so that none is old and none is lost while the last one is worked on.
+    /// Whether pictures are taken or read only on request, so that none becomes old or is lost while the previous one
+    /// is processed.
     fn is_on_request(&self) -> bool {
         false
     }
@@ -66,7 +67,7 @@ impl<C: Camera + ?Sized> Camera for Box<C> {
 /// The mean of all channels of all pixels, 0 to 255; 0 for a picture without pixels.
 pub fn mean_brightness(picture: &RgbImage) -> f64 {
     let bytes = picture.as_raw();
-    // Rows of 4 KiB fit into u32 and are added without conversion to u64, which is four times as fast.
+    // Sums of 4 KiB rows fit into u32, which is four times as fast as adding u64.
     let sum: u64 =
         bytes.chunks(1 << 12).map(|row| u64::from(row.iter().map(|&byte| u32::from(byte)).sum::<u32>())).sum();
     sum as f64 / bytes.len().max(1) as f64

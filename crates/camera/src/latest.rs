@@ -1,4 +1,4 @@
-//! A thread that reads a camera without a pause, so that the newest frame is at hand.
+//! A thread that reads a camera continuously, so that the newest frame is available at once.
 
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -10,13 +10,13 @@ use crate::error::CameraError;
 use crate::fault::Fault;
 use crate::frame::{Camera, Frame};
 
-/// Bound of errors that were not read: the oldest are dropped.
+/// Maximum number of unread errors; the oldest are dropped.
 const MAX_ERRORS: usize = 16;
 
-/// The newest frame of a camera that a thread reads; older ones are dropped and counted.
+/// The newest frame of a camera that a thread reads; older frames are dropped and counted.
 ///
-/// It is a [`Camera`] itself: [`next_frame`](Camera::next_frame) gives each frame at most once. Dropping it waits until the thread
-/// has ended its current frame, so that the camera is closed then.
+/// It is a [`Camera`] itself: [`next_frame`](Camera::next_frame) returns each frame at most once. Dropping it waits
+/// until the thread has finished its current frame, so that the camera is then closed.
 pub struct LatestFrame {
     shared: Arc<Shared>,
     thread: Option<JoinHandle<()>>,
@@ -39,13 +39,13 @@ struct Newest {
 
 impl Shared {
     fn lock(&self) -> MutexGuard<'_, Newest> {
-        // Nothing that is done under this lock can leave it half done.
+        // No operation under this lock can leave it half done.
         self.newest.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 impl LatestFrame {
-    /// Reads the camera in a thread until this is dropped, the camera ends, or an error is not passing.
+    /// Reads the camera in a thread until this object is dropped, the camera ends, or a permanent error occurs.
     pub fn spawn(mut camera: Box<dyn Camera>) -> Self {
         let shared = Arc::new(Shared::default());
         let writer = Arc::clone(&shared);
@@ -57,7 +57,7 @@ impl LatestFrame {
                     Ok(Some(mut frame)) => {
                         if let Some(dropped) = newest.frame.take() {
                             newest.num_dropped += 1;
-                            // These are reported once, so that they are kept for a caller that missed the frame.
+                            // These faults are reported once, so they are kept for a caller that missed the frame.
                             let once = |fault: &Fault| matches!(fault, Fault::Back { .. } | Fault::OtherSize { .. });
                             frame.faults.extend(dropped.faults.into_iter().filter(once));
                         }
@@ -83,11 +83,11 @@ impl LatestFrame {
         Self { shared, thread: Some(thread) }
     }
 
-    /// The newest frame that was not taken yet; waits for it until the time is over and is `None` then, and at the camera's end
+    /// The newest frame that was not taken yet. Waits for it; returns `None` after the timeout and at the camera's end
     /// ([`has_ended`](Self::has_ended)).
     ///
     /// # Errors
-    /// Each error of the camera, once, before the frames that came after it.
+    /// Each error of the camera, once, before later frames.
     pub fn take(&self, timeout: Duration) -> Result<Option<Frame>, CameraError> {
         let deadline = Instant::now() + timeout;
         let mut newest = self.shared.lock();
@@ -107,14 +107,14 @@ impl LatestFrame {
         }
     }
 
-    /// Whether there will be no more frames, and all were taken.
+    /// Whether there are no more frames and all were taken.
     pub fn has_ended(&self) -> bool {
         let newest = self.shared.lock();
         newest.has_ended && newest.frame.is_none() && newest.errors.is_empty()
     }
 
-    /// How many frames were read and replaced by a newer one before they were taken. Gaps in [`Frame::number`] count those, too, and
-    /// those that the camera itself did not deliver.
+    /// Number of frames that were replaced by a newer one before they were taken. Gaps in [`Frame::number`] also
+    /// include frames that the camera did not deliver.
     pub fn num_dropped(&self) -> u64 {
         self.shared.lock().num_dropped
     }
@@ -123,10 +123,10 @@ impl LatestFrame {
 impl Camera for LatestFrame {
     fn next_frame(&mut self) -> Result<Option<Frame>, CameraError> {
         loop {
-            // The camera's own stall timeout ends the wait with an error, so that any time does here.
+            // The camera's own stall timeout ends the wait with an error, so the value here does not matter.
             match self.take(Duration::from_secs(1))? {
                 Some(frame) => return Ok(Some(frame)),
-                // A thread that panicked has finished without saying so.
+                // A thread that panicked has finished without reporting it.
                 None if self.has_ended() || self.thread.as_ref().is_none_or(JoinHandle::is_finished) => {
                     return Ok(None);
                 }
@@ -140,7 +140,7 @@ impl Drop for LatestFrame {
     fn drop(&mut self) {
         self.shared.is_stopped.store(true, Ordering::SeqCst);
         if let Some(thread) = self.thread.take() {
-            // A panic of the camera was printed by its own thread.
+            // The panic message was printed by the camera's thread.
             let _ = thread.join();
         }
     }
@@ -152,7 +152,7 @@ mod tests {
     use image::RgbImage;
     use std::sync::mpsc::{Receiver, Sender, channel};
 
-    /// Gives a frame for each number that is sent; torn for `None`.
+    /// Gives a frame for each number that is sent, and a torn one for `None`.
     struct Driven(Receiver<Option<u64>>, Sender<()>);
 
     impl Camera for Driven {
@@ -171,14 +171,15 @@ mod tests {
         let (send, receive) = channel();
         let (asked, was_asked) = channel();
         let mut latest = LatestFrame::spawn(Box::new(Driven(receive, asked)));
-        // Declared last, it is dropped first where an assertion fails: `latest` would wait for its thread for ever.
+        // Declared last, so that it is dropped first if an assertion fails: `latest` would wait for its thread for
+        // ever.
         let send = send;
         assert!(latest.take(Duration::from_millis(20)).unwrap().is_none() && !latest.has_ended());
         for number in 0..5 {
             was_asked.recv().unwrap();
             send.send(Some(number)).unwrap();
         }
-        // When it asks for the sixth, the fifth stands.
+        // When the sixth is requested, the fifth is stored.
         was_asked.recv().unwrap();
         assert_eq!(latest.take(Duration::ZERO).unwrap().unwrap().number, 4);
         assert_eq!(latest.num_dropped(), 4);

@@ -1,4 +1,4 @@
-//! Live pictures: one trait, and the cameras behind it.
+//! Live pictures: a trait and its implementations for several kinds of cameras.
 //!
 //! ```text
 //! Address ── open ── Source: V4L2 node, HTTP, program, folder ── Reconnecting ── Watched ── Box<dyn Camera>
@@ -6,12 +6,12 @@
 //!                                                                                  LatestFrame ─┘ a thread; newest frame only
 //! MjpegServer: pictures out, to browsers on this computer
 //! ```
-//! [`Camera::next_frame`] answers within about the stall timeout, with a [`Frame`] or an error. What is wrong with a camera is a
-//! [`Fault`]: where there is a picture all the same (frozen, black, another size, back again) it stands in [`Frame::faults`]; where
-//! there is none (stale, torn, gone) it is a [`CameraError::Fault`], and the next call goes on.
+//! [`Camera::next_frame`] returns within about the stall timeout, with a [`Frame`] or an error. A camera's problem is a
+//! [`Fault`]: if there still is a picture (frozen, black, another size, back again), it is in [`Frame::faults`]; if
+//! there is none (stale, torn, gone), it is a [`CameraError::Fault`], and the next call continues.
 //!
-//! Absent: any knowledge of lenses and tables (crate `calibration`), the simulated camera (crate `simulation`; [`Address::Sim`] is
-//! recognised here, opened there), TLS, sound, and video codecs other than motion JPEG.
+//! Absent: any knowledge of lenses and tables (crate `calibration`), the simulated camera (crate `simulation`;
+//! [`Address::Sim`] is parsed here and opened there), TLS, sound, and video codecs other than motion JPEG.
 //!
 //! ```
 //! use sdg_camera::{Address, OpenOptions, open};

@@ -1,4 +1,4 @@
-//! An address to a camera.
+//! Opening the camera at an address.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -15,16 +15,16 @@ use crate::source::Source;
 use crate::v4l;
 use crate::watched::Watched;
 
-/// Frames a second that can be asked for.
+/// Range of requested frame rates, in frames per second.
 const FPS: std::ops::RangeInclusive<f64> = 0.1..=1000.0;
-/// Stall timeouts: shorter than a frame takes, and longer than anybody waits.
+/// Range of stall timeouts: longer than a frame takes, shorter than anyone would wait.
 const STALL_TIMEOUTS: std::ops::RangeInclusive<Duration> = Duration::from_millis(10)..=Duration::from_secs(3600);
 
-/// Opens the camera at an address, opened again when its connection is lost, and watched for faults.
+/// Opens the camera at an address. The camera is reopened when its connection is lost, and watched for faults.
 ///
 /// # Errors
-/// [`CameraError::Open`] and [`CameraError::Setting`] where it does not open or take its settings, [`CameraError::OpenedElsewhere`] for
-/// [`Address::Sim`] and [`Address::Ros2`].
+/// [`CameraError::Open`] and [`CameraError::Setting`] if it cannot be opened or rejects its settings,
+/// [`CameraError::OpenedElsewhere`] for [`Address::Sim`] and [`Address::Ros2`].
 pub fn open(address: &Address, options: &OpenOptions) -> Result<Box<dyn Camera>, CameraError> {
     let name: Arc<str> = address.to_string().into();
     let refused = |expected: &str, found: String| {

@@ -7,19 +7,19 @@ use sdg_picture::PixelFrame;
 /// How a V4L2 camera encodes its frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Encoding {
-    /// YUYV: 4:2:2, two bytes a pixel.
+    /// YUYV: 4:2:2, two bytes per pixel.
     Yuyv,
-    /// RGB24 (V4L2's `RGB3`): three bytes a pixel.
+    /// RGB24 (V4L2's `RGB3`): three bytes per pixel.
     Rgb24,
     /// Motion JPEG (V4L2's `MJPG`).
     Mjpeg,
 }
 
 impl Encoding {
-    /// All of them, in the order in which they are preferred: nothing lost first.
+    /// All encodings, in order of preference: lossless first.
     pub const ALL: [Self; 3] = [Self::Rgb24, Self::Yuyv, Self::Mjpeg];
 
-    /// V4L2's four letters.
+    /// V4L2's four-character code.
     pub fn fourcc(self) -> [u8; 4] {
         match self {
             Self::Yuyv => *b"YUYV",
@@ -29,33 +29,33 @@ impl Encoding {
     }
 }
 
-/// What a camera is asked for. `width`, `height`, `encoding`, `exposure_secs` and `white_balance_kelvin` are for V4L2; the other
-/// kinds of camera deliver what they have, whose size the frames tell.
+/// Settings requested from a camera. `width`, `height`, `encoding`, `exposure_secs` and `white_balance_kelvin` apply to
+/// V4L2; other kinds of cameras deliver frames as they are, and the frames state their size.
 #[derive(Debug, Clone)]
 pub struct OpenOptions {
-    /// Pixels in a row; the nearest size there is.
+    /// Width in pixels; the nearest available size is used.
     pub width: u32,
     /// Height, in pixels.
     pub height: u32,
-    /// Frames a second: of a V4L2 camera, or how often a snapshot is fetched over HTTP. `None`: as the camera likes, and
-    /// [`DEFAULT_SNAPSHOT_FPS`](Self::DEFAULT_SNAPSHOT_FPS) snapshots a second.
+    /// Frames per second of a V4L2 camera, or snapshots per second over HTTP. `None`: the camera's default, and
+    /// [`DEFAULT_SNAPSHOT_FPS`](Self::DEFAULT_SNAPSHOT_FPS) for snapshots.
     pub fps: Option<f64>,
-    /// How frames are encoded; the best there is where `None`.
+    /// Encoding of the frames; `None` for the best available one.
     pub encoding: Option<Encoding>,
-    /// A fixed exposure time in seconds; automatic where `None`.
+    /// Fixed exposure time in seconds; `None` for automatic exposure.
     pub exposure_secs: Option<f64>,
-    /// A fixed white balance in kelvin; automatic where `None`.
+    /// Fixed white balance in kelvin; `None` for automatic white balance.
     pub white_balance_kelvin: Option<u32>,
-    /// Which way up pictures with an Exif orientation are: with a calibration, the sensor's.
+    /// Orientation of pictures with an Exif orientation: with a calibration, the sensor's.
     pub frame: PixelFrame,
-    /// Without a frame for so long a camera is [`Fault::Stale`](crate::Fault::Stale).
+    /// Time without a frame after which a camera is [`Fault::Stale`](crate::Fault::Stale).
     pub stall_timeout: Duration,
-    /// The same bits in so many frames in a row are [`Fault::Frozen`](crate::Fault::Frozen).
+    /// Number of bit-identical frames in a row that is [`Fault::Frozen`](crate::Fault::Frozen).
     pub frozen_frames: u32,
 }
 
 impl OpenOptions {
-    /// Snapshots a second that are fetched where nothing else is asked for.
+    /// Default number of snapshots per second.
     pub const DEFAULT_SNAPSHOT_FPS: f64 = 5.0;
 }
 

@@ -15,17 +15,17 @@ use crate::error::CameraError;
 use crate::source::{Missing, Source, Taken};
 use crate::splitter::Splitter;
 
-/// Read at once from the program.
+/// Bytes per read from the program.
 const PIECE_BYTES: usize = 64 << 10;
-/// Of a line on standard error, so many bytes are kept.
+/// Maximum number of bytes kept of a line on standard error.
 const MAX_LINE_BYTES: u64 = 1 << 10;
-/// A program that has closed its standard output is given so long to end by itself.
+/// Time for a program to exit after it has closed its standard output.
 const EXIT_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// A picture as it arrived, still encoded; in words, what arrived instead.
+/// A picture as received, still encoded; or text that describes invalid data.
 type Arrived = (SystemTime, Result<Vec<u8>, String>);
 
-/// A running program. Pictures are taken in order and none is left out: a program that is faster than its reader waits.
+/// A running program. Pictures are taken in order without gaps: a program that is faster than its reader waits.
 pub(crate) struct Program {
     child: Child,
     pictures: Option<Receiver<Arrived>>,
@@ -39,7 +39,7 @@ impl Program {
     /// Starts the program.
     ///
     /// # Errors
-    /// [`CameraError::Open`] for a program that cannot be started.
+    /// [`CameraError::Open`] if the program cannot be started.
     pub(crate) fn start(line: &CommandLine, frame: PixelFrame) -> Result<Self, CameraError> {
         let refused = |why: String| CameraError::Open { address: format!("cmd:{line}"), why };
         let (program, arguments) = line.words().split_first().ok_or_else(|| refused("no program".to_owned()))?;
@@ -59,7 +59,7 @@ impl Program {
         Ok(Self { child, pictures: Some(pictures), last_line, threads, has_delivered: false, frame })
     }
 
-    /// What the end of the program's output means.
+    /// Interprets the end of the program's output.
     fn end(&mut self) -> Result<Option<Taken>, Missing> {
         let deadline = Instant::now() + EXIT_TIMEOUT;
         let status = loop {
@@ -70,7 +70,7 @@ impl Program {
                 Err(error) => return Err(Missing::Gone(format!("the program's state is unknown: {error}"))),
             }
         };
-        // It ended, so that its standard error ends as well, unless a child of its own holds that open.
+        // The program has exited, so its standard error ends too, unless a child process holds it open.
         while self.threads.iter().any(|thread| !thread.is_finished()) && Instant::now() < deadline {
             std::thread::sleep(Duration::from_millis(5));
         }
@@ -78,7 +78,7 @@ impl Program {
             return Ok(None);
         }
         let why = self.with_last_line(status);
-        // Wrong arguments end a program at once; to start it again would not help.
+        // A program with wrong arguments exits at once; restarting it would not help.
         Err(if self.has_delivered { Missing::Gone(why) } else { Missing::Ended(why) })
     }
 
@@ -110,12 +110,12 @@ impl Source for Program {
 
 impl Drop for Program {
     fn drop(&mut self) {
-        // Ends the reading thread where it waits for its picture to be taken.
+        // Ends the reading thread if it waits for its picture to be taken.
         self.pictures = None;
-        // It may have ended already; without `wait` it would stay as a zombie.
+        // It may have exited already; without `wait` it would remain a zombie.
         let _ = self.child.kill();
         let _ = self.child.wait();
-        // The threads are not joined: a grandchild may hold the pipes open. They end with the pipes.
+        // The threads are not joined: a grandchild process may hold the pipes open. They end with the pipes.
     }
 }
 
@@ -147,7 +147,8 @@ fn keep_last_line(stderr: ChildStderr, last_line: &Mutex<String>) {
     let mut bytes = Vec::new();
     loop {
         bytes.clear();
-        // Programs that show progress end their lines with a carriage return and never with a line feed; hence the bound.
+        // Programs that show progress end their lines with a carriage return and never with a line feed, so the length
+        // is bounded.
         match reader.by_ref().take(MAX_LINE_BYTES).read_until(b'\n', &mut bytes) {
             Ok(0) | Err(_) => return,
             Ok(_) => {}

@@ -1,4 +1,4 @@
-//! A camera that is opened again when its connection is lost, with growing pauses.
+//! A camera that is reopened when its connection is lost, with growing pauses.
 
 use std::sync::Arc;
 use std::thread::sleep;
@@ -9,19 +9,20 @@ use crate::fault::Fault;
 use crate::frame::{Camera, Frame};
 use crate::source::{Missing, Source, fault};
 
-/// Before the first attempt to open again; each further pause is twice as long.
+/// Pause before the first attempt to reopen; each further pause is twice as long.
 const FIRST_PAUSE: Duration = Duration::from_millis(100);
-/// The longest pause: a camera that was plugged in again is back after that.
+/// Maximum pause: a camera that was plugged in again is back after this time.
 const MAX_PAUSE: Duration = Duration::from_secs(5);
-/// After so many stall timeouts in a row the connection is given up: the other end may be gone without a word.
+/// Number of stall timeouts in a row after which the connection is dropped: the other end may have disappeared
+/// silently.
 const MAX_STALLS: u32 = 3;
-/// After so many torn frames in a row the connection is given up: where frames begin may be lost.
+/// Number of torn frames in a row after which the connection is dropped: frame boundaries may be lost.
 const MAX_TORN: u32 = 30;
 
-/// Opens a connection; at most until the deadline, as far as the system allows.
+/// Opens a connection, until the deadline if the system allows.
 pub(crate) type Opener = Box<dyn FnMut(Instant) -> Result<Box<dyn Source>, CameraError> + Send>;
 
-/// Numbers the frames of one connection after the other.
+/// Numbers the frames across successive connections.
 pub(crate) struct Reconnecting {
     name: Arc<str>,
     opener: Opener,
@@ -46,7 +47,7 @@ impl Reconnecting {
     /// Opens the first connection.
     ///
     /// # Errors
-    /// Those of the opener: a wrong address is an error at once.
+    /// Those of the opener: a wrong address fails at once.
     pub(crate) fn open(name: Arc<str>, mut opener: Opener, stall_timeout: Duration) -> Result<Self, CameraError> {
         let source = opener(Instant::now() + stall_timeout)?;
         Ok(Self {
@@ -63,9 +64,9 @@ impl Reconnecting {
         })
     }
 
-    /// Drops the connection and sets the time of the next attempt.
+    /// Drops the connection and schedules the next attempt.
     fn lose(&mut self, why: String) -> CameraError {
-        // A device or a process must be closed before it is opened again.
+        // A device or a process must be closed before it is reopened.
         self.source = None;
         (self.num_stalls, self.num_torn) = (0, 0);
         let now = Instant::now();
@@ -75,7 +76,7 @@ impl Reconnecting {
         fault(&self.name, Fault::Gone { why })
     }
 
-    /// Opens again when it is time, at most until the deadline.
+    /// Reopens when it is time, until the deadline at most.
     fn reopen(&mut self, deadline: Instant) -> Result<(), CameraError> {
         let (retry_at, why) = match &self.lost {
             Some(lost) => (lost.retry_at, lost.why.clone()),
@@ -95,7 +96,7 @@ impl Reconnecting {
     }
 }
 
-/// The fault repeats the address before the reason.
+/// Removes the address, which the fault's text would repeat.
 fn without_address(error: &CameraError, name: &str) -> String {
     let text = error.to_string();
     text.strip_prefix(name).and_then(|rest| rest.strip_prefix(": ")).map_or(text.clone(), str::to_owned)
@@ -176,7 +177,7 @@ mod tests {
         Ok(Some(Taken::now(RgbImage::new(1, 1))))
     }
 
-    /// A camera whose connections give these; `Err` is a connection that does not open.
+    /// A camera whose connections give these results; `Err` is a connection that cannot be opened.
     fn camera(connections: Vec<Result<Vec<Step>, &'static str>>) -> (Reconnecting, Arc<AtomicU32>) {
         let mut connections = connections.into_iter();
         let opened = Arc::new(AtomicU32::new(0));
@@ -210,7 +211,8 @@ mod tests {
         assert_eq!(fault_of(&mut camera), Fault::Torn { found: "half".into() });
         assert_eq!(camera.next_frame().unwrap().unwrap().number, 2);
         assert_eq!(fault_of(&mut camera), Fault::Gone { why: "cable".into() });
-        // The pause of 100 ms is longer than the stall timeout of 50 ms: this call ends before the connection is opened again.
+        // The pause of 100 ms is longer than the stall timeout of 50 ms: this call ends before the connection is
+        // reopened.
         assert!(matches!(fault_of(&mut camera), Fault::Gone { .. }));
         let back = loop {
             match camera.next_frame() {

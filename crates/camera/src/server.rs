@@ -1,4 +1,4 @@
-//! Pictures to browsers on this computer, as motion JPEG.
+//! Serves pictures as motion JPEG to browsers on this computer.
 
 use std::io::{Read, Write};
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
@@ -12,36 +12,37 @@ use image::codecs::jpeg::JpegEncoder;
 
 use crate::error::CameraError;
 
-/// Of JPEG, 1 to 100: at 90 thin lines keep their colours.
+/// JPEG quality, 1 to 100: at 90 thin lines keep their colours.
 const QUALITY: u8 = 90;
-/// A browser that takes nothing for so long is disconnected.
+/// Time after which a browser that reads nothing is disconnected.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(5);
-/// A request that has not arrived after this is not waited for.
+/// Time limit for receiving a request.
 const REQUEST_TIMEOUT: Duration = Duration::from_secs(5);
-/// Between looks at whether the server ends, where no picture comes.
+/// Interval of checks for the server's end while there are no pictures.
 const LOOK_EVERY: Duration = Duration::from_millis(200);
-/// The end waits so long for browsers to take the last picture.
+/// Time limit at the end for browsers to receive the last picture.
 const LAST_PICTURE_WITHIN: Duration = Duration::from_millis(500);
-/// More than the windows of one user.
+/// Maximum number of connections; one user needs fewer.
 const MAX_CONNECTIONS: usize = 32;
-/// More than a browser sends.
+/// Maximum size of a request; browsers send less.
 const MAX_REQUEST_BYTES: usize = 16 << 10;
 
 const PAGE: &str = include_str!("page/index.html");
 const SCRIPT: &str = include_str!("page/page.js");
 
-/// A server on 127.0.0.1 that shows the pictures which are published, to any number of browsers.
+/// A server on 127.0.0.1 that shows the published pictures to any number of browsers.
 ///
 /// | path | answer |
 /// |---|---|
-/// | `/` | a page with the live picture, which tells when the program has ended |
+/// | `/` | a page with the live picture, which shows when the program has ended |
 /// | `/stream` | `multipart/x-mixed-replace`, a JPEG in each part |
 /// | `/snapshot.jpg` | the newest picture; status 503 before the first |
 /// | `/words` | what the newest picture shows, in words; empty before the first |
 ///
-/// [`publish`](Self::publish) never waits: a picture is encoded when the first browser requests it, and a slow browser gets the newest one
-/// when it is ready for it. Only requests that name 127.0.0.1 or localhost with this port are answered, and none from other pages: a
-/// name that was made to point here, or a page elsewhere, does not get the pictures.
+/// [`publish`](Self::publish) never waits: a picture is encoded when the first browser requests it, and a slow browser
+/// gets the newest picture when it is ready. Only requests that name 127.0.0.1 or localhost with this port are
+/// answered, and none from other pages: foreign host names that resolve to this address, and other pages, do not get
+/// the pictures.
 pub struct MjpegServer {
     shared: Arc<Shared>,
     port: u16,
@@ -59,7 +60,7 @@ struct Shared {
 struct Published {
     number: u64,
     picture: RgbImage,
-    /// For those who cannot see the picture.
+    /// Description for screen readers.
     words: String,
     /// Encoded on the first request.
     jpeg: OnceLock<Vec<u8>>,
@@ -75,7 +76,7 @@ impl Published {
     fn jpeg(&self) -> &[u8] {
         self.jpeg.get_or_init(|| {
             let mut bytes = Vec::new();
-            // A picture without pixels is no JPEG; nobody can look at it either.
+            // A picture without pixels cannot be encoded as JPEG, nor seen.
             let _ = JpegEncoder::new_with_quality(&mut bytes, QUALITY).encode_image(&self.picture);
             bytes
         })
@@ -83,10 +84,10 @@ impl Published {
 }
 
 impl MjpegServer {
-    /// Takes a port of 127.0.0.1; 0 for any that is free.
+    /// Binds a port of 127.0.0.1; 0 for any free port.
     ///
     /// # Errors
-    /// [`CameraError::Port`] for one that is taken.
+    /// [`CameraError::Port`] if the port is taken.
     pub fn start(port: u16) -> Result<Self, CameraError> {
         let failed = |source| CameraError::Port { port, source };
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port)).map_err(failed)?;
@@ -102,7 +103,7 @@ impl MjpegServer {
         format!("http://127.0.0.1:{}/", self.port)
     }
 
-    /// Shows a picture in place of the one before; `words` tell a screen reader what it shows.
+    /// Replaces the shown picture; `words` describes it to screen readers.
     pub fn publish(&self, picture: RgbImage, words: impl Into<String>) {
         let mut newest = self.shared.newest.lock().unwrap_or_else(PoisonError::into_inner);
         let number = newest.as_ref().map_or(0, |published| published.number + 1);
@@ -116,7 +117,7 @@ impl Drop for MjpegServer {
     fn drop(&mut self) {
         self.shared.is_stopped.store(true, Ordering::SeqCst);
         self.shared.changed.notify_all();
-        // Wakes the thread, which waits for a connection.
+        // Wakes the thread that waits for a connection.
         let _ = TcpStream::connect((Ipv4Addr::LOCALHOST, self.port));
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
@@ -134,7 +135,7 @@ fn accept(listener: &TcpListener, port: u16, shared: &Arc<Shared>) {
             return;
         }
         let Ok(stream) = stream else {
-            // A connection that broke before it was taken, or no more files: the next one may do.
+            // A connection that broke before it was accepted, or too many open files: the next one may succeed.
             std::thread::sleep(Duration::from_millis(10));
             continue;
         };
@@ -144,7 +145,7 @@ fn accept(listener: &TcpListener, port: u16, shared: &Arc<Shared>) {
         }
         let shared = Arc::clone(shared);
         std::thread::spawn(move || {
-            // A browser that has gone away is no error.
+            // A browser that has disconnected is not an error.
             let _ = serve(stream, port, &shared);
             shared.num_connections.fetch_sub(1, Ordering::SeqCst);
         });
@@ -177,7 +178,7 @@ fn serve(mut stream: TcpStream, port: u16, shared: &Shared) -> std::io::Result<(
     }
 }
 
-/// The path of a request that may be answered; otherwise a status and the reason.
+/// The path of an allowed request; otherwise a status and the reason.
 type Asked = Result<String, (&'static str, &'static str)>;
 
 fn read_path(stream: &mut TcpStream, port: u16) -> std::io::Result<Asked> {
@@ -218,7 +219,7 @@ fn judge(request: &httparse::Request<'_, '_>, port: u16) -> Asked {
     Ok(request.path.unwrap_or_default().split('?').next().unwrap_or_default().to_owned())
 }
 
-/// Every answer ends its connection, is not stored, and is not shown within other pages.
+/// Each response closes its connection, is not cached, and cannot be embedded in other pages.
 fn head(status: &str, content_type: &str) -> String {
     format!(
         "HTTP/1.1 {status}\r\nContent-Type: {content_type}\r\nConnection: close\r\nCache-Control: no-store\r\n\
@@ -243,13 +244,14 @@ fn stream_pictures(stream: &mut TcpStream, shared: &Shared) -> std::io::Result<(
         let part = format!("Content-Type: image/jpeg\r\nContent-Length: {}\r\n\r\n", jpeg.len());
         stream.write_all(part.as_bytes())?;
         stream.write_all(jpeg)?;
-        // Chromium shows a part when the next boundary has come: without it, each picture would be shown a picture late.
+        // Chromium shows a part when the next boundary arrives: without it, each picture would be shown one picture
+        // late.
         stream.write_all(b"\r\n--sdg-picture\r\n")?;
     }
     Ok(())
 }
 
-/// Waits for a picture after the last one; `None` when the server ends and all were taken.
+/// Waits for a picture after number `last`; `None` when the server ends and all pictures were taken.
 fn next_picture(shared: &Shared, last: Option<u64>) -> Option<Arc<Published>> {
     let mut newest = shared.newest.lock().unwrap_or_else(PoisonError::into_inner);
     loop {

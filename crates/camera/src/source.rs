@@ -1,4 +1,4 @@
-//! One connection to a camera: pictures until it ends.
+//! One connection to a camera, which gives pictures until it ends.
 
 use std::time::{Instant, SystemTime};
 
@@ -7,17 +7,17 @@ use image::RgbImage;
 use crate::error::CameraError;
 use crate::fault::Fault;
 
-/// What a connection gave.
+/// Result of a connection.
 #[derive(Debug)]
 pub(crate) struct Taken {
     pub(crate) picture: RgbImage,
     pub(crate) captured: SystemTime,
-    /// Frames before it that were thrown away because newer ones had come.
+    /// Number of frames discarded before it because newer ones had arrived.
     pub(crate) num_skipped: u64,
 }
 
 impl Taken {
-    /// A picture that arrived now, with none thrown away before it.
+    /// A picture that arrived now, without discarded ones before it.
     pub(crate) fn now(picture: RgbImage) -> Self {
         Self { picture, captured: SystemTime::now(), num_skipped: 0 }
     }
@@ -26,19 +26,19 @@ impl Taken {
 /// Why a connection gave no picture.
 #[derive(Debug)]
 pub(crate) enum Missing {
-    /// Nothing until the deadline; the connection stands.
+    /// No data until the deadline; the connection is still open.
     Late,
-    /// This picture is lost, the connection stands.
+    /// This picture is lost; the connection is still open.
     Torn(String),
     /// The connection is lost.
     Gone(String),
-    /// The camera ended; to open it again would end likewise.
+    /// The camera has ended permanently; reopening it would end in the same way.
     Ended(String),
 }
 
 /// One connection to a camera.
 pub(crate) trait Source: Send {
-    /// Waits for a picture until the deadline; `None` where there will be none.
+    /// Waits for a picture until the deadline; `None` if there are no more.
     fn take(&mut self, deadline: Instant) -> Result<Option<Taken>, Missing>;
 
     /// As [`Camera::is_on_request`](crate::Camera::is_on_request).

@@ -1,16 +1,16 @@
-//! A stream of bytes to single pictures: JPEG, PNG and PPM one after the other, as programs write them.
+//! Splits a stream of bytes into single pictures: consecutive JPEG, PNG and PPM files, as programs write them.
 
 use sdg_picture::{JpegEnd, JpegScanner, PpmHead};
 
 use crate::decode::{MAX_ENCODED_BYTES, PNG_START};
 
-/// Bytes that begin no picture are reported after so many, at the latest.
+/// Number of bytes that belong to no picture after which they are reported at the latest.
 const MAX_GARBAGE_BYTES: usize = 1 << 20;
 
 /// The start marker, and the first byte of the next.
 const JPEG_START: [u8; 3] = [0xff, 0xd8, 0xff];
 
-/// Cuts a stream where pictures end.
+/// Splits a stream at the ends of pictures.
 #[derive(Debug, Default)]
 pub(crate) struct Splitter {
     buffer: Vec<u8>,
@@ -18,27 +18,27 @@ pub(crate) struct Splitter {
     garbage_bytes: usize,
 }
 
-/// Whether a picture is whole.
+/// The extent of the picture at the beginning of the buffer.
 enum Extent {
-    /// After so many bytes.
+    /// Complete, with this number of bytes.
     Ends(usize),
     NotYet,
-    /// It is broken: why, and how many bytes are thrown away.
+    /// Broken: the reason, and the number of bytes to discard.
     Broken(String, usize),
     /// No picture begins here.
     None,
 }
 
 impl Splitter {
-    /// Adds what was read.
+    /// Appends received bytes.
     pub(crate) fn push(&mut self, bytes: &[u8]) {
         self.buffer.extend_from_slice(bytes);
     }
 
-    /// The next picture that is whole, still encoded; `None` until more is pushed.
+    /// The next complete picture, still encoded; `None` until more is pushed.
     ///
     /// # Errors
-    /// In words, what was found instead of a whole picture; the next call goes on behind it.
+    /// Text that describes the data found in place of a complete picture; the next call continues after it.
     pub(crate) fn next_picture(&mut self) -> Option<Result<Vec<u8>, String>> {
         loop {
             match self.extent() {
@@ -49,7 +49,7 @@ impl Splitter {
                         return self.take_garbage().map(Err);
                     }
                 }
-                // Whether the garbage has ended is not known before the next bytes.
+                // The end of the garbage is unknown before the next bytes.
                 Extent::NotYet if self.buffer.len() < PNG_START.len() => return None,
                 _ if self.garbage_bytes > 0 => return self.take_garbage().map(Err),
                 Extent::NotYet => return None,
@@ -67,7 +67,7 @@ impl Splitter {
         }
     }
 
-    /// At the stream's end: what is left of a picture.
+    /// At the end of the stream: a description of the incomplete picture, if any.
     pub(crate) fn rest(&mut self) -> Option<String> {
         match self.buffer.len() {
             0 => self.take_garbage(),
@@ -84,7 +84,7 @@ impl Splitter {
                 JpegEnd::At(end) => Extent::Ends(end),
                 JpegEnd::NotYet => Extent::NotYet,
                 JpegEnd::Broken(at) => {
-                    // Cut within a segment, it has swallowed the beginning of the next.
+                    // A JPEG cut within a segment has swallowed the beginning of the next one.
                     let next = bytes[2..].windows(JPEG_START.len()).position(|start| start == JPEG_START);
                     let next = next.map_or(at, |next| at.min(next + 2));
                     Extent::Broken(format!("a JPEG that breaks off after {next} bytes"), next.max(1))
@@ -107,7 +107,7 @@ impl Splitter {
         }
     }
 
-    /// Throws away bytes up to one that may begin a picture. Blanks and zeros between pictures are usual and do not count.
+    /// Discards bytes up to one that may begin a picture. Blanks and zeros between pictures are common and not counted.
     fn skip_garbage(&mut self) {
         let begin = (1..self.buffer.len()).find(|&at| may_begin_picture(&self.buffer[at..]));
         let skipped = begin.unwrap_or(self.buffer.len());
@@ -123,7 +123,7 @@ impl Splitter {
     }
 }
 
-/// Whether the bytes, or what may still follow them, can be a picture.
+/// Whether the bytes, with any continuation, can be a picture.
 fn may_begin_picture(bytes: &[u8]) -> bool {
     let begins = |start: &[u8]| bytes.iter().zip(start).all(|(found, expected)| found == expected);
     let is_ppm = || begins(b"P6") && bytes.get(2).is_none_or(|blank| blank.is_ascii_whitespace() || *blank == b'#');
@@ -159,7 +159,7 @@ mod tests {
         png
     }
 
-    /// All that comes out when the stream arrives in pieces of that size.
+    /// All results if the stream arrives in pieces of `piece` bytes.
     fn split(stream: &[u8], piece: usize) -> (Vec<Result<Vec<u8>, String>>, Option<String>) {
         let mut splitter = Splitter::default();
         let mut found = Vec::new();
@@ -173,7 +173,7 @@ mod tests {
     #[test]
     fn pictures_of_three_kinds_come_out_whole_in_any_pieces() {
         let jpeg = crate::decode::tests::jpeg(20, 10);
-        // Pixels that look like beginnings of pictures.
+        // Pixels that look like the beginnings of pictures.
         let ppm = [b"P6\n3 2\n255\n".as_slice(), b"P6P6\xff\xd8\xff\xd9 P6 \x89P6 P6"].concat();
         let stream = [&jpeg, &ppm, &png(), b"\n\n\0\0".as_slice(), &jpeg, &jpeg, &png()].concat();
         for piece in [1, 2, 3, 11, 1000, stream.len()] {

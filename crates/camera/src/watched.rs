@@ -1,4 +1,4 @@
-//! Faults that only the pictures show: frozen, black, another size.
+//! Faults that are detected in the pictures: frozen, black, another size.
 
 use image::RgbImage;
 
@@ -6,22 +6,22 @@ use crate::error::CameraError;
 use crate::fault::Fault;
 use crate::frame::{Camera, Frame};
 
-/// A channel up to this is near 0: the compression of a black picture leaves some steps.
+/// Maximum value of a channel that counts as black: compression of a black picture leaves small values.
 const NEAR_BLACK: u8 = 24;
-/// One in so many channels may be brighter in a black picture: a sensor has single bright pixels.
+/// One in this many channels may be brighter in a black picture: a sensor has single bright pixels.
 const MAX_BRIGHT_SHARE: usize = 1000;
 
-/// Adds what is wrong with a camera's pictures to [`Frame::faults`].
+/// Adds the faults of a camera's pictures to [`Frame::faults`].
 pub struct Watched<C> {
     camera: C,
-    /// `None` where equal pictures are usual, as with files.
+    /// `None` if equal pictures are normal, as with files.
     frozen_frames: Option<u32>,
     last: Option<RgbImage>,
     num_equal: u32,
 }
 
 impl<C: Camera> Watched<C> {
-    /// Watches a camera. So many frames in a row with the same bits are a fault; with `None` they are not, as for files.
+    /// Watches a camera. `frozen_frames` bit-identical frames in a row are a fault; `None` disables this, as for files.
     pub fn new(camera: C, frozen_frames: Option<u32>) -> Self {
         Self { camera, frozen_frames, last: None, num_equal: 0 }
     }
@@ -62,7 +62,7 @@ impl<C: Camera> Camera for Watched<C> {
 fn is_black(picture: &RgbImage) -> bool {
     let bytes = picture.as_raw();
     let limit = bytes.len() / MAX_BRIGHT_SHARE;
-    // All but black pictures are decided by their first pixels.
+    // Except for black pictures, the first pixels decide.
     bytes.iter().filter(|&&byte| byte > NEAR_BLACK).take(limit + 1).count() <= limit
 }
 
@@ -80,7 +80,7 @@ mod tests {
         }
     }
 
-    /// The names of the faults of each picture.
+    /// The faults of each picture.
     fn faults(pictures: Vec<RgbImage>, frozen_frames: Option<u32>) -> Vec<Vec<Fault>> {
         let mut camera = Watched::new(Pictures(pictures.into_iter()), frozen_frames);
         std::iter::from_fn(|| camera.next_frame().unwrap()).map(|frame| frame.faults).collect()
@@ -107,7 +107,7 @@ mod tests {
         hot.put_pixel(3, 3, Rgb([255; 3]));
         let mut lit = hot.clone();
         lit.put_pixel(4, 3, Rgb([255; 3]));
-        // 40 × 25 pixels have 3000 channels: 3 may be bright.
+        // 40 × 25 pixels have 3000 channels, of which 3 may be bright.
         assert_eq!(faults(vec![hot, lit, grey(NEAR_BLACK + 1)], None), [vec![Fault::Black], vec![], vec![]]);
     }
 

@@ -1,12 +1,12 @@
-//! YUYV and padded rows to RGB.
+//! Conversion of YUYV and padded rows to RGB.
 
 use image::RgbImage;
 
-/// Rows of YUYV (4:2:2: two pixels share their colour) to RGB. Luma 16 to 235 and BT.601's matrix, as the USB video class has it
-/// where a camera says nothing else; in integers, at most one step off.
+/// Converts rows of YUYV (4:2:2: two pixels share their chroma) to RGB. Luma 16 to 235 and BT.601's matrix, the default
+/// of the USB video class; integer arithmetic, at most one step of error.
 ///
 /// # Errors
-/// In words, what is found where there are fewer bytes than the rows need.
+/// Text with the number of bytes found, if there are fewer than the rows need.
 pub fn yuyv_to_rgb(bytes: &[u8], width: u32, height: u32, bytes_per_row: usize) -> Result<RgbImage, String> {
     if width == 0 || width % 2 == 1 {
         return Err(format!("an odd width of {width} pixels"));
@@ -28,7 +28,7 @@ pub fn yuyv_to_rgb(bytes: &[u8], width: u32, height: u32, bytes_per_row: usize) 
     RgbImage::from_raw(width, height, pixels).ok_or_else(|| format!("{width} × {height} pixels"))
 }
 
-/// Rows of RGB24 that may be padded.
+/// Converts rows of RGB24, which may be padded.
 ///
 /// # Errors
 /// As [`yuyv_to_rgb`].
@@ -52,7 +52,7 @@ fn rows(bytes: &[u8], used: usize, height: u32, bytes_per_row: usize) -> Result<
 mod tests {
     use super::*;
 
-    /// BT.601's colour bars at 100 %: (Y, U, V) of the standard, and the RGB that they stand for.
+    /// BT.601's colour bars at 100 %: (Y, U, V) of the standard, and the corresponding RGB.
     const BARS: [([u8; 3], [u8; 3]); 8] = [
         ([235, 128, 128], [255, 255, 255]),
         ([210, 16, 146], [255, 255, 0]),
@@ -64,7 +64,7 @@ mod tests {
         ([16, 128, 128], [0, 0, 0]),
     ];
 
-    /// The standard's own bars are rounded to whole steps of YUV, which are up to two steps of RGB.
+    /// The standard's bars are rounded to whole steps of YUV, which are up to two steps of RGB.
     const ROUNDING: i32 = 2;
 
     #[test]
@@ -76,7 +76,7 @@ mod tests {
                 assert!(differs <= ROUNDING, "{pixel:?} for {expected:?}");
             }
         }
-        // By hand: 298 × (126 − 16) + 128 = 32908; / 256 = 128.
+        // Calculated by hand: 298 × (126 − 16) + 128 = 32908; / 256 = 128.
         assert_eq!(yuyv_to_rgb(&[126, 128, 126, 128], 2, 1, 4).unwrap().into_raw(), [128; 6]);
     }
 
@@ -85,7 +85,7 @@ mod tests {
         let row = [81, 90, 16, 240, 9, 9];
         let picture = yuyv_to_rgb(&[row, row].concat(), 2, 2, 6).unwrap();
         assert_eq!(picture.get_pixel(0, 1).0, [255, 0, 0]);
-        // By hand, with luma 0: red 409 × 112 + 128 = 45936; / 256 = 179.
+        // Calculated by hand, with luma 0: red 409 × 112 + 128 = 45936; / 256 = 179.
         assert_eq!(picture.get_pixel(1, 0).0, [179, 0, 0]);
         let padded = rgb24_to_rgb(&[1, 2, 3, 0, 4, 5, 6], 1, 2, 4).unwrap();
         assert_eq!(padded.into_raw(), [1, 2, 3, 4, 5, 6]);

@@ -1,4 +1,5 @@
-//! Servers of motion JPEG and snapshots that stall, cut, send garbage, redirect and flood: each is survived, told, and recovered from.
+//! Servers of motion JPEG and snapshots that stall, cut, send garbage, redirect and flood: the client survives, reports
+//! the fault, and recovers.
 
 use std::io::Write;
 use std::net::TcpStream;
@@ -13,7 +14,7 @@ use support::{Script, Server, jpeg, level_of, open, part};
 
 const OK: &str = "HTTP/1.1 200 OK\r\nContent-Type: multipart/x-mixed-replace; boundary=cut\r\n\r\n";
 
-/// A server that works: three pictures of level 200, then nothing more.
+/// A server that works: three pictures of level 200, then silence.
 fn recover(stream: &mut TcpStream) {
     let _ = stream.write_all(OK.as_bytes());
     for _ in 0..3 {
@@ -23,7 +24,7 @@ fn recover(stream: &mut TcpStream) {
     sleep(Duration::from_secs(20));
 }
 
-/// The faults until a picture of the level comes, and that picture's.
+/// The faults until a picture of this level arrives, and that picture's faults.
 fn faults_until(camera: &mut dyn Camera, level: u8) -> Vec<Fault> {
     let mut faults = Vec::new();
     let start = Instant::now();
@@ -46,7 +47,7 @@ fn faults_until(camera: &mut dyn Camera, level: u8) -> Vec<Fault> {
     }
 }
 
-/// A first connection that does what `script` does after one good picture; the next one recovers.
+/// The faults of a connection that runs `script` after one good picture; the next connection recovers.
 fn faults_of(script: impl Fn(&mut TcpStream) + Send + Sync + 'static) -> Vec<Fault> {
     let first: Script = Box::new(move |stream| {
         let _ = stream.write_all(OK.as_bytes());
@@ -107,7 +108,7 @@ fn a_torn_picture_is_not_delivered_and_the_next_one_is() {
     let torn = [b"--cut\r\n\r\n".as_slice(), &picture[..picture.len() / 2], b"\r\n"].concat();
     let faults = faults_of(move |stream| {
         stream.write_all(&[torn.as_slice(), b"--cut\r\n"].concat()).unwrap();
-        // Of two that are there at once, the older one is passed over.
+        // Of two available pictures, the older one is skipped.
         sleep(Duration::from_millis(100));
         stream.write_all(&part(150, false)).unwrap();
         stream.write_all(b"--cut\r\n").unwrap();
@@ -126,7 +127,7 @@ fn garbage_is_told() {
         matches!(&faults[0], Fault::Torn { found } if found.contains("expected a PNG, JPEG, WebP, BMP or TIFF")),
         "{faults:?}"
     );
-    // No boundary any more: nothing is kept, and silence is told.
+    // Without any further boundary, nothing is kept and the silence is reported.
     let faults = faults_of(|stream| while stream.write_all(&[0x55; 1 << 16]).is_ok() {});
     assert!(matches!(faults[0], Fault::Stale { .. }), "{faults:?}");
 }
@@ -175,13 +176,13 @@ fn of_a_flood_the_newest_picture_is_given_and_the_numbers_show_the_gap() {
     loop {
         let frame = camera.next_frame().unwrap().unwrap();
         num_frames += 1;
-        // Whatever was passed over is counted: picture n has level 2 n.
+        // All skipped pictures are counted: picture n has level 2 n.
         assert!(u64::from(level_of(&frame)).abs_diff(2 * frame.number) < 5, "{frame:?} {}", level_of(&frame));
         if frame.number == 99 {
             break;
         }
     }
-    // All came long ago, so that one is enough; a machine that is busy elsewhere may take some more.
+    // All pictures have arrived long ago, so one read is enough; a busy machine may need some more.
     assert!(num_frames < 20, "{num_frames} of 100");
 }
 
@@ -274,7 +275,8 @@ fn a_server_that_went_away_comes_back() {
     assert!(matches!(faults.last(), Some(Fault::Back { away_secs }) if *away_secs > 0.5), "{faults:?}");
 }
 
-/// A camera of single pictures that asks who asks; the requests with an answer to that, and how many had none.
+/// A camera of single pictures that requires authentication; also returns the authenticated requests, and the number of
+/// others.
 fn locked_server(challenges: &'static str) -> (Server, Arc<Mutex<Vec<String>>>, Arc<AtomicUsize>) {
     let asked = Arc::new(Mutex::new(Vec::new()));
     let refused = Arc::new(AtomicUsize::new(0));
@@ -312,7 +314,7 @@ fn snapshots_are_fetched_again_and_again_with_the_password() {
         // Base64 of me:secret.
         assert!(request.contains("Authorization: Basic bWU6c2VjcmV0\r\n"), "{request}");
     }
-    // Once who asks is known, it is said with each request.
+    // After the first challenge, each request is authenticated.
     assert_eq!(refused.load(Ordering::SeqCst), 1);
 }
 

@@ -53,7 +53,7 @@ fn jpeg_png_and_ppm_streams_come_in_order_and_end() {
         let found = levels(open(&format!("cat '{}'", path.display())).as_mut());
         let close = found.iter().zip([40, 80, 120]).all(|((_, level), expected)| level.abs_diff(expected) < 3);
         assert!(close && found.iter().map(|(number, _)| *number).eq(0..3), "{name}: {found:?}");
-        // No program that reads faster than pictures come: a byte at a time.
+        // The program is slower than the reader: one byte at a time.
         let slow = format!("sh -c 'dd bs=1 if=\"{}\" 2>/dev/null'", path.display());
         assert_eq!(levels(open(&slow).as_mut()), found, "{name}");
     }
@@ -111,7 +111,7 @@ fn the_program_ends_with_its_camera() {
     let folder = tempfile::tempdir().unwrap();
     let id_file = folder.path().join("id");
     let start = Instant::now();
-    // `exec`: what is killed is the sleeping program itself.
+    // `exec`: the killed process is the sleeping program itself.
     let mut camera = open(&format!("sh -c 'echo $$ > \"{}\"; exec sleep 60'", id_file.display()));
     assert!(matches!(camera.next_frame().unwrap_err().fault(), Some(Fault::Stale { .. })));
     let id = fs::read_to_string(&id_file).unwrap().trim().to_owned();
@@ -124,7 +124,7 @@ fn the_program_ends_with_its_camera() {
 
 #[test]
 fn the_newest_frame_of_a_fast_program_is_at_hand() {
-    // Without an end: `yes` repeats its line, which is a picture of 1 × 1 pixel (the line feed is its third byte).
+    // An endless stream: `yes` repeats its line, which is a picture of 1 × 1 pixel (the line feed is its third byte).
     let mut latest = LatestFrame::spawn(open("yes 'P6 1 1 255 ab'"));
     let first = latest.next_frame().unwrap().unwrap();
     std::thread::sleep(Duration::from_millis(200));

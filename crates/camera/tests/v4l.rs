@@ -1,6 +1,7 @@
 //! Cameras of Video4Linux 2, read through real drivers: `make test-v4l` boots a kernel with them in QEMU.
 //!
-//! [`UsbCamera`] is a webcam that the test itself plays; `uvcvideo`, the driver of all webcams, does not know the difference. `vivid` is the kernel's own test camera; it draws eight colour bars, which show whether pixels are what they should be.
+//! [`UsbCamera`] is a webcam simulated by the test; `uvcvideo`, the driver of all webcams, cannot distinguish it from a
+//! real one. `vivid` is the kernel's test camera; it draws eight colour bars, which verify the pixels.
 
 use std::time::{Duration, Instant};
 
@@ -15,7 +16,7 @@ use usb_camera::UsbCamera;
 /// vivid's bars from left to right at 75 % (ITU-R BT.801): white, yellow, cyan, green, magenta, red, blue, black.
 const BARS: [[u8; 3]; 8] =
     [[191, 191, 191], [191, 191, 0], [0, 191, 191], [0, 191, 0], [191, 0, 191], [191, 0, 0], [0, 0, 191], [0, 0, 0]];
-/// YUV in whole steps, there and back.
+/// Error of conversion to YUV in whole steps and back.
 const MAX_ERROR: u8 = 4;
 
 fn vivid() -> Node {
@@ -58,7 +59,7 @@ fn assert_bars(frame: &Frame) {
     assert!(worst <= MAX_ERROR, "off by {worst}: expected {BARS:?}, found {found:?}");
 }
 
-/// Reads frames, all of which must be whole and of the size; prints the rate.
+/// Reads frames, checks that all are complete and of this size, and prints the rate.
 fn read(camera: &mut dyn Camera, size: (u32, u32), count: u32) -> Vec<Frame> {
     let start = Instant::now();
     let frames: Vec<_> = (0..count).map(|_| camera.next_frame().unwrap().unwrap()).collect();
@@ -69,7 +70,7 @@ fn read(camera: &mut dyn Camera, size: (u32, u32), count: u32) -> Vec<Frame> {
     frames
 }
 
-/// Presses one of vivid's buttons, or sets a switch, from a second opening of the node.
+/// Presses one of vivid's buttons, or sets a switch, through a second file descriptor of the node.
 fn inject(name: &str) {
     let mut device = Device::open(vivid().path).unwrap();
     let control =
@@ -86,7 +87,7 @@ fn nodes_tell_their_formats_and_sizes() {
         let format = node.formats.iter().find(|format| format.encoding == Some(encoding)).unwrap();
         let Sizes::Listed(sizes) = &format.sizes else { panic!("vivid's webcam lists its sizes") };
         assert!(sizes.contains(&(640, 480)) && sizes.contains(&(1280, 720)), "{sizes:?}");
-        // By vivid's own table: the larger, the slower.
+        // As in vivid's table: larger frames have lower rates.
         let fps_of = |size| format.max_fps[sizes.iter().position(|listed| *listed == size).unwrap()];
         assert_eq!([fps_of((640, 480)), fps_of((1280, 720))], [25.0, 12.5], "{:?}", format.max_fps);
     }
@@ -96,7 +97,7 @@ fn nodes_tell_their_formats_and_sizes() {
 #[test]
 #[ignore = "needs vivid: make test-v4l"]
 fn yuyv_and_rgb_frames_have_the_bars_colours_and_the_format_can_change() {
-    // By the driver's formats, by the name and by the path.
+    // Opened by the driver's formats, by the name and by the path.
     let path = format!("v4l:{}", vivid().path.display());
     let changes = [
         ("v4l:vivid", 640, 480, Encoding::Yuyv),
@@ -131,7 +132,7 @@ fn frames_are_new_however_long_nobody_read() {
     let mut camera = try_open("v4l:vivid", &options(640, 480, Encoding::Yuyv)).unwrap();
     let first = read(camera.as_mut(), (640, 480), 3).pop().unwrap();
     std::thread::sleep(Duration::from_secs(1));
-    // The buffers were filled at once and are a second old; they are thrown away.
+    // The buffers were filled at once and are a second old; they are discarded.
     let second = camera.next_frame().unwrap().unwrap();
     assert!(second.number > first.number + 1, "{} after {}", second.number, first.number);
 }
@@ -171,7 +172,7 @@ fn a_camera_that_is_unplugged_comes_back() {
     inject("Disconnect");
     let gone = (0..10).find_map(|_| camera.next_frame().err()).expect("the device is gone");
     assert!(matches!(gone.fault(), Some(Fault::Gone { .. })), "{gone}");
-    // vivid plugs itself in again when the last program has closed it.
+    // vivid reconnects itself when the last program has closed it.
     let frame = (0..20).find_map(|_| camera.next_frame().ok()).expect("it comes back").unwrap();
     assert!(matches!(frame.faults[..], [Fault::Back { .. }]), "{:?}", frame.faults);
     assert_bars(&frame);
@@ -190,7 +191,7 @@ fn what_the_camera_does_not_have_is_refused() {
     assert!(error.contains("vivid"), "what there is, is named: {error}");
 }
 
-/// What a webcam of this test is opened with.
+/// Options for this test's webcam.
 fn webcam_options(width: u32, height: u32) -> OpenOptions {
     OpenOptions { width, height, stall_timeout: Duration::from_secs(2), ..OpenOptions::default() }
 }

@@ -1,3 +1,3 @@
-//! What is linked into libsdg.so: all of `sdg-capi`.
+//! Links all of `sdg-capi` into libsdg.so.
 
 pub use sdg_capi::*;

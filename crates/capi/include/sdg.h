@@ -3,14 +3,14 @@
  * Written by a test from crates/capi/src: change those, then run it with SDG_WRITE_HEADER=1.
  *
  * Handles. Models, cameras and detections are numbers; each is freed once, with sdg_free, in any order. A handle that was freed, or
- * is of another object, is SDG_ERROR_HANDLE and does no harm. What must be true: pointers are NULL or point to what a function says.
+ * is of another kind of object, gives SDG_ERROR_HANDLE. Requirement: pointers are NULL or point to the memory that a function describes.
  *
- * Threads. Every function may be called from any thread at any time, and handles may be shared. A detection computes on as many threads
- * as there are cores, or as sdg_options.threads says; all callers without such a number share theirs. sdg_last_error is the calling
- * thread's own. A process that is forked after a detection or a teaching must call exec, or gets SDG_ERROR_FORKED.
+ * Threads. Every function may be called from any thread at any time, and handles may be shared. A detection uses one thread per core,
+ * or sdg_options.threads; callers that do not set a number share their threads. sdg_last_error is per
+ * thread. A process that is forked after a detection or a teaching must call exec, otherwise it gets SDG_ERROR_FORKED.
  *
- * Errors. Every function but sdg_abi_version and sdg_last_error gives SDG_OK or the kind of an error; results are written with SDG_OK
- * alone. Nothing is thrown, and no panic crosses the border.
+ * Errors. Every function but sdg_abi_version and sdg_last_error returns SDG_OK or the kind of an error; results are written with
+ * SDG_OK only. No exception is thrown, and no panic leaves the library.
  */
 #ifndef SDG_H
 #define SDG_H
@@ -22,70 +22,71 @@
 extern "C" {
 #endif
 
-/* Version of this header's functions and structures; the number in the shared library's name. A library refuses structures of another. */
+/* Version of this header's functions and structures, and number in the shared library's name. The library rejects
+ * structures of another version. */
 #define SDG_ABI_VERSION 1u
 
-/* A model, a camera, or the detections of a picture: a number that is given once and never again. 0 is none. */
+/* A model, a camera, or the detections of a picture: a number that is never reused. 0 is no object. */
 typedef uint64_t sdg_handle;
 
-/* SDG_OK or the kind of an error, whose text sdg_last_error gives. */
+/* SDG_OK or the kind of an error; sdg_last_error gives the text. */
 typedef int32_t sdg_status;
 
 /* No error. */
 #define SDG_OK 0
 
-/* A value that a function does not take. */
+/* A value that a function does not accept. */
 #define SDG_ERROR_ARGUMENT 1
 
-/* A file that is not there, or that cannot be read or written. */
+/* A file that does not exist, or cannot be read or written. */
 #define SDG_ERROR_FILE 2
 
-/* A file that is no grasp model, a damaged one, or one of another version. */
+/* A file that is not a grasp model, is damaged, or has another version. */
 #define SDG_ERROR_MODEL_FILE 3
 
-/* A picture's bits, size, channels or rows. */
+/* Invalid bit depth, size, channels or rows of a picture. */
 #define SDG_ERROR_PICTURE 4
 
-/* A camera's file; a camera given to a model that was taught without. */
+/* An invalid camera file; or a camera for a model that was taught without one. */
 #define SDG_ERROR_CAMERA 5
 
-/* A region that does not lie in the picture. */
+/* A region that is not inside the picture. */
 #define SDG_ERROR_REGION 6
 
-/* A photo and marks that nothing can be taught from. */
+/* A photo or marks unsuitable for teaching. */
 #define SDG_ERROR_TEACHING 7
 
-/* No part in the picture; from sdg_detections_best alone. */
+/* No part in the picture; only from sdg_detections_best. */
 #define SDG_ERROR_NOTHING_TO_GRASP 8
 
-/* A handle that was freed, that was never given, or that is of another object. */
+/* A handle that was freed, that never existed, or that is of another kind of object. */
 #define SDG_ERROR_HANDLE 9
 
-/* A program that was compiled with the header of another ABI version. */
+/* The program was compiled with a header of another ABI version. */
 #define SDG_ERROR_VERSION 10
 
-/* A fault of this library. */
+/* An internal error of this library. */
 #define SDG_ERROR_INTERNAL 11
 
-/* A process that was forked after its parent had detected or taught. */
+/* The process was forked after its parent had detected or taught. */
 #define SDG_ERROR_FORKED 12
 
-/* sdg_picture.order: red first. Of no meaning for grey. */
+/* sdg_picture.order: red first. Ignored for grey. */
 #define SDG_RGB 0u
 
 /* sdg_picture.order: blue first, as in OpenCV's Mat. */
 #define SDG_BGR 1u
 
-/* sdg_options.region_kind: the region that the model was taught with; all of the picture where it has none. */
+/* sdg_options.region_kind: the region that the model was taught with; the whole picture if it has none. */
 #define SDG_REGION_OF_MODEL 0u
 
-/* sdg_options.region_kind: all of the picture. */
+/* sdg_options.region_kind: the whole picture. */
 #define SDG_REGION_ALL 1u
 
 /* sdg_options.region_kind: the numbers of sdg_options.region. */
 #define SDG_REGION_PART 2u
 
-/* sdg_detection.frame: without a camera; all numbers of the pose are 0. */
+/* sdg_detection.frame: no camera; all numbers of the pose are 0. */
 #define SDG_FRAME_NONE 0u
 
 /* sdg_detection.frame: the table, z up. */
@@ -94,7 +95,7 @@ typedef int32_t sdg_status;
 /* sdg_detection.frame: the robot's base. */
 #define SDG_FRAME_BASE 2u
 
-/* sdg_detection.turn_source: a source that this header does not know. */
+/* sdg_detection.turn_source: a source unknown to this header. */
 #define SDG_TURN_OTHER 0u
 
 /* sdg_detection.turn_source: the network's class of the box's crop (model A). */
@@ -109,42 +110,43 @@ typedef int32_t sdg_status;
 /* sdg_detection.turn_source: the mask's outline (model D). */
 #define SDG_TURN_OUTLINE 4u
 
-/* sdg_detection.turn_source: every turn was tried (model S). */
+/* sdg_detection.turn_source: search over all turns (model S). */
 #define SDG_TURN_SEARCH 5u
 
-/* sdg_teaching.symmetry: the part looks the same at every turn. */
+/* sdg_teaching.symmetry: the part looks the same in every turn. */
 #define SDG_SYMMETRY_FULL 4294967295u
 
 /* Bytes of sdg_detection.refused. */
 #define SDG_REFUSED_BYTES 128u
 
-/* A picture of the caller's, read during the call alone. The upper row is the first, the left pixel of a row is the first. */
+/* A picture of the caller, read only during the call. The first row is at the top, and the first pixel of a row at the
+ * left. */
 typedef struct {
     /* SDG_ABI_VERSION. */
     uint32_t abi_version;
-    /* Pixels of a row. */
+    /* Width in pixels. */
     uint32_t width;
-    /* Number of rows. */
+    /* Height: number of rows. */
     uint32_t height;
-    /* Bytes of a pixel: 3, or 1 for grey. */
+    /* Bytes per pixel: 3, or 1 for grey. */
     uint32_t channels;
-    /* Bits of a channel: 8. */
+    /* Bits per channel: 8. */
     uint32_t bits_per_channel;
     /* SDG_RGB or SDG_BGR. */
     uint32_t order;
     /* Bytes from the start of a row to the start of the next; at least width * channels. */
     size_t row_bytes;
-    /* Bytes that may be read from pixels on. */
+    /* Number of bytes readable from pixels on. */
     size_t num_bytes;
     /* First byte of the first row. */
     const uint8_t *pixels;
 } sdg_picture;
 
-/* How a picture is searched. NULL in its place is the same as all numbers 0 but abi_version. */
+/* Search options. NULL is equivalent to all numbers 0 except abi_version. */
 typedef struct {
     /* SDG_ABI_VERSION. */
     uint32_t abi_version;
-    /* Number of threads, at most 1024; 0 for as many as there are cores. It changes no digit of a result. */
+    /* Number of threads, at most 1024; 0 for one per core. The results do not depend on it. */
     uint32_t threads;
     /* The calibrated camera that took the picture, for poses in metres; 0 for none. */
     sdg_handle camera;
@@ -154,17 +156,18 @@ typedef struct {
     uint32_t region[4];
 } sdg_options;
 
-/* What a model is taught from. Numbers that are 0 and pointers that are NULL have the defaults of `sdg teach`. */
+/* Inputs of a teaching. Numbers that are 0 and pointers that are NULL select the defaults of `sdg teach`. */
 typedef struct {
     /* SDG_ABI_VERSION. */
     uint32_t abi_version;
-    /* Turns after which the part looks the same: 2 for half a turn, ..., SDG_SYMMETRY_FULL for a disc; 0 and 1 for none. */
+    /* Number of turns in which the part looks the same: 2 for half a turn, ..., SDG_SYMMETRY_FULL for a disc; 0 and 1
+     * for none. */
     uint32_t symmetry;
     /* File of the photo. */
     const char *photo;
-    /* File of the marks, LabelMe's or COCO's. */
+    /* File of the marks, in LabelMe or COCO format. */
     const char *marks;
-    /* The model's letter: "S" takes seconds; NULL is "C", whose network takes minutes. */
+    /* The model's letter: "S" takes seconds; NULL selects "C", whose network takes minutes. */
     const char *model;
     /* File of the calibrated camera that took the photo, for poses in metres; NULL for none. */
     const char *camera;
@@ -174,51 +177,51 @@ typedef struct {
     double grasp_height_m;
     /* Seed of the random numbers; 0 for 1, the default of `sdg teach`. */
     uint64_t seed;
-    /* Training steps of a network; 0 for the model's own number. */
+    /* Number of training steps of a network; 0 for the model's default. */
     uint64_t steps;
 } sdg_teaching;
 
-/* Contributions of each kind of evidence to the score, in log-odds. NaN: of a kind that was not asked. */
+/* Contributions of each kind of evidence to the score, in log-odds. NaN: not evaluated. */
 typedef struct {
     /* The network's proposals; NaN for models without one. */
     double network;
-    /* Edges of the photo that the picture has. */
+    /* Edges of the photo found in the picture. */
     double edges;
     /* Colours inside the outline. */
     double surface;
     /* Hue. */
     double hue;
-    /* Share of the part in regions that agree. */
+    /* Share of the part in agreeing regions. */
     double visible;
-    /* Size beside the expected one. */
+    /* Size compared with the expected one. */
     double size;
     /* Share of the part outside the picture. */
     double outside;
-    /* Resemblance to other things. */
+    /* Resemblance to other objects. */
     double resemblance;
-    /* Likeness to the photo by the comparing network. */
+    /* Likeness to the photo, by the comparison network. */
     double likeness;
-    /* Details by the network that knows look-alikes. */
+    /* Details, by the network trained on look-alikes. */
     double details;
-    /* Table where the part should be. */
+    /* Table at places where the part should be. */
     double table;
     /* Share of the outline without an edge. */
     double rim;
-    /* Edges that the photo does not have. */
+    /* Edges that are not in the photo. */
     double added;
-    /* How much better the mirror image fits. */
+    /* Advantage of the mirror image's fit. */
     double mirror;
 } sdg_evidence;
 
-/* A place where the part may lie. Pixels: x right, y down, the middle of the first pixel at (0.5, 0.5). */
+/* A candidate position of the part. Pixels: x right, y down, centre of the first pixel at (0.5, 0.5). */
 typedef struct {
-    /* From 0 to 1, calibrated: from 0.5 on it is accepted. */
+    /* Calibrated, from 0 to 1; accepted from 0.5. */
     double score;
-    /* The network's own score; NaN where no network was asked (model S). */
+    /* The network's own score; NaN without a network (model S). */
     double network_score;
-    /* How well the demonstration agrees with the picture, from 0 to 1. */
+    /* Agreement of the demonstration with the picture, from 0 to 1. */
     double agreement;
-    /* The part's size over its nominal size; NaN with a camera. */
+    /* The part's size relative to its nominal size; NaN with a camera. */
     double size;
     /* Left, upper, right and lower edge, in pixels. */
     double bounds[4];
@@ -232,75 +235,80 @@ typedef struct {
     double grasp_width_px;
     /* Grasp point in the frame, in metres. */
     double p_m[3];
-    /* Turn about the frame's z, right-handed. */
+    /* Rotation about the frame's z, right-handed. */
     double yaw_deg;
     /* Distance between the jaws for the part's width, in metres. */
     double opening_m;
-    /* The position lies within this with a probability of 68 %. */
+    /* The position is within this distance with a probability of 68 %. */
     double sigma_mm;
-    /* The turn lies within this with a probability of 68 %. */
+    /* The rotation is within this angle with a probability of 68 %. */
     double sigma_deg;
-    /* What the score is made of. */
+    /* The components of the score. */
     sdg_evidence evidence;
     /* SDG_FRAME_TABLE or SDG_FRAME_BASE with a camera, SDG_FRAME_NONE without. */
     uint32_t frame;
-    /* 1 where it is accepted, 0 where it is refused. */
+    /* 1 if it is accepted, 0 if it is refused. */
     uint32_t is_accepted;
-    /* SDG_TURN_CROP, ...: the first source of the turn. */
+    /* SDG_TURN_CROP, ...: the initial source of the turn. */
     uint32_t turn_source;
-    /* Corners of the outline; sdg_detections_polygon gives them. */
+    /* Number of corners of the outline; see sdg_detections_polygon. */
     uint32_t num_polygon;
-    /* Keypoints; sdg_detections_keypoints gives them. */
+    /* Number of keypoints; see sdg_detections_keypoints. */
     uint32_t num_keypoints;
-    /* Why it is refused, in UTF-8; empty where it is accepted. */
+    /* Why it is refused, in UTF-8; empty if it is accepted. */
     char refused[128];
 } sdg_detection;
 
 /* The library's SDG_ABI_VERSION. */
 uint32_t sdg_abi_version(void);
 
-/* To be called first with SDG_ABI_VERSION, the header's: SDG_ERROR_VERSION where the library has another. */
+/* Call this first, with SDG_ABI_VERSION of the header: SDG_ERROR_VERSION if the library has another version. */
 sdg_status sdg_check_abi(uint32_t abi_version);
 
-/* Copies the text of the calling thread's last error into buffer, in UTF-8, cut off where there is no room, always ended by a zero
- * byte. Gives the number of bytes of all of it with the zero byte. buffer may be NULL. The text stays until the thread's next error. */
+/* Copies the text of the calling thread's last error to buffer, in UTF-8, truncated if necessary and always
+ * zero-terminated. Returns the size of the complete text with its zero byte. buffer may be NULL. The text is valid
+ * until the thread's next error. */
 size_t sdg_last_error(char *buffer, size_t num_bytes);
 
 /* Reads the file of a grasp model. */
 sdg_status sdg_model_load(const char *file, sdg_handle *model);
 
-/* Writes a model's file, whole or not at all. It replaces a grasp model or nothing. */
+/* Writes a model's file atomically. It replaces only an existing grasp model. */
 sdg_status sdg_model_save(sdg_handle model, const char *file);
 
-/* Teaches a model as `sdg teach` does. It computes on all cores, for seconds or minutes. */
+/* Teaches a model like `sdg teach`, on all cores, which takes seconds or minutes. */
 sdg_status sdg_teach(const sdg_teaching *from, sdg_handle *model);
 
-/* Reads the file of a calibrated camera with its pose over the table, as `sdg camera calibrate` and `sdg camera table` write it. */
+/* Reads the file of a calibrated camera with its pose over the table, as written by `sdg camera calibrate` and `sdg
+ * camera table`. */
 sdg_status sdg_camera_load(const char *file, sdg_handle *camera);
 
-/* Finds the part in a picture, whose pixels are copied first. A picture without the part is no error here. options may be NULL. */
+/* Detects the part in a picture; its pixels are copied first. A picture without the part is not an error. options may
+ * be NULL. */
 sdg_status sdg_detect(sdg_handle model, const sdg_picture *picture, const sdg_options *options, sdg_handle *detections);
 
-/* The number of detections, the refused ones with them. */
+/* Gives the number of detections, including refused ones. */
 sdg_status sdg_detections_count(sdg_handle detections, size_t *count);
 
-/* A detection by its number, from 0; the best score first. */
+/* Gives the detection with an index, from 0, in order of decreasing score. */
 sdg_status sdg_detections_get(sdg_handle detections, size_t idx, sdg_detection *found);
 
-/* The best of the accepted detections; SDG_ERROR_NOTHING_TO_GRASP where there is none. */
+/* Gives the best accepted detection; SDG_ERROR_NOTHING_TO_GRASP if there is none. */
 sdg_status sdg_detections_best(sdg_handle detections, sdg_detection *found);
 
-/* Copies x and y of the outline's corners in pixels, at most max_points of the num_polygon that a detection has. */
+/* Copies x and y of the outline's corners in pixels, at most max_points of the detection's num_polygon. */
 sdg_status sdg_detections_polygon(sdg_handle detections, size_t idx, double *numbers, size_t max_points);
 
-/* Copies x and y in pixels and the network's score of the keypoints, at most max_points of the num_keypoints that a detection has. */
+/* Copies x and y in pixels and the network's score of each keypoint, at most max_points of the detection's
+ * num_keypoints. */
 sdg_status sdg_detections_keypoints(sdg_handle detections, size_t idx, double *numbers, size_t max_points);
 
-/* Copies all detections as the array of `sdg detect --json`, with every digit, into buffer as sdg_last_error does. The number of bytes of
- * all of it with the zero byte is written to needed, unless that is NULL. */
+/* Copies all detections to buffer like sdg_last_error, as the array of `sdg detect --json` with all digits. The size
+ * of the complete text with its zero byte is written to needed, unless that is NULL. */
 sdg_status sdg_detections_json(sdg_handle detections, char *buffer, size_t num_bytes, size_t *needed);
 
-/* Frees a model, a camera or detections. The handle is an error from then on; calls in other threads that began before still end well. */
+/* Frees a model, a camera or detections. The handle is invalid from then on; calls in other threads that began before
+ * complete normally. */
 sdg_status sdg_free(sdg_handle handle);
 
 #ifdef __cplusplus

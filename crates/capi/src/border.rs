@@ -1,4 +1,4 @@
-//! The border to C: statuses, the last error of a thread, panics caught, texts copied out.
+//! The boundary to C: status codes, the last error of each thread, caught panics, copied texts.
 
 use std::cell::RefCell;
 use std::ffi::{CStr, OsStr, c_char};
@@ -14,20 +14,20 @@ thread_local! {
     static LAST_ERROR: RefCell<String> = const { RefCell::new(String::new()) };
 }
 
-/// Does a call's work; an error or a panic becomes a status and the thread's last error.
+/// Runs the work of a call; an error or a panic becomes a status code and the thread's last error.
 pub fn status(work: impl FnOnce() -> Result<()>) -> sdg_status {
-    // Objects stand behind locks that a panic does not leave unusable; nothing else is shared.
+    // Objects are behind locks that a panic does not make unusable; no other state is shared.
     let (status, text) = match catch_unwind(AssertUnwindSafe(work)) {
         Ok(Ok(())) => return SDG_OK,
         Ok(Err(fault)) => (fault.kind as sdg_status, fault.text),
         Err(_) => (SDG_ERROR_INTERNAL, "a fault of libsdg, described on standard error; please report it".to_owned()),
     };
-    // Without effect in a thread that has ended but for its destructors.
+    // Has no effect in a thread that only runs its destructors.
     _ = LAST_ERROR.try_with(|last| *last.borrow_mut() = text);
     status
 }
 
-/// Copies the thread's last error out, as [`copy_text`].
+/// Copies the thread's last error to the buffer, as [`copy_text`].
 ///
 /// # Safety
 /// As [`copy_text`].
@@ -37,10 +37,11 @@ pub unsafe fn copy_last_error(buffer: *mut c_char, num_bytes: usize) -> usize {
     unsafe { copy_text(&text, buffer, num_bytes) }
 }
 
-/// Copies as much of a text as there is room for, ended by a zero byte; gives the number of bytes of all of it with the zero byte.
+/// Copies as much of a text as fits, terminated by a zero byte; returns the size of the complete text with its zero
+/// byte.
 ///
 /// # Safety
-/// `buffer` is null, or `num_bytes` may be written there.
+/// `buffer` is null or writable for `num_bytes`.
 pub unsafe fn copy_text(text: &str, buffer: *mut c_char, num_bytes: usize) -> usize {
     if !buffer.is_null() && num_bytes > 0 {
         let copied = text.floor_char_boundary(num_bytes - 1);
@@ -53,15 +54,15 @@ pub unsafe fn copy_text(text: &str, buffer: *mut c_char, num_bytes: usize) -> us
     text.len() + 1
 }
 
-/// An error for a pointer that is null.
+/// The error for a null pointer.
 pub fn null(name: &str) -> Fault {
     Fault::new(FaultKind::Argument, format!("expected a pointer as {name}, found NULL"))
 }
 
-/// A path of the caller's, which errors call by `name`.
+/// A path from the caller; errors call it `name`.
 ///
 /// # Safety
-/// `path` is null or ends with a zero byte, and is not written during the call.
+/// `path` is null or a zero-terminated string that is not changed during the call.
 pub unsafe fn path<'a>(path: *const c_char, name: &str) -> Result<&'a Path> {
     if path.is_null() {
         return Err(null(name));
@@ -71,7 +72,7 @@ pub unsafe fn path<'a>(path: *const c_char, name: &str) -> Result<&'a Path> {
     Ok(Path::new(OsStr::from_bytes(bytes)))
 }
 
-/// Checks that a program's structures are this library's.
+/// Checks that the caller's structures have the ABI version of this library.
 pub fn check_abi(of: &str, found: u32) -> Result<()> {
     if found == SDG_ABI_VERSION {
         return Ok(());

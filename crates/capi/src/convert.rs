@@ -1,4 +1,4 @@
-//! C's structures as the library's objects, and the library's records as C's structures.
+//! Conversion of C structures to the library's objects, and of the library's records to C structures.
 
 use std::path::PathBuf;
 use std::slice;
@@ -15,7 +15,7 @@ use crate::types::*;
 /// Checks a picture and copies its pixels.
 ///
 /// # Safety
-/// `num_bytes` may be read from `pixels` on, and are not written meanwhile.
+/// `pixels` is readable for `num_bytes`, which are not changed during the call.
 pub unsafe fn picture(picture: &sdg_picture) -> Result<RgbImage> {
     check_abi("sdg_picture", picture.abi_version)?;
     let fault = |text: String| Err(Fault::new(FaultKind::Picture, text));
@@ -40,7 +40,7 @@ pub unsafe fn picture(picture: &sdg_picture) -> Result<RgbImage> {
             "expected row_bytes of at least {row} for {width} pixels of {channels}, found {row_bytes}"
         ));
     }
-    // The last row may end with its pixels.
+    // The last row may have no padding.
     let needed = row_bytes.checked_mul(height - 1).and_then(|above| above.checked_add(row));
     if needed.is_none_or(|needed| needed > num_bytes) || num_bytes > isize::MAX as usize {
         return fault(format!("expected the bytes of {height} rows of {row_bytes}, found num_bytes of {num_bytes}"));
@@ -53,7 +53,7 @@ pub unsafe fn picture(picture: &sdg_picture) -> Result<RgbImage> {
     Ok(shape.copy(order, |row, column, channel| pixels[row * row_bytes + column * channels + channel]))
 }
 
-/// How a picture is searched.
+/// The search options for a picture.
 pub fn view(options: Option<&sdg_options>) -> Result<View> {
     let Some(options) = options else { return Ok(View::default()) };
     check_abi("sdg_options", options.abi_version)?;
@@ -70,15 +70,15 @@ pub fn view(options: Option<&sdg_options>) -> Result<View> {
     Ok(View { camera, region, threads: (options.threads > 0).then_some(options.threads as usize) })
 }
 
-/// Of `sdg teach` without `--seed`.
+/// The default of `sdg teach`.
 const DEFAULT_SEED: u64 = 1;
-/// More than any network is taught for.
+/// Maximum number of training steps.
 const MAX_STEPS: u64 = 1_000_000;
 
-/// What a model is taught from, and how.
+/// The inputs and options of a teaching.
 ///
 /// # Safety
-/// The pointers are null or texts that end with a zero byte.
+/// The pointers are null or zero-terminated strings.
 pub unsafe fn teaching(from: &sdg_teaching) -> Result<(Teaching, TeachOptions)> {
     check_abi("sdg_teaching", from.abi_version)?;
     let mut options = TeachOptions::new(if from.seed == 0 { DEFAULT_SEED } else { from.seed });
@@ -123,7 +123,7 @@ pub unsafe fn teaching(from: &sdg_teaching) -> Result<(Teaching, TeachOptions)> 
     Ok((Teaching { demonstrations, negatives: Vec::new(), camera }, options))
 }
 
-/// Metres over the table; millimetres in their place would be above these.
+/// Checks a height in metres over the table; a height given in millimetres would exceed the maximum.
 fn height(name: &str, height_m: f64) -> Result<f64> {
     const MAX_HEIGHT_M: f64 = 0.5;
     if (0.0..=MAX_HEIGHT_M).contains(&height_m) {
@@ -133,11 +133,11 @@ fn height(name: &str, height_m: f64) -> Result<f64> {
     Err(Fault::new(FaultKind::Argument, text))
 }
 
-/// The structure of a record; numbers that the record lacks are NaN.
+/// Converts a record; missing numbers are NaN.
 pub fn detection(record: &Record) -> sdg_detection {
     let found = &record.found.detection;
     let mut refused = [0; SDG_REFUSED_BYTES as usize];
-    // SAFETY: the buffer is as long as is said.
+    // SAFETY: the buffer has the length that is given.
     unsafe { copy_text(found.refused.unwrap_or_default(), refused.as_mut_ptr(), refused.len()) };
     let absent = f64::NAN;
     let pose = record.found.pose.as_ref();
@@ -197,10 +197,10 @@ fn evidence(found: Option<&Contributions>) -> sdg_evidence {
     }
 }
 
-/// Copies as many rows of numbers as there is room for.
+/// Copies as many rows of numbers as fit.
 ///
 /// # Safety
-/// `out` is null, or `max_rows` rows of `N` numbers may be written there.
+/// `out` is null or writable for `max_rows` rows of `N` numbers.
 pub unsafe fn copy_rows<const N: usize>(rows: &[[f64; N]], out: *mut f64, max_rows: usize) -> Result<()> {
     if out.is_null() {
         return Err(null("numbers"));
@@ -214,7 +214,7 @@ pub unsafe fn copy_rows<const N: usize>(rows: &[[f64; N]], out: *mut f64, max_ro
 /// Writes a result.
 ///
 /// # Safety
-/// `out` is null, or a value may be written there.
+/// `out` is null or writable for one value.
 pub unsafe fn write<T>(out: *mut T, name: &str, value: T) -> Result<()> {
     if out.is_null() {
         return Err(null(name));

@@ -1,4 +1,4 @@
-//! Functions of the header.
+//! The functions in the header.
 
 use std::ffi::c_char;
 use std::ops::ControlFlow;
@@ -17,17 +17,18 @@ pub extern "C" fn sdg_abi_version() -> u32 {
     SDG_ABI_VERSION
 }
 
-/// To be called first with SDG_ABI_VERSION, the header's: SDG_ERROR_VERSION where the library has another.
+/// Call this first, with SDG_ABI_VERSION of the header: SDG_ERROR_VERSION if the library has another version.
 #[unsafe(no_mangle)]
 pub extern "C" fn sdg_check_abi(abi_version: u32) -> sdg_status {
     status(|| check_abi("a program", abi_version))
 }
 
-/// Copies the text of the calling thread's last error into buffer, in UTF-8, cut off where there is no room, always ended by a zero
-/// byte. Gives the number of bytes of all of it with the zero byte. buffer may be NULL. The text stays until the thread's next error.
+/// Copies the text of the calling thread's last error to buffer, in UTF-8, truncated if necessary and always
+/// zero-terminated. Returns the size of the complete text with its zero byte. buffer may be NULL. The text is valid
+/// until the thread's next error.
 ///
 /// # Safety
-/// `buffer` is null, or `num_bytes` may be written there.
+/// `buffer` is null or writable for `num_bytes`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sdg_last_error(buffer: *mut c_char, num_bytes: usize) -> usize {
     // SAFETY: the caller promises the same.
@@ -37,27 +38,27 @@ pub unsafe extern "C" fn sdg_last_error(buffer: *mut c_char, num_bytes: usize) -
 /// Reads the file of a grasp model.
 ///
 /// # Safety
-/// `file` is null or ends with a zero byte; `model` is null, or a handle may be written there.
+/// `file` is null or zero-terminated; `model` is null or writable for a handle.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sdg_model_load(file: *const c_char, model: *mut sdg_handle) -> sdg_status {
     // SAFETY: the caller promises the same.
     status(|| unsafe { give(model, "model", || Ok(Object::Model(Arc::new(Model::read(path(file, "file")?)?)))) })
 }
 
-/// Writes a model's file, whole or not at all. It replaces a grasp model or nothing.
+/// Writes a model's file atomically. It replaces only an existing grasp model.
 ///
 /// # Safety
-/// `file` is null or ends with a zero byte.
+/// `file` is null or zero-terminated.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sdg_model_save(model: sdg_handle, file: *const c_char) -> sdg_status {
     // SAFETY: the caller promises the same.
     status(|| handles::model(model)?.write(unsafe { path(file, "file")? }))
 }
 
-/// Teaches a model as `sdg teach` does. It computes on all cores, for seconds or minutes.
+/// Teaches a model like `sdg teach`, on all cores, which takes seconds or minutes.
 ///
 /// # Safety
-/// `from` is null or has pointers that are null or texts that end with a zero byte; `model` is null, or a handle may be written there.
+/// `from` is null or has pointers that are null or zero-terminated strings; `model` is null or writable for a handle.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sdg_teach(from: *const sdg_teaching, model: *mut sdg_handle) -> sdg_status {
     let taught = || {
@@ -70,21 +71,23 @@ pub unsafe extern "C" fn sdg_teach(from: *const sdg_teaching, model: *mut sdg_ha
     status(|| unsafe { give(model, "model", taught) })
 }
 
-/// Reads the file of a calibrated camera with its pose over the table, as `sdg camera calibrate` and `sdg camera table` write it.
+/// Reads the file of a calibrated camera with its pose over the table, as written by `sdg camera calibrate` and `sdg
+/// camera table`.
 ///
 /// # Safety
-/// `file` is null or ends with a zero byte; `camera` is null, or a handle may be written there.
+/// `file` is null or zero-terminated; `camera` is null or writable for a handle.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sdg_camera_load(file: *const c_char, camera: *mut sdg_handle) -> sdg_status {
     // SAFETY: the caller promises the same.
     status(|| unsafe { give(camera, "camera", || Ok(Object::Camera(Camera::read(path(file, "file")?)?))) })
 }
 
-/// Finds the part in a picture, whose pixels are copied first. A picture without the part is no error here. options may be NULL.
+/// Detects the part in a picture; its pixels are copied first. A picture without the part is not an error. options may
+/// be NULL.
 ///
 /// # Safety
-/// `picture` is null or has a picture, of whose `pixels` `num_bytes` may be read and are not written during the call; `options` is null
-/// or has options; `detections` is null, or a handle may be written there.
+/// `picture` is null or has a picture whose `pixels` are readable for `num_bytes` and not changed during the call;
+/// `options` is null or has options; `detections` is null or writable for a handle.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sdg_detect(
     model: sdg_handle,
@@ -104,20 +107,20 @@ pub unsafe extern "C" fn sdg_detect(
     status(|| unsafe { give(detections, "detections", detected) })
 }
 
-/// The number of detections, the refused ones with them.
+/// Gives the number of detections, including refused ones.
 ///
 /// # Safety
-/// `count` is null, or a number may be written there.
+/// `count` is null or writable for a number.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sdg_detections_count(detections: sdg_handle, count: *mut usize) -> sdg_status {
     // SAFETY: the caller promises the same.
     status(|| unsafe { write(count, "count", handles::detections(detections)?.len()) })
 }
 
-/// A detection by its number, from 0; the best score first.
+/// Gives the detection with an index, from 0, in order of decreasing score.
 ///
 /// # Safety
-/// `found` is null, or a detection may be written there.
+/// `found` is null or writable for a detection.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sdg_detections_get(
     detections: sdg_handle,
@@ -128,20 +131,20 @@ pub unsafe extern "C" fn sdg_detections_get(
     status(|| with_record(detections, idx, |record| unsafe { write(found, "found", detection(record)) }))
 }
 
-/// The best of the accepted detections; SDG_ERROR_NOTHING_TO_GRASP where there is none.
+/// Gives the best accepted detection; SDG_ERROR_NOTHING_TO_GRASP if there is none.
 ///
 /// # Safety
-/// `found` is null, or a detection may be written there.
+/// `found` is null or writable for a detection.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sdg_detections_best(detections: sdg_handle, found: *mut sdg_detection) -> sdg_status {
     // SAFETY: the caller promises the same.
     status(|| unsafe { write(found, "found", detection(handles::detections(detections)?.best()?)) })
 }
 
-/// Copies x and y of the outline's corners in pixels, at most max_points of the num_polygon that a detection has.
+/// Copies x and y of the outline's corners in pixels, at most max_points of the detection's num_polygon.
 ///
 /// # Safety
-/// `numbers` is null, or `2 * max_points` numbers may be written there.
+/// `numbers` is null or writable for `2 * max_points` numbers.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sdg_detections_polygon(
     detections: sdg_handle,
@@ -158,10 +161,11 @@ pub unsafe extern "C" fn sdg_detections_polygon(
     })
 }
 
-/// Copies x and y in pixels and the network's score of the keypoints, at most max_points of the num_keypoints that a detection has.
+/// Copies x and y in pixels and the network's score of each keypoint, at most max_points of the detection's
+/// num_keypoints.
 ///
 /// # Safety
-/// `numbers` is null, or `3 * max_points` numbers may be written there.
+/// `numbers` is null or writable for `3 * max_points` numbers.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sdg_detections_keypoints(
     detections: sdg_handle,
@@ -177,11 +181,11 @@ pub unsafe extern "C" fn sdg_detections_keypoints(
     })
 }
 
-/// Copies all detections as the array of `sdg detect --json`, with every digit, into buffer as sdg_last_error does. The number of bytes of
-/// all of it with the zero byte is written to needed, unless that is NULL.
+/// Copies all detections to buffer like sdg_last_error, as the array of `sdg detect --json` with all digits. The size
+/// of the complete text with its zero byte is written to needed, unless that is NULL.
 ///
 /// # Safety
-/// `buffer` is null, or `num_bytes` may be written there; `needed` is null, or a number may be written there.
+/// `buffer` is null or writable for `num_bytes`; `needed` is null or writable for a number.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sdg_detections_json(
     detections: sdg_handle,
@@ -201,18 +205,19 @@ pub unsafe extern "C" fn sdg_detections_json(
     })
 }
 
-/// Frees a model, a camera or detections. The handle is an error from then on; calls in other threads that began before still end well.
+/// Frees a model, a camera or detections. The handle is invalid from then on; calls in other threads that began before
+/// complete normally.
 #[unsafe(no_mangle)]
 pub extern "C" fn sdg_free(handle: sdg_handle) -> sdg_status {
     status(|| handles::free(handle))
 }
 
-/// Makes an object and writes its handle.
+/// Creates an object and writes its handle.
 ///
 /// # Safety
-/// `out` is null, or a handle may be written there.
+/// `out` is null or writable for a handle.
 unsafe fn give(out: *mut sdg_handle, name: &str, make: impl FnOnce() -> Result<Object>) -> Result<()> {
-    // First: nothing would free an object whose handle cannot be written.
+    // Checked first: an object whose handle cannot be written would never be freed.
     if out.is_null() {
         return Err(null(name));
     }

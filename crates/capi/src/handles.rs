@@ -1,4 +1,4 @@
-//! Objects under numbers, each of which is given once in a process.
+//! Objects identified by numbers, each used only once per process.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -7,7 +7,7 @@ use sdg_bindings::{Camera, Detections, Fault, FaultKind, Model, Result};
 
 use crate::types::sdg_handle;
 
-/// The object of a handle. Another thread may free it during a call, which then still holds it.
+/// The object of a handle. If another thread frees it during a call, the call still holds it.
 #[derive(Debug, Clone)]
 pub enum Object {
     Model(Arc<Model>),
@@ -35,7 +35,7 @@ impl Object {
         }
     }
 
-    /// Keeps it; its handle.
+    /// Stores the object and returns its handle.
     pub fn keep(self) -> sdg_handle {
         with_table(|table| {
             table.last += 1;
@@ -45,7 +45,7 @@ impl Object {
     }
 }
 
-/// The object of a handle; `expected` is named in the error.
+/// The object of a handle; `expected` is the kind named in the error.
 fn object(handle: sdg_handle, expected: &str) -> Result<Object> {
     with_table(|table| match table.objects.as_ref().and_then(|objects| objects.get(&handle)) {
         Some(object) => Ok(object.clone()),
@@ -99,7 +99,7 @@ pub fn free(handle: sdg_handle) -> Result<()> {
         Some(object) => Ok(object),
         None => Err(table.unknown(handle, "an object")),
     })?;
-    // After the table's lock is released: a model takes a while.
+    // Dropped after the table's lock is released: freeing a model takes time.
     drop(freed);
     Ok(())
 }

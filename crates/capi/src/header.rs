@@ -1,10 +1,10 @@
-//! include/sdg.h as it follows from `types` and `functions`, so that no header says other than what the library exports.
+//! Generates include/sdg.h from `types` and `functions`, so that the header always agrees with the library.
 //!
-//! It knows the Rust that those two files are written in and no more; what it does not know it does not pass over.
+//! It parses only the Rust syntax used in those two files, and fails on anything else.
 
 use std::fmt::Write;
 
-/// C's type of a Rust type, with the name that it declares.
+/// The C declaration of a name with a Rust type.
 fn declaration(rust: &str, name: &str) -> String {
     let rust = rust.trim();
     if let Some(inner) = rust.strip_prefix("*const ") {
@@ -30,14 +30,14 @@ fn declaration(rust: &str, name: &str) -> String {
     format!("{c} {name}")
 }
 
-/// Documentation lines as a comment; what is about `unsafe` is Rust's alone.
+/// Converts documentation lines to a C comment, without the sections on `unsafe`.
 fn comment(docs: &[&str], indent: &str) -> String {
     let lines: Vec<&str> =
         docs.iter().copied().take_while(|line| *line != "# Safety").filter(|line| !line.is_empty()).collect();
     format!("{indent}/* {} */\n", lines.join(&format!("\n{indent} * ")))
 }
 
-/// The declarations of a source, in its order.
+/// The declarations of a source file, in order.
 fn declarations(source: &str) -> String {
     let mut header = String::new();
     let mut docs: Vec<&str> = Vec::new();
@@ -117,14 +117,14 @@ const HEAD: &str = "\
  * Written by a test from crates/capi/src: change those, then run it with SDG_WRITE_HEADER=1.
  *
  * Handles. Models, cameras and detections are numbers; each is freed once, with sdg_free, in any order. A handle that was freed, or
- * is of another object, is SDG_ERROR_HANDLE and does no harm. What must be true: pointers are NULL or point to what a function says.
+ * is of another kind of object, gives SDG_ERROR_HANDLE. Requirement: pointers are NULL or point to the memory that a function describes.
  *
- * Threads. Every function may be called from any thread at any time, and handles may be shared. A detection computes on as many threads
- * as there are cores, or as sdg_options.threads says; all callers without such a number share theirs. sdg_last_error is the calling
- * thread's own. A process that is forked after a detection or a teaching must call exec, or gets SDG_ERROR_FORKED.
+ * Threads. Every function may be called from any thread at any time, and handles may be shared. A detection uses one thread per core,
+ * or sdg_options.threads; callers that do not set a number share their threads. sdg_last_error is per
+ * thread. A process that is forked after a detection or a teaching must call exec, otherwise it gets SDG_ERROR_FORKED.
  *
- * Errors. Every function but sdg_abi_version and sdg_last_error gives SDG_OK or the kind of an error; results are written with SDG_OK
- * alone. Nothing is thrown, and no panic crosses the border.
+ * Errors. Every function but sdg_abi_version and sdg_last_error returns SDG_OK or the kind of an error; results are written with
+ * SDG_OK only. No exception is thrown, and no panic leaves the library.
  */
 #ifndef SDG_H
 #define SDG_H
@@ -157,7 +157,7 @@ fn the_header_says_what_the_library_exports() {
     let line = expected.lines().zip(found.lines()).find(|(expected, found)| expected != found);
     assert!(
         expected == found,
-        "include/sdg.h is not what the sources say, first at {line:?}: run this test with SDG_WRITE_HEADER=1"
+        "include/sdg.h differs from the sources, first at {line:?}: run this test with SDG_WRITE_HEADER=1"
     );
 }
 

@@ -1,4 +1,4 @@
-/* Wrong input: for each call its name, the status, and the text of the error. Usage: bad_input MODEL CAMERA DAMAGED PHOTO.ppm */
+/* Wrong input: prints the name, the status and the error text of each call. Usage: bad_input MODEL CAMERA DAMAGED PHOTO.ppm */
 #include <sdg.h>
 #include <stdio.h>
 #include <stdlib.h>

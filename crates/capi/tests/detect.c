@@ -1,5 +1,5 @@
-/* Every field of every detection, as JSON of the names of `sdg detect --json`, a line for each picture; then the line that the library
- * itself writes. Usage: detect MODEL CAMERA|- THREADS PICTURE.ppm... */
+/* Prints all fields of all detections as JSON with the names of `sdg detect --json`, one line per picture, each followed by the line
+ * that the library writes itself. Usage: detect MODEL CAMERA|- THREADS PICTURE.ppm... */
 #include <math.h>
 #include <sdg.h>
 #include <stdio.h>
@@ -17,7 +17,7 @@ static void check(sdg_status status) {
     }
 }
 
-/* 17 digits give back the very number. */
+/* 17 digits represent the number exactly. */
 static void number(const char *name, double value) {
     printf("\"%s\":%.17g,", name, value);
 }

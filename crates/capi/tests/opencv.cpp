@@ -1,5 +1,5 @@
-// OpenCV's Mat, which has blue first and rows longer than their pixels where it is a part of another, in two threads that share a model.
-// Prints the detections of each picture as the library writes them. Usage: opencv MODEL PICTURE.ppm...
+// OpenCV's Mat, with blue first and, for a part of another Mat, with padded rows, in two threads that share a model.
+// Prints the detections of each picture as written by the library. Usage: opencv MODEL PICTURE.ppm...
 #include <opencv2/core.hpp>
 #include <sdg.h>
 
@@ -76,7 +76,7 @@ int main(int argc, char **argv) {
         first.join();
         second.join();
         if (of_threads[0] != of_threads[1]) {
-            std::cerr << "expected the same of a part as of its copy, found " << of_threads[0] << " and " << of_threads[1] << '\n';
+            std::cerr << "expected equal detections for a part and its copy, found " << of_threads[0] << " and " << of_threads[1] << '\n';
             return 1;
         }
         std::cout << of_threads[0] << '\n';

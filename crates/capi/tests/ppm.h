@@ -1,4 +1,4 @@
-/* Reads binary PPM pictures, 8 bits a channel; the tests' pixels go through no other library. */
+/* Reads binary PPM pictures with 8 bits per channel, so that the tests' pixels do not depend on another library. */
 #ifndef PPM_H
 #define PPM_H
 
@@ -6,7 +6,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-/* The pixels, to be freed; ends the program where there are none. */
+/* The pixels, to be freed by the caller; exits if the file has none. */
 static uint8_t *read_ppm(const char *file, uint32_t *width, uint32_t *height) {
     FILE *in = fopen(file, "rb");
     if (in == NULL || fscanf(in, "P6 %u %u 255", width, height) != 2 || fgetc(in) != '\n') {

@@ -1,4 +1,4 @@
-"""The C library: the same detections as Rust's and Python's to the bit, no error or leak under valgrind, wrong input, the guide.
+"""The C library: the same detections as from Rust and Python to the bit, no error or leak under valgrind, wrong input, the guide.
 
 Models and pictures are those of python/tests.
 """
@@ -21,7 +21,7 @@ from test_equal import NAMES, as_printed, output, records_by_python, without_sec
 
 HERE = Path(__file__).resolve().parent
 INSTALLED = ROOT / "target" / "capi"
-# valgrind computes 50 times as slowly.
+# valgrind is 50 times slower.
 VALGRIND = [
     *("valgrind", "--quiet", "--error-exitcode=99", "--leak-check=full", "--show-leak-kinds=definite,indirect"),
     *("--errors-for-leak-kinds=definite,indirect", "--fair-sched=yes"),
@@ -72,7 +72,7 @@ def write_ppm(path: Path, picture: made_pictures.Picture) -> None:
 def records_by_c(
     programs: Path, model: Path, pixels: list[Path], threads: int = 0, under: tuple[str, ...] = ()
 ) -> list[list[dict[str, Any]]]:
-    """What the program in C reads of the structures, which must be what the library writes as JSON."""
+    """The structures' fields as read by the C program, which must equal the JSON written by the library."""
     camera = made_pictures.CAMERA if "camera" in model.stem else "-"
     lines = run(*under, programs / "detect", model, camera, threads, *pixels).splitlines()
     assert len(lines) == 2 * len(pixels)
@@ -96,7 +96,7 @@ def test_c_equals_rust_python_and_the_program(
     assert by_c == records_by_python(models[name], pictures)
 
     by_rust = [json.loads(line) for line in output(reference, models[name], *(camera or ["-"]), *pictures.values())]
-    # `size` is not the reference's.
+    # The reference has no `size`.
     assert [[{k: v for k, v in one.items() if k != "size"} for one in found] for found in by_c] == by_rust
 
     options = [part for file in camera for part in ("--camera", file)]
@@ -118,7 +118,7 @@ def test_a_mat_of_opencv_has_the_same_pixels(
     assert [json.loads(line) for line in lines] == records_by_python(models["S"], pictures)
 
 
-# The first model without and the last with a camera: a network takes minutes there.
+# The first model without and the last with a camera: a network takes minutes.
 @pytest.mark.parametrize("name", [NAMES[0], NAMES[-1]])
 def test_valgrind_finds_no_error_and_no_leak(
     name: str, programs: Path, models: dict[str, Path], pixels: dict[str, Path]
@@ -138,7 +138,7 @@ def test_valgrind_finds_a_leak_where_there_is_one(tmp_path: Path) -> None:
     assert subprocess.run([*VALGRIND, tmp_path / "leak"], capture_output=True).returncode == 99
 
 
-# By the name of the call in bad_input.c: the status, and words of the text.
+# For each call's name in bad_input.c: the status, and a part of the text.
 BAD_INPUT = {
     "abi_own": (0, ""),
     "abi_old": (10, "expected a program of ABI version 1, found 0: compile the program with this library's sdg.h"),

@@ -1,4 +1,4 @@
-//! Pictures with our marks on them.
+//! Pictures with detections drawn on them.
 
 use image::{Rgb, RgbImage};
 use nalgebra::Point2;
@@ -10,17 +10,18 @@ use sdg_report::{
 
 use crate::live_detection::Part;
 
-/// The score from which detections are accepted, where nobody sets another: scores are calibrated so that it separates right from wrong.
+/// Default minimum score of accepted detections: scores are calibrated so that it separates right from wrong ones.
 pub const DEFAULT_MIN_SCORE: f64 = 0.5;
-/// The image with every detection drawn on it.
+/// The image with all detections drawn on it.
 pub fn with_detections(image: &RgbImage, detections: &[GraspDetection]) -> RgbImage {
     let mut drawn = image.clone();
     draw_detections(&mut drawn, detections.iter(), DEFAULT_MIN_SCORE, &[]);
     drawn
 }
 
-/// Draws detections, the best first in their order; those that score at least `min_score` as accepted. Where reasons are given, the
-/// refused ones among them have a tag with score and reason, which no other tag covers, and further refused ones a box alone.
+/// Draws detections, which are ordered by decreasing score; those of at least `min_score` are drawn as accepted. If
+/// reasons are given, refused detections with a reason get a tag with score and reason that no other tag covers; other
+/// refused ones get only a box.
 pub fn draw_detections<'a>(
     drawn: &mut RgbImage,
     detections: impl DoubleEndedIterator<Item = &'a GraspDetection>,
@@ -48,14 +49,15 @@ pub fn draw_detections<'a>(
     }
 }
 
-/// Draws the parts that are there in a frame, the best on top, with the numbers of their tracks, counted from 1 for people, and scores.
+/// Draws the visible parts of a frame, the best on top, with their scores and track numbers, which are shown counted
+/// from 1.
 pub fn draw_parts(drawn: &mut RgbImage, parts: &[Part], min_score: f64) {
     for part in parts.iter().rev().filter(|part| part.is_seen(min_score)) {
         draw_numbered(drawn, &part.found.detection, true, part.track.map(|(number, ..)| number + 1));
     }
 }
 
-/// Draws the frame of the part of the picture that is searched, where not all of it is.
+/// Draws the frame of the searched region, unless the whole picture is searched.
 pub fn draw_region(drawn: &mut RgbImage, region: Option<&SearchRegion>) {
     let Some(region) = region else { return };
     let width = line_width(drawn);
@@ -81,16 +83,16 @@ fn draw_numbered(drawn: &mut RgbImage, detection: &GraspDetection, is_accepted: 
     draw_detection(drawn, &mark);
 }
 
-/// Colours of the dots where edges and surface differ: apart in lightness, too.
+/// Colours of the dots where edges and surface differ; they also differ in lightness.
 const EDGES: Color = Color([255, 40, 60]);
 const SURFACE: Color = Color([90, 150, 255]);
 /// Colour of the frames of squares in which a feature or print differs.
 const FEATURES: Color = Color([255, 190, 0]);
-/// Dots of a picture this large are a pixel wide; those of larger ones grow with it.
+/// Picture side in pixels up to which dots are one pixel wide; in larger pictures they grow in proportion.
 const DOT_PX_PER_SIDE: f64 = 400.0;
 
-/// Draws a dot wherever edges (red) or surface (blue) differ from the demonstration, a frame (yellow) where a feature does, and what the colours
-/// mean; nothing where nothing differs.
+/// Draws dots where edges (red) or the surface (blue) differ from the demonstration, frames (yellow) where a feature
+/// differs, and a legend; draws nothing if there are no differences.
 pub fn draw_differences(drawn: &mut RgbImage, differences: &[Differences]) {
     let side = f64::from(drawn.width().max(drawn.height()));
     let radius = (0.5 * side / DOT_PX_PER_SIDE).max(0.5);
@@ -116,14 +118,14 @@ pub fn draw_differences(drawn: &mut RgbImage, differences: &[Differences]) {
     }
 }
 
-/// Writes score and reason below a detection's box, farther down where another such tag is.
+/// Writes score and reason below a detection's box, or farther down if another tag is there.
 fn draw_reason(drawn: &mut RgbImage, detection: &GraspDetection, reason: &str, taken: &mut Vec<BoundingBox>) {
     let text_px = (f64::from(drawn.width().max(drawn.height())) / 60.0).max(8.0);
     let text = format!("{:.2} refused: {reason}", detection.score);
     let step = 2.4 * text_px;
     let height = f64::from(drawn.height());
     let below = |row: usize| {
-        // From the foot of the picture it goes on at its head.
+        // After the bottom of the picture it continues at the top.
         let y = (detection.bbox.y2 + 3.0 * text_px + row as f64 * step) % (height + step);
         Point2::new(detection.bbox.x1, y)
     };

@@ -1,4 +1,4 @@
-//! A grasp as it would go from where the arm stands: planned with the same sequence and limits; nothing moves.
+//! A grasp planned from the arm's current posture, with the real sequence and limits; nothing moves.
 
 use sdg_robot::{
     ArmState, CameraPose, GraspConfig, GraspStep, GraspTarget, KnownTarget, PlaceGoal, PlacingConfig, PlannedArm,
@@ -7,24 +7,24 @@ use sdg_robot::{
 
 use crate::sequence_run::{Ended, run_sequence};
 
-/// A grasp that is planned and not carried out.
+/// A planned grasp that is not executed.
 #[derive(Debug)]
 pub struct DryRun {
-    /// The arm before it.
+    /// The arm's state at the start.
     pub start: ArmState,
-    /// The hand before it.
+    /// The hand's opening at the start.
     pub opening_m: f64,
-    /// What was planned.
+    /// The planned motions.
     pub arm: PlannedArm,
     /// The step that cannot be planned, and why.
     pub failed: Option<(GraspStep, String)>,
 }
 
 impl DryRun {
-    /// Plans the sequence from a state of the arm, with the part where it is seen from there, if it is.
+    /// Plans the sequence from a state of the arm; the part's pose is given if it is visible from there.
     ///
     /// # Errors
-    /// A motion that breaks a limit, or a setting that the arm cannot do.
+    /// A motion violates a limit, or the arm cannot apply a setting.
     pub fn plan(
         start: ArmState,
         opening_m: f64,

@@ -7,23 +7,23 @@ use sdg_robot::RobotError;
 /// Result of this crate.
 pub type Result<T> = std::result::Result<T, CellError>;
 
-/// Why a cell's perception cannot be set up, or cannot look.
+/// Why perception cannot be set up, or a search fails.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CellError {
-    /// The model refuses.
+    /// Error of the model.
     #[error(transparent)]
     Grasp(#[from] GraspError),
-    /// The camera's pose is not known, or a picture is not the camera's.
+    /// The camera's pose is unknown, or a picture is not from this camera.
     #[error(transparent)]
     Camera(#[from] CameraFileError),
-    /// The workcell mounts the camera on the hand, and nothing says where on it.
+    /// The workcell mounts the camera on the hand, but the camera's file has no pose relative to the hand.
     #[error("expected hand_eye: flange_from_camera, since the workcell mounts the camera on the hand")]
     NotOnHand,
-    /// The workcell mounts the camera beside the robot, and nothing says where in the robot's base.
+    /// The workcell mounts the camera beside the robot, but the camera's file has no pose in the robot's base.
     #[error("expected table: with frame: base, since the workcell mounts the camera beside the robot")]
     NotInBase,
-    /// The thread that searches.
+    /// The search thread failed.
     #[error("the search thread {0}")]
     SearchThread(&'static str),
 }

@@ -1,4 +1,4 @@
-//! Perception as an arm's sequence asks for it.
+//! Perception in the form that an arm's sequence needs.
 //!
 //! ```text
 //! Pictures ─ picture, when it was taken ─ Perception over the table ─ poses in the robot's base ─ GraspTarget
@@ -20,24 +20,24 @@ use crate::mounted_camera::MountedCamera;
 use crate::perception::{Found, Perception};
 use crate::surface::{PartOnSurface, PosedPicture, surface_height};
 
-/// How long a picture that was taken after the arm stopped is waited for.
+/// Maximum wait for a picture taken after the arm stopped.
 const MAX_WAIT: Duration = Duration::from_secs(5);
 
-/// A picture, and when it was taken where time passes by a clock.
+/// A picture, with its capture time if time is measured by a clock.
 #[derive(Debug, Clone)]
 pub struct TakenPicture {
     /// The picture.
     pub picture: RgbImage,
-    /// When it was taken.
+    /// The capture time.
     pub taken: Option<Instant>,
 }
 
-/// Source of pictures while a grasp runs.
+/// A source of pictures during a grasp.
 pub trait Pictures<A: Arm> {
-    /// Takes a picture after the arm has stopped, which is before this call.
+    /// Takes a picture after this call; the arm has stopped before.
     ///
     /// # Errors
-    /// No such picture in time; the camera's own errors.
+    /// There is no such picture in time, or the camera fails.
     fn take(&mut self, arm: &mut A) -> sdg_robot::Result<TakenPicture>;
 }
 
@@ -72,7 +72,7 @@ impl<A: Arm> Pictures<A> for LivePictures {
     }
 }
 
-/// Where a part lies: its outline, m in the base frame, and the z of the table and of the outline.
+/// Position of a part: its outline in the base frame, m, and the heights of the table and of the outline.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SeenOutline {
     /// Corners, in metres.
@@ -94,43 +94,44 @@ pub struct ModelFinder<P> {
     last: Option<(RgbImage, Vec<Found>)>,
     /// The best part of the last picture.
     seen: Option<SeenOutline>,
-    /// The other sure parts of the last picture.
+    /// The other accepted parts of the last picture.
     others: Vec<GraspTarget>,
-    /// How much higher than on the table parts may lie, m; `None` where they lie on it.
+    /// Range of heights over the table at which parts may lie, m; `None` if they lie on the table.
     heights_m: Option<RangeInclusive<f64>>,
-    /// The pictures that heights are measured by, with what each shows.
+    /// The pictures used for measuring heights, with their detections.
     sights: Vec<Sights>,
-    /// Where parts are put down: those that lie there are not to be taken.
+    /// Places where parts are put down: parts lying there are not grasped.
     pub places: Vec<Place>,
 }
 
-/// A picture with the parts in it, each with the corners of its outline in the plane of [`Sighting::middle_m`], base frame, m.
+/// A picture and its parts, each with the corners of its outline in the plane of [`Sighting::middle_m`], base frame, m.
 #[derive(Debug)]
 struct Sights {
     picture: PosedPicture,
     parts: Vec<(Sighting, Polygon)>,
 }
 
-/// How much higher than on the table parts may lie where nothing is told of it, m.
+/// Range of heights over the table at which parts may lie if nothing is given, m.
 pub const UNKNOWN_HEIGHTS_M: RangeInclusive<f64> = -0.010..=0.080;
-/// Sizes are looked for so far beyond those of parts at the ends of these heights: what a pose is off by.
+/// Margin of the searched sizes beyond those at the ends of the height range, for errors of poses.
 const SIZE_LEEWAY: f64 = 0.03;
-/// By its size at a look, a part's height is known so well, m.
+/// Accuracy of a part's height as derived from its apparent size, m.
 const BY_SIZE_WITHIN_M: f64 = 0.015;
-/// A picture that is taken to measure a height shows the part so near to where it was seen before, m.
+/// In a picture for measuring a height, maximum distance of the part from its earlier position, m.
 const SAME_PART_M: f64 = 0.040;
-/// Sizes of demonstrations that differ by more say nothing of a height.
+/// If sizes by several demonstrations differ by more than this, they give no height.
 const MAX_SIZE_DIFFERENCE: f64 = 0.003;
-/// A part may be so much higher than its marks, m.
+/// Maximum height of a part over its marks, m.
 const TOP_LEEWAY_M: f64 = 0.002;
-/// The surface that a part lies on is looked for within so many standard deviations of where the part's pose puts it, between these bounds in m.
+/// The surface under a part is searched within this number of standard deviations of its expected height, between these
+/// bounds in m.
 const SURFACE_SIGMAS: f64 = 3.5;
 const SURFACE_WITHIN_M: [f64; 2] = [0.004, 0.009];
-/// Radius that holds 68 % of a place's errors over their standard deviation along x and along y.
+/// Ratio of the radius that contains 68 % of position errors to their standard deviation along x and y.
 const SIGMAS_OF_RADIUS: f64 = 1.51;
 
 impl<P> ModelFinder<P> {
-    /// Looks for the model's part through the camera.
+    /// Detects the model's part with this camera.
     pub fn new(model: GraspModel, camera: MountedCamera, pictures: P) -> Self {
         let perception = Perception::of_any_camera(model);
         Self {
@@ -148,12 +149,12 @@ impl<P> ModelFinder<P> {
         }
     }
 
-    /// The same, with detections checked or not.
+    /// Sets whether detections are checked against the demonstration.
     pub fn with_verification(self, verification: Verification) -> Self {
         Self { verification, ..self }
     }
 
-    /// The same for parts that may lie so much higher than on the table, m: at a look their size tells their height.
+    /// Sets the heights over the table at which parts may lie, m: their apparent size then gives their height.
     pub fn with_heights(self, heights_m: RangeInclusive<f64>) -> Self {
         Self { heights_m: Some(heights_m), ..self }
     }
@@ -163,7 +164,7 @@ impl<P> ModelFinder<P> {
         self.last.as_ref().map(|(picture, found)| (picture, found.as_slice()))
     }
 
-    /// Where the best part of the last picture lies.
+    /// Position of the best part in the last picture.
     pub fn seen(&self) -> Option<&SeenOutline> {
         self.seen.as_ref()
     }
@@ -184,7 +185,7 @@ impl<P> ModelFinder<P> {
             sighting.at_height(height_m).target
         };
         let targets: Vec<GraspTarget> = sightings.iter().map(at_its_height).collect();
-        // The outline lies where the best part was found.
+        // The outline at the position where the best part was found.
         if let (Some(seen), Some(sighting), Some(target)) = (&mut self.seen, sightings.first(), targets.first()) {
             let higher_m = target.base_from_tcp.translation.z - sighting.target.base_from_tcp.translation.z;
             let share = 1.0 - higher_m / sighting.distance_m();
@@ -195,8 +196,8 @@ impl<P> ModelFinder<P> {
         Ok(targets)
     }
 
-    /// Takes a picture and finds all parts in it, the best first, as if they lay so much higher than on the table (m). Others are found as well
-    /// where heights are given, m over the table.
+    /// Takes a picture and finds all parts in it, best first, assuming that they lie this much higher than on the table
+    /// (m). If heights over the table (m) are given, parts at other heights are found too.
     fn look<A: Arm>(
         &mut self,
         arm: &mut A,
@@ -214,7 +215,7 @@ impl<P> ModelFinder<P> {
         self.perception.move_to(&place)?;
         let distance_m = place.camera.world_from_camera.translation.z - self.marks_z_m(&place);
         self.perception.look_for_sizes(heights_m.map(|heights_m| {
-            // What lies higher is nearer to the camera, and larger.
+            // A higher part is nearer to the camera, and appears larger.
             let size =
                 |height_m: f64| (distance_m / (distance_m + higher_m - height_m).max(0.5 * distance_m)).max(0.51);
             let [low, high] = [size(*heights_m.start()), size(*heights_m.end())];
@@ -227,7 +228,7 @@ impl<P> ModelFinder<P> {
         Ok(sightings)
     }
 
-    /// z of the marks of a part on the table, m.
+    /// z of the marks of a part that lies on the table, m.
     fn marks_z_m(&self, place: &CameraOverTable) -> f64 {
         place.table_height_m + self.perception.model().facts().lengths.map_or(0.0, |lengths| lengths.mark_height_m)
     }
@@ -242,7 +243,7 @@ impl<P> ModelFinder<P> {
             None => Point3::new(target.base_from_tcp.translation.x, target.base_from_tcp.translation.y, marks_z_m),
         };
         let pose = found.pose?;
-        // What walls do to a pose is the relief's part, and alike in both pictures.
+        // The effect of walls on a pose is due to the part's relief, and equal in both pictures.
         let noise_m = ErrorLength::POSITION.metres(&Circumstances { mark_height_m: 0.0, ..pose.circumstances });
         Some(Sighting {
             camera_m: place.camera.world_from_camera.translation.vector.into(),
@@ -254,7 +255,8 @@ impl<P> ModelFinder<P> {
         })
     }
 
-    /// A part's size in the plane of the marks over its own; `None` where demonstrations contradict each other, or were not laid over the picture.
+    /// Size of a part in the plane of the marks relative to its own; `None` if demonstrations contradict each other, or
+    /// were not compared with the picture.
     fn size_of(&self, found: &Found) -> Option<f64> {
         found.detection.agreement?;
         let model = self.perception.model();
@@ -275,7 +277,7 @@ impl<P> ModelFinder<P> {
         Some(SeenOutline { outline_in_base, z_m: [table_m, mark_m] })
     }
 
-    /// Keeps the last picture and the outlines of what it shows.
+    /// Keeps the last picture and the outlines of its parts.
     fn keep_sights(&mut self, sightings: &[Sighting]) {
         let (Some((picture, found)), Some(place)) = (&self.last, self.perception.camera_over_table()) else { return };
         let outlines = found.iter().filter(|found| found.pose.is_some()).map(|found| found.detection.outline.as_ref());
@@ -288,7 +290,7 @@ impl<P> ModelFinder<P> {
         self.sights.push(Sights { picture: PosedPicture::new(picture, place.camera), parts });
     }
 
-    /// The surface beside a part that two of the kept pictures show.
+    /// The height of the surface beside a part from two of the kept pictures.
     fn surface_of(&self, pair: &[Sighting; 2], expected: &MeasuredHeight) -> Option<MeasuredHeight> {
         let lengths = self.perception.model().facts().lengths?;
         let kept = |sighting: &Sighting| {
@@ -296,7 +298,7 @@ impl<P> ModelFinder<P> {
             self.sights.iter().find_map(|sights| Some((&sights.picture, &sights.parts.iter().find(shows)?.1)))
         };
         let ([one, other], [(first, outline), (second, _)]) = (*pair, [kept(&pair[0])?, kept(&pair[1])?]);
-        // The first picture's outline, at its height and where both pictures show it.
+        // The first picture's outline, at the height and position given by both pictures.
         let marks_m = expected.height_m + lengths.mark_height_m;
         let [here, there] = [one.middle_at(marks_m), other.middle_at(marks_m)];
         let share = (one.camera_m.z - marks_m) / one.distance_m();
@@ -305,7 +307,7 @@ impl<P> ModelFinder<P> {
         let outline_m = Polygon { vertices: outline.vertices.iter().map(corner).collect() };
         let part = PartOnSurface {
             outline_m: &outline_m,
-            // Marks are in the middle of a round bar and on top of others.
+            // Marks are at mid-height of a round bar and on top of other parts.
             top_m: lengths.mark_height_m.max(2.0 * lengths.grasp_height_m) + TOP_LEEWAY_M,
             expected_m: expected.height_m,
             within_m: (SURFACE_SIGMAS * expected.sigma_m).clamp(SURFACE_WITHIN_M[0], SURFACE_WITHIN_M[1]),
@@ -320,7 +322,7 @@ impl<P> ModelFinder<P> {
     }
 }
 
-/// A detection as the sequence takes it.
+/// A detection in the form that the sequence uses.
 fn target(found: &Found) -> Option<GraspTarget> {
     let pose = found.pose?;
     Some(GraspTarget {

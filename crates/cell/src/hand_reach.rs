@@ -1,4 +1,4 @@
-//! Where the hand reaches the table.
+//! The part of the table that the hand reaches.
 
 use std::f64::consts::PI;
 
@@ -7,12 +7,12 @@ use sdg_kinematics::IkOptions;
 use sdg_kinematics::collision::{Body, Checker, CollisionError};
 use sdg_robot::workcell::Workcell;
 
-/// Turns of the hand that are tried, over half a turn: with exchanged fingers the others are the same.
+/// Number of hand turns that are tried over half a turn: with exchanged fingers the others are equivalent.
 const NUM_TURNS: usize = 4;
 /// Distance kept from obstacles, m.
 const MARGIN_M: f64 = 0.003;
 
-/// Squares of the table, and in how many turns of the hand each is reached.
+/// Squares of the table, each with the number of hand turns that reach it.
 pub struct Reach {
     /// All squares of the area.
     pub squares: Vec<Square>,
@@ -21,19 +21,20 @@ pub struct Reach {
     height_m: f64,
 }
 
-/// One of them.
+/// A square of the table.
 pub struct Square {
     /// Its middle in the base frame, m.
     pub at_m: Point2<f64>,
-    /// Turns of the hand that reach it.
+    /// Number of hand turns that reach it.
     pub num_turns: usize,
 }
 
 impl Reach {
-    /// Looks at an area of the table (x and y in the base frame, m), with the tcp at a height over it, among the workcell's obstacles and within its workspace.
+    /// Computes the reach in an area of the table (x and y in the base frame, m), with the tcp at a height over it,
+    /// among the workcell's obstacles and inside its workspace.
     ///
     /// # Errors
-    /// None for a workcell that was read.
+    /// None for a workcell that was read from a file.
     pub fn of(workcell: &Workcell, [x, y]: [[f64; 2]; 2], grid_m: f64, height_m: f64) -> Result<Self, CollisionError> {
         let mut model = workcell.collision_model(workcell.robot.geometry().hand.opening_max_m)?;
         model.allow(Body::HAND, "table")?;
@@ -50,7 +51,7 @@ impl Reach {
         Ok(Self { squares, grid_m, height_m })
     }
 
-    /// What there is to say.
+    /// A summary in lines of text.
     pub fn lines(&self, workcell: &Workcell) -> Vec<String> {
         let square_m2 = self.grid_m * self.grid_m;
         let area_m2 =
@@ -103,7 +104,8 @@ fn num_turns(workcell: &Workcell, checker: &mut Checker<'_>, at_m: Point2<f64>, 
         .count()
 }
 
-/// Whether some configuration reaches a pose with either finger on either side, free of obstacles and within the workspace.
+/// Whether some configuration reaches a pose, in either of the two equivalent hand turns, without collision and inside
+/// the workspace.
 fn is_reached(workcell: &Workcell, checker: &mut Checker<'_>, pose: &Isometry3<f64>) -> bool {
     let arm = workcell.robot.geometry();
     let within = |p: Vector3<f64>| {

@@ -1,4 +1,4 @@
-//! How the height of parts is found out: measured by a camera on the hand, or told.
+//! How the height of parts is determined: measured by a camera on the hand, or given.
 
 use sdg_grasp::GraspModel;
 use sdg_robot::CameraPose;
@@ -6,7 +6,8 @@ use sdg_robot::height::{HeightMeasurement, ToldHeight};
 
 use crate::mounted_camera::MountedCamera;
 
-/// How the height of a model's part is measured, with a camera on the hand and a model that knows lengths; `told` is z of the base, m.
+/// How the height of a model's part is measured, with a camera on the hand and a model with known lengths; `told` is z
+/// in the base, m.
 pub fn height_measurement(
     model: &GraspModel,
     camera: &MountedCamera,
@@ -18,8 +19,8 @@ pub fn height_measurement(
 }
 
 impl MountedCamera {
-    /// A camera beside the robot, for parts whose marks are as high as told (z of the base, m) instead of as high over the table as the model
-    /// knows. A camera on the hand measures.
+    /// For a camera beside the robot: uses the given height of the marks (z in the base, m) in place of the model's
+    /// height over the table. A camera on the hand measures the height.
     pub fn with_marks_at(self, model: &GraspModel, told: Option<&ToldHeight>) -> Self {
         match (self.pose, model.facts().lengths, told) {
             (CameraPose::InBase(_), Some(lengths), Some(told)) => {

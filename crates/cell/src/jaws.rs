@@ -1,4 +1,4 @@
-//! Whether the jaws of a grasp touch another part, as far as the picture shows.
+//! Detects whether the jaws of a grasp would touch another part in the picture.
 //!
 //! ```text
 //!    ┌─────┐         jaw: from half the opening outwards, as long as a finger is wide
@@ -8,8 +8,8 @@
 //!    └───╱─┘
 //!       ╱ neighbour  its outline reaches under a jaw
 //! ```
-//! The jaws are open as wide as the grasp is marked. A hand that opens wider needs more room, and what the model was not taught is not seen: no
-//! warning is no promise.
+//! The jaws are as far open as marked. A hand that opens wider needs more room, and objects that the model was not
+//! taught are not detected: the absence of a warning guarantees nothing.
 
 use nalgebra::{Point2, Vector2};
 use sdg_geometry::{PlanarGrasp, Polygon};
@@ -18,9 +18,10 @@ use sdg_kinematics::{FINGER_HALF_WIDTH_M, finger_thickness_m};
 
 use crate::perception::Perception;
 
-/// An outline that covers less of a jaw than this does not count: outlines are right to about a pixel. Chosen by hand.
+/// Minimum covered share of a jaw's area that counts as contact: outlines are accurate to about a pixel. Chosen by
+/// hand.
 const MIN_COVERED: f64 = 0.03;
-/// Two detections that share more of their area than this are readings of one part. Chosen by hand.
+/// Overlap above which two detections are readings of the same part. Chosen by hand.
 const SAME_PART: f64 = 0.5;
 
 /// A jaw seen from above, in pixels.
@@ -33,17 +34,17 @@ struct Jaw {
 }
 
 impl Jaw {
-    /// A finger of this width, as thick as the Franka hand's tips are for their width.
+    /// A finger of this width, with the thickness of the Franka hand's fingertips in proportion.
     fn of_length(length: f64) -> Self {
         Self { length, thickness: length * finger_thickness_m(0.0) / (2.0 * FINGER_HALF_WIDTH_M) }
     }
 
-    /// Whether one of two such jaws at a grasp lies over a part.
+    /// Whether one of the two jaws of a grasp overlaps a part.
     fn touches(&self, grasp: &PlanarGrasp, part: &Polygon) -> bool {
         let (sin, cos) = grasp.angle.radians().sin_cos();
         let (along, across) = (Vector2::new(cos, sin), Vector2::new(-sin, cos));
         [-1.0, 1.0].into_iter().any(|side| {
-            // In the jaw's own frame the polygon's clip against an image does the cutting.
+            // In the jaw's frame, clipping the polygon against an image performs the cut.
             let in_jaw = |p: &Point2<f64>| {
                 let from_middle = p - grasp.center();
                 let out = side * across.dot(&from_middle) - 0.5 * grasp.width;
@@ -60,8 +61,9 @@ fn region(detection: &GraspDetection) -> Polygon {
 }
 
 impl Perception {
-    /// For each detection in a picture, in their order, the numbers of those whose parts its jaws touch. Fingers have the Franka hand's size where
-    /// the camera's place is known; elsewhere they are as wide as the marked line is long.
+    /// For each detection in a picture, in order, the indices of the detections whose parts its jaws touch. Fingers
+    /// have the Franka hand's size if the camera's pose is known; otherwise they are as wide as the marked line is
+    /// long.
     pub fn touched_by_jaws(&self, detections: &[&GraspDetection]) -> Vec<Vec<usize>> {
         let regions: Vec<Polygon> = detections.iter().map(|detection| region(detection)).collect();
         let touched = |(idx, detection): (usize, &&GraspDetection)| {
@@ -77,7 +79,7 @@ impl Perception {
         detections.iter().enumerate().map(touched).collect()
     }
 
-    /// How long the marked line is on a detected part, in pixels: detections tell its middle only.
+    /// Length of the marked line on a detected part, in pixels: detections give only its middle.
     pub fn marked_length(&self, detection: &GraspDetection) -> f64 {
         let taught = &self.model().demonstrations()[0].marks;
         let scale = if taught.width_px > 0.0 { detection.grasp.width / taught.width_px } else { 1.0 };
@@ -99,12 +101,12 @@ mod tests {
 
     #[test]
     fn a_part_under_a_jaw_is_touched_and_one_beside_it_is_not() {
-        // Jaws take y from 75 to 90 and from 110 to 125, x from 89 to 111.
+        // The jaws cover y from 75 to 90 and from 110 to 125, x from 89 to 111.
         assert!(touches(0.0, [60.0, 115.0, 140.0, 135.0]));
         assert!(touches(0.0, [60.0, 60.0, 140.0, 85.0]));
         assert!(!touches(0.0, [60.0, 126.0, 140.0, 146.0]));
         assert!(!touches(0.0, [112.0, 60.0, 140.0, 140.0]));
-        // Between the jaws there is no jaw.
+        // The space between the jaws is not covered.
         assert!(!touches(0.0, [60.0, 92.0, 140.0, 108.0]));
         // A neighbour that is smaller than a jaw, wholly under it.
         assert!(touches(0.0, [98.0, 114.0, 104.0, 119.0]));

@@ -1,4 +1,4 @@
-//! Detection in a camera's frames: each on its own, or parts followed from frame to frame.
+//! Detection in a camera's frames: in each frame independently, or with tracking from frame to frame.
 
 use std::sync::Arc;
 use std::time::{Duration, SystemTime};
@@ -11,32 +11,32 @@ use crate::error::Result;
 use crate::live_tracker::{LiveTracker, SearchTime};
 use crate::perception::{Found, Perception};
 
-/// How long the newest frame is waited for.
+/// Maximum wait for the newest frame.
 const MAX_WAIT: Duration = Duration::from_millis(200);
 
-/// The frames of a camera: of a stream the newest, of stored and rendered pictures and of those on request each.
+/// The frames of a camera: the newest frame of a stream, or every frame of stored, rendered and on-request pictures.
 pub enum Frames {
-    /// What has not been taken is replaced by newer ones.
+    /// Frames that were not taken are replaced by newer ones.
     Newest(LatestFrame),
-    /// One after the other.
+    /// Every frame in order.
     Each(Box<dyn Camera>),
 }
 
-/// What a camera gave.
+/// Result of reading a camera.
 #[derive(Debug)]
 pub enum Next {
     /// A frame.
     Frame(Frame),
-    /// None yet.
+    /// No frame yet.
     None,
-    /// There will be none any more.
+    /// There are no more frames.
     End,
     /// A fault of the camera.
     Error(CameraError),
 }
 
 impl Frames {
-    /// Those of a camera that is open.
+    /// The frames of an open camera.
     pub fn of(camera: Box<dyn Camera>, address: &Address) -> Self {
         match address {
             Address::Sim(_) => Self::Each(camera),
@@ -45,12 +45,12 @@ impl Frames {
         }
     }
 
-    /// Whether none comes before it is asked for.
+    /// Whether frames are produced only on request.
     pub fn wait(&self) -> bool {
         matches!(self, Self::Each(camera) if camera.is_on_request())
     }
 
-    /// The next one, waited for a moment.
+    /// The next frame, with a short wait.
     pub fn take(&mut self) -> Next {
         match self {
             Self::Newest(newest) => match newest.take(MAX_WAIT) {
@@ -68,17 +68,17 @@ impl Frames {
     }
 }
 
-/// A part in a frame, and which track it is of.
+/// A part in a frame, and its track.
 #[derive(Debug, Clone)]
 pub struct Part {
-    /// Where it is.
+    /// The detection.
     pub found: Found,
-    /// Number and state of its track, and the time since it was seen.
+    /// Number and state of its track, and the time since the part was last seen.
     pub track: Option<(u64, TrackState, Duration)>,
 }
 
 impl Part {
-    /// Whether it is there in this frame.
+    /// Whether the part is visible in this frame.
     pub fn is_seen(&self, min_score: f64) -> bool {
         match self.track {
             Some((_, state, _)) => state != TrackState::Lost,
@@ -87,26 +87,26 @@ impl Part {
     }
 }
 
-/// Parts of a frame, with or without those of the frames before.
+/// Detects the parts of a frame, with or without using earlier frames.
 pub struct FrameDetector {
     detector: Perception,
     verification: Verification,
     tracker: Option<LiveTracker>,
-    /// The time from one stored picture to the next; `None` where frames have times of their own.
+    /// The time between stored pictures; `None` if frames have their own times.
     interval: Option<Duration>,
-    /// What frame times are counted from.
+    /// Reference for the frame times.
     first: Option<SystemTime>,
 }
 
-/// Between stored pictures that are played without a rate: nothing says that one follows from the other.
+/// Interval for stored pictures without a frame rate, which need not be consecutive.
 const UNRELATED: Duration = Duration::from_secs(1);
 
 impl FrameDetector {
-    /// `tracking` is how parts are followed, or nothing where each frame is searched on its own; `frames_wait` where none comes before it is
-    /// asked for.
+    /// `tracking` configures tracking; `None` searches each frame independently. `frames_wait`: frames are produced
+    /// only on request.
     ///
     /// # Errors
-    /// A model that cannot be followed.
+    /// The model cannot be tracked.
     pub fn new(
         detector: Perception,
         verification: Verification,
@@ -114,7 +114,7 @@ impl FrameDetector {
         address: &Address,
         frames_wait: bool,
     ) -> Result<Self> {
-        // The time of a file's last change is not that of its picture.
+        // A file's modification time is not the capture time of its picture.
         let interval = match address {
             Address::Folder { playback, .. } | Address::File { playback, .. } => {
                 Some(playback.interval.unwrap_or(UNRELATED))
@@ -134,7 +134,7 @@ impl FrameDetector {
     /// The parts in a frame.
     ///
     /// # Errors
-    /// A picture of another size than the camera's, and errors of detection.
+    /// The picture's size differs from the camera's, or detection fails.
     pub fn find(&mut self, picture: &Arc<RgbImage>, frame: &Frame) -> Result<Vec<Part>> {
         self.detector.check_picture(picture)?;
         let Some(tracker) = &mut self.tracker else {
@@ -156,7 +156,7 @@ impl FrameDetector {
 }
 
 impl FrameDetector {
-    /// What it detects with.
+    /// The perception used for detection.
     pub fn perception(&self) -> &Perception {
         &self.detector
     }

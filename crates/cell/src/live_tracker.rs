@@ -1,14 +1,14 @@
-//! Parts followed through live pictures: tracking on the caller's thread, searches on another one.
+//! Tracks parts through live pictures: tracking runs on the caller's thread, searches on another one.
 //!
 //! ```text
 //! frame ─ LiveTracker::frame ─ Tracker: follow ─────────────────────────── TrackedPart…
 //!                                │ search due ─ channel ─ search thread ─ channel ─ taken before the next frame
 //!                                └ the frame does not follow from the one before: searched here, before it is answered
 //! ```
-//! So a frame is answered after one search at most, beside which one more may run on the search thread.
+//! So a frame waits for at most one search, while another one may run on the search thread.
 //!
-//! The duration of a search varies, and what it found is carried forward. So that a test gives the same output on any machine,
-//! [`SearchTime::Frames`] runs each search on the caller's thread and hands its outcome over a fixed number of frames later.
+//! The duration of a search varies, and its result is carried forward. For reproducible tests, [`SearchTime::Frames`]
+//! runs each search on the caller's thread and delivers its result a fixed number of frames later.
 
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
@@ -23,16 +23,16 @@ use crate::perception::Perception;
 
 const ENDED: CellError = CellError::SearchThread("ended");
 
-/// Where searches run.
+/// The thread and timing of searches.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SearchTime {
-    /// On a thread of their own, as long as they take.
+    /// On a separate thread, with their real duration.
     AsItTakes,
-    /// On the caller's thread; known to the tracker so many frames after the one that was searched, at least one.
+    /// On the caller's thread; the tracker gets the result this number of frames after the searched one, at least one.
     Frames(u32),
 }
 
-/// A tracker and what runs its searches.
+/// A tracker with its searches.
 pub struct LiveTracker {
     tracker: Tracker,
     searches: Searches,
@@ -40,23 +40,23 @@ pub struct LiveTracker {
 
 enum Searches {
     Threaded {
-        /// `None` once the thread is to end.
+        /// `None` once the thread must end.
         due: Option<Sender<PartSearch>>,
         done: Receiver<SearchOutcome>,
         thread: Option<JoinHandle<()>>,
     },
     Delayed {
         frames: u32,
-        /// What was found, and the frames until it is known.
+        /// The search's result, and the number of frames until it is delivered.
         outcome: Option<(SearchOutcome, u32)>,
     },
 }
 
 impl LiveTracker {
-    /// A tracker that knows no part yet; it starts the search thread.
+    /// A tracker without known parts; it starts the search thread.
     ///
     /// # Errors
-    /// A thread that the system refuses.
+    /// The system refuses a thread.
     pub fn new(perception: &Perception, config: TrackerConfig, search_time: SearchTime) -> Result<Self> {
         let searches = match search_time {
             SearchTime::AsItTakes => {
@@ -78,12 +78,11 @@ impl LiveTracker {
         Ok(Self { tracker: Tracker::new(perception.to_part_detector(), config), searches })
     }
 
-    /// Follows all known parts into a frame; a frame that does not follow from the one before is searched first, others beside this
-    /// thread where that is due. `captured` counts from any moment that is the
-    /// same for all frames.
+    /// Tracks all known parts into a frame. If the frame is not a continuation of the previous one, it is searched
+    /// first; otherwise due searches run on the other thread. `captured` is measured from any fixed time.
     ///
     /// # Errors
-    /// What a search refuses, as a picture that is too small.
+    /// Errors of a search, for example a picture that is too small.
     pub fn frame(&mut self, picture: Arc<RgbImage>, captured: Duration) -> Result<Vec<TrackedPart>> {
         if let Some(outcome) = self.searches.finished()? {
             self.tracker.take_outcome(outcome)?;
@@ -100,7 +99,7 @@ impl LiveTracker {
 }
 
 impl Searches {
-    /// The outcome that is to be known before the next frame.
+    /// The result that must be delivered before the next frame.
     fn finished(&mut self) -> Result<Option<SearchOutcome>> {
         match self {
             Self::Threaded { done, .. } => match done.try_recv() {
@@ -132,7 +131,7 @@ impl Searches {
 }
 
 impl Drop for LiveTracker {
-    /// Waits for a search that is running.
+    /// Waits for a running search.
     fn drop(&mut self) {
         if let Searches::Threaded { due, thread, .. } = &mut self.searches {
             due.take();

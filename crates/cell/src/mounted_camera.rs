@@ -8,22 +8,22 @@ use sdg_robot::CameraPose;
 
 use crate::error::{CellError, Result};
 
-/// A calibrated camera and where it is.
+/// A calibrated camera and its mounting.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MountedCamera {
-    /// The lens and the size of its pictures.
+    /// The intrinsics and picture size.
     pub intrinsics: PinholeCamera,
-    /// Where it is fixed.
+    /// The pose relative to its mounting.
     pub pose: CameraPose,
     /// The table's z in the robot's base, in metres.
     pub table_height_m: f64,
 }
 
 impl MountedCamera {
-    /// The camera of a file, mounted as a workcell says.
+    /// The camera of a file, mounted as defined in a workcell.
     ///
     /// # Errors
-    /// [`CellError::NotOnHand`] and [`CellError::NotInBase`] for a file without the pose that the mounting needs.
+    /// [`CellError::NotOnHand`] and [`CellError::NotInBase`] if the file lacks the pose for this mounting.
     pub fn new(camera: &CalibratedCamera, mount: Mount, table_height_m: f64) -> Result<Self> {
         let pose = match (mount, camera.flange_from_camera, &camera.table) {
             (Mount::Hand, Some(flange_from_camera), _) => CameraPose::OnFlange(flange_from_camera),

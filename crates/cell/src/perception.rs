@@ -1,4 +1,4 @@
-//! A grasp model behind a camera whose place is known, or behind any camera.
+//! A grasp model with a camera of known pose, or for pictures of any camera.
 
 use std::ops::RangeInclusive;
 
@@ -14,9 +14,9 @@ use sdg_grasp::{
 
 use crate::error::Result;
 
-/// Pictures in, grasps out: in pixels, and in metres as well where the camera and its place are known.
+/// Detects grasps in pictures: in pixels, and also in metres if the camera and its pose are known.
 ///
-/// Every caller looks through this: the command line, the page, the ROS 2 node, an arm's sequence, rehearsals and evaluations.
+/// All callers use it: the command line, the page, the ROS 2 node, an arm's sequence, rehearsals and evaluations.
 #[derive(Debug, Clone)]
 pub struct Perception {
     view: View,
@@ -27,23 +27,23 @@ pub struct Perception {
 enum View {
     /// Pictures of any camera.
     AnyCamera(Box<GraspModel>),
-    /// Those of a calibrated camera in its place; the model as it was given, for a camera without place.
+    /// Pictures of a calibrated camera with a pose; also the original model, for a camera without a pose.
     OverTable(Box<PlanViewDetector>, CameraOverTable),
 }
 
-/// A detection, in metres as well where the camera's place is known.
+/// A detection, with its pose in metres if the camera's pose is known.
 #[derive(Debug, Clone)]
 pub struct Found {
     /// In pixels of the picture as given.
     pub detection: GraspDetection,
-    /// In the world of the camera's place.
+    /// In the world frame of the camera's pose.
     pub pose: Option<PlanarPose>,
 }
 
-/// A camera over its table as its file says, and the frame of that.
+/// The camera over its table as given in its file, and the frame of that pose.
 ///
 /// # Errors
-/// A file without the camera's pose.
+/// The file has no pose of the camera.
 pub fn camera_over_table(camera: &CalibratedCamera) -> std::result::Result<(CameraOverTable, Frame), CameraFileError> {
     let (posed, table) = camera.posed()?;
     let place = CameraOverTable { camera: posed, table_height_m: table.height_m, workspace: table.workspace };
@@ -51,32 +51,32 @@ pub fn camera_over_table(camera: &CalibratedCamera) -> std::result::Result<(Came
 }
 
 impl Perception {
-    /// Looks at pictures of any camera: grasps are in pixels.
+    /// For pictures of any camera: grasps are in pixels.
     pub fn of_any_camera(model: GraspModel) -> Self {
         Self { view: View::AnyCamera(Box::new(model)), frame: None }
     }
 
-    /// Looks through a calibrated camera in its place: grasps are in metres of the place's world as well.
+    /// For a calibrated camera with a known pose: grasps are also in metres in the world frame of that pose.
     ///
     /// # Errors
-    /// A model that was taught without a camera; a camera that does not see the plane of the marks.
+    /// The model was taught without a camera, or the camera does not see the plane of the marks.
     pub fn over_table(model: GraspModel, place: &CameraOverTable) -> Result<Self> {
         Ok(Self { view: View::OverTable(Box::new(PlanViewDetector::new(model, place)?), *place), frame: None })
     }
 
-    /// The same with the place that the camera's file has.
+    /// The same with the pose in the camera's file.
     ///
     /// # Errors
-    /// As [`Self::over_table`]; a file without the camera's pose.
+    /// Those of [`Self::over_table`]; the file has no pose of the camera.
     pub fn calibrated(model: GraspModel, camera: &CalibratedCamera) -> Result<Self> {
         let (place, frame) = camera_over_table(camera)?;
         Ok(Self { frame: Some(frame), ..Self::over_table(model, &place)? })
     }
 
-    /// Goes on from another place of the camera, or with another camera.
+    /// Continues with another pose of the camera, or with another camera.
     ///
     /// # Errors
-    /// As [`Self::over_table`]; the place then stays what it was.
+    /// Those of [`Self::over_table`]; the pose is then unchanged.
     pub fn move_to(&mut self, place: &CameraOverTable) -> Result<()> {
         match &mut self.view {
             View::AnyCamera(model) => *self = Self::over_table(GraspModel::clone(model), place)?,
@@ -88,11 +88,11 @@ impl Perception {
         Ok(())
     }
 
-    /// Looks for parts of these sizes in the plane of the marks, over the part's own, as [`PlanViewDetector::look_for_sizes`]; nothing changes
-    /// for pictures of any camera.
+    /// Searches for parts of these sizes in the plane of the marks, relative to the part's own, as
+    /// [`PlanViewDetector::look_for_sizes`]; no effect for pictures of any camera.
     ///
     /// # Errors
-    /// A range that is none.
+    /// The range is invalid.
     pub fn look_for_sizes(&mut self, sizes: Option<RangeInclusive<f64>>) -> Result<()> {
         match &mut self.view {
             View::AnyCamera(_) => Ok(()),
@@ -100,10 +100,11 @@ impl Perception {
         }
     }
 
-    /// Searches this part of pictures alone, in their pixels, instead of the part that the model's file says; all of them with `None`.
+    /// Restricts the search to this region, in pixels of the pictures, in place of the model's region; `None` searches
+    /// the whole picture.
     ///
     /// # Errors
-    /// A region without pixels, and one that cannot be of these pictures, as far as their size is known, or that the part does not fit in;
+    /// The region is empty, is not inside these pictures, as far as their size is known, or is too small for the part;
     /// nothing is changed then.
     pub fn look_in(&mut self, region: Option<SearchRegion>) -> Result<()> {
         match &mut self.view {
@@ -113,7 +114,7 @@ impl Perception {
         Ok(())
     }
 
-    /// The part of pictures that is searched, in their pixels; all of them where `None`.
+    /// The searched region, in pixels of the pictures; `None` for the whole picture.
     pub fn region(&self) -> Option<&SearchRegion> {
         match &self.view {
             View::AnyCamera(model) => model.region(),
@@ -121,10 +122,10 @@ impl Perception {
         }
     }
 
-    /// Finds the part in a picture, best score first.
+    /// Detects the part in a picture, best score first.
     ///
     /// # Errors
-    /// A picture of another size than the calibrated camera's or than the region is for; the model's own errors.
+    /// The picture's size differs from that of the calibrated camera or of the region; errors of the model.
     pub fn detect(&self, picture: &RgbImage, verification: Verification) -> Result<Vec<Found>> {
         self.check_picture(picture)?;
         Ok(match &self.view {
@@ -139,10 +140,10 @@ impl Perception {
         })
     }
 
-    /// Whether a picture can be the calibrated camera's, and whether the region is one of it.
+    /// Checks that a picture can be from the calibrated camera, and that the region is inside it.
     ///
     /// # Errors
-    /// A picture of another size, and a region that does not lie in it.
+    /// The picture has another size, or the region is not inside it.
     pub fn check_picture(&self, picture: &RgbImage) -> Result<()> {
         self.check_size(picture)?;
         if let Some(region) = self.region() {
@@ -161,7 +162,7 @@ impl Perception {
         Err(CameraFileError::OtherSize { width, height, found_width, found_height }.into())
     }
 
-    /// Where the camera is; `None` for pictures of any camera.
+    /// The camera's pose; `None` for pictures of any camera.
     pub fn camera_over_table(&self) -> Option<&CameraOverTable> {
         match &self.view {
             View::AnyCamera(_) => None,
@@ -174,7 +175,7 @@ impl Perception {
         self.camera_over_table().map(|place| [place.camera.intrinsics.width, place.camera.intrinsics.height])
     }
 
-    /// Which way up its pictures are: a calibration knows the sensor's pixels.
+    /// Orientation of its pictures: a calibration refers to the sensor's pixels.
     pub fn pixel_frame(&self) -> PixelFrame {
         match self.view {
             View::AnyCamera(_) => PixelFrame::Upright,
@@ -182,12 +183,12 @@ impl Perception {
         }
     }
 
-    /// The frame of positions, as the camera's file says.
+    /// The frame of positions, as given in the camera's file.
     pub fn frame(&self) -> Option<Frame> {
         self.frame
     }
 
-    /// The model, with its size known where the camera's place is.
+    /// The model, with known size if the camera's pose is known.
     pub fn model(&self) -> &GraspModel {
         match &self.view {
             View::AnyCamera(model) => model,
@@ -195,7 +196,7 @@ impl Perception {
         }
     }
 
-    /// The same for a tracker.
+    /// The same in the form for a tracker.
     pub fn to_part_detector(&self) -> PartDetector {
         match &self.view {
             View::AnyCamera(model) => GraspModel::clone(model).into(),
@@ -203,8 +204,8 @@ impl Perception {
         }
     }
 
-    /// The part's size in a picture over its size in the photo; `None` where that says nothing: by a calibrated camera, or without
-    /// the check.
+    /// The part's size in a picture relative to its size in the photo; `None` if that is meaningless: with a calibrated
+    /// camera, or without the check.
     pub fn size_of(&self, detection: &GraspDetection, picture_size: [u32; 2]) -> Option<f64> {
         match &self.view {
             View::AnyCamera(model) => model.size_of(detection, picture_size),
@@ -212,7 +213,7 @@ impl Perception {
         }
     }
 
-    /// Where a picture differs from the demonstration under each detection; `None` as [`Self::size_of`].
+    /// The differences between a picture and the demonstration for each detection; `None` as for [`Self::size_of`].
     pub fn differences(&self, picture: &RgbImage, detections: &[&GraspDetection]) -> Vec<Option<Differences>> {
         match &self.view {
             View::AnyCamera(model) => model.differences(picture, detections),
@@ -220,7 +221,7 @@ impl Perception {
         }
     }
 
-    /// Length that a pixel covers in the plane of the marks, in metres, where the camera's place is known.
+    /// Length of a pixel in the plane of the marks, in metres, if the camera's pose is known.
     pub fn metres_per_pixel(&self, pixel: &Point2<f64>) -> Option<f64> {
         match &self.view {
             View::AnyCamera(_) => None,
@@ -228,11 +229,11 @@ impl Perception {
         }
     }
 
-    /// The middles of the grasps of those demonstrations that were cut from this very picture, in its pixels; `find` gets the
-    /// picture as the model was shown it.
+    /// The middles of the grasps of those demonstrations that come from this picture, in its pixels; `find` receives
+    /// the picture in the form in which the model was taught it.
     ///
     /// # Errors
-    /// A picture of another size than the calibrated camera's.
+    /// The picture's size differs from that of the calibrated camera.
     pub fn taught_grasps(
         &self,
         picture: &RgbImage,

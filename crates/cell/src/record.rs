@@ -1,4 +1,4 @@
-//! A detection in JSON, as `sdg detect` prints it.
+//! The JSON record of a detection, as printed by `sdg detect`.
 
 use sdg_calibration::Frame;
 use sdg_grasp::DetectionRecord;
@@ -17,26 +17,26 @@ pub struct FoundRecord {
     pub pose: Option<PoseRecord>,
 }
 
-/// Where the gripper is to close; metres and degrees, the turn about the frame's z. The position lies within `sigma_mm` and
-/// the turn within `sigma_deg` with a probability of 68 % each.
+/// Pose of the grasp in metres and degrees; the rotation is about the frame's z. The position is within `sigma_mm` and
+/// the rotation within `sigma_deg` with a probability of 68 % each.
 #[derive(Debug, Clone, Serialize)]
 pub struct PoseRecord {
-    /// The frame that the camera's file places the camera in.
+    /// The frame of the pose in the camera's file.
     pub frame: Frame,
     /// Grasp point in that frame, in metres.
     pub p_m: [f64; 3],
-    /// Turn about the frame's z, right-handed.
+    /// Rotation about the frame's z, right-handed.
     pub yaw_deg: f64,
     /// Distance between the jaws for the part's width, in metres.
     pub opening_m: f64,
     /// Standard deviation of the position.
     pub sigma_mm: f64,
-    /// Standard deviation of the turn.
+    /// Standard deviation of the rotation.
     pub sigma_deg: f64,
 }
 
 impl FoundRecord {
-    /// The record of what a detector found.
+    /// The record of a detection.
     pub fn new(found: &Found, detector: &Perception) -> Self {
         let pose = found.pose.as_ref().zip(detector.frame()).map(|(pose, frame)| PoseRecord {
             frame,

@@ -1,23 +1,23 @@
-//! A grasp, or a grasp and a place, as one call.
+//! Runs a grasp, with or without placing, in one call.
 
 use sdg_robot::{
     CameraPose, CompliantArm, GraspConfig, GraspOutcome, GraspReport, GraspStep, PartFinder, PlaceGoal, PlaceOffset,
     PlacingConfig, PlacingOutcome, Robot, Touched, grasp_and_place, grasp_softly,
 };
 
-/// How a sequence ended.
+/// Result of a sequence.
 pub struct Ended {
     /// The grasp.
     pub grasp: GraspReport,
-    /// The step that failed, and why; `None` where all is as it was asked for.
+    /// The step that failed, and why; `None` if everything succeeded.
     pub failed: Option<(GraspStep, String)>,
-    /// How far the part lay beside its place at the last look, where one was asked for.
+    /// Offset of the part from its place at the last look, if a place was given.
     pub beside: Option<PlaceOffset>,
-    /// What was felt each time it was put down.
+    /// Contact each time the part was put down.
     pub touched: Vec<Touched>,
 }
 
-/// Grasps the part and, where a place is given, puts it there.
+/// Grasps the part and, if a place is given, puts it there.
 ///
 /// # Errors
 /// As [`sdg_robot::grasp`].

@@ -1,14 +1,14 @@
 //! The height of the surface beside a part, from two pictures of it.
 //!
 //! ```text
-//! outline of the part ─ windows around it, the nearest first, but for what the part hides from a camera
+//! outline of the part ─ windows around it, the nearest first, except where the part hides them from a camera
 //! window ─ at each height: both pictures resampled there ─ correlation ─ the height of its one clear maximum
-//! heights of the windows ─ the highest that many of them all around the part share ─ SurfaceHeight
+//! heights of the windows ─ the highest one that many windows all around the part share ─ SurfaceHeight
 //! ```
-//! A part's own edges lie anywhere between its foot and its top, and which of them a picture is matched by changes with the view. What lies beside it is
-//! one plane, and grain, scratches, shadows and edges on it are in that plane.
+//! The part's own edges are anywhere between its bottom and its top, and which of them match between pictures depends
+//! on the view. The surface beside it is one plane, and so are the grain, scratches, shadows and edges on it.
 //!
-//! Left out: parts and their poses.
+//! Not included: parts and their poses.
 
 use image::RgbImage;
 use nalgebra::{Point2, Point3, Vector2};
@@ -16,31 +16,34 @@ use sdg_geometry::{Polygon, PosedCamera, median};
 
 /// Radius of a window, m.
 const WINDOW_M: f64 = 0.005;
-/// Distance of the samples in a window, m: about a pixel of a VGA camera from 0.3 m.
+/// Spacing of the samples in a window, m: about a pixel of a VGA camera from 0.3 m.
 const SAMPLE_M: f64 = 0.0006;
-/// Distance between the middles of windows, m.
+/// Spacing of the windows, m.
 const WINDOWS_APART_M: f64 = 0.004;
-/// A window keeps so far from the outline, and reaches no farther from it than by the second, m.
+/// Minimum and maximum distance of a window from the outline, m.
 const BESIDE_M: [f64; 2] = [0.002, 0.040];
-/// Distance of the heights that are tried, m: half a pixel of disparity.
+/// Step between the tested heights, m: half a pixel of disparity.
 const STEP_M: f64 = 0.0005;
-/// A window tells a height where both pictures correlate by so much, and by so much less everywhere beyond a distance from it, m.
+/// Minimum correlation of both pictures at a window's height; and, beyond a distance from that height in m, the
+/// required drop of the correlation.
 const MIN_CORRELATION: f64 = 0.8;
 const MIN_LEAD: f64 = 0.15;
 const LEAD_BEYOND_M: f64 = 0.003;
-/// The surface is what the nearest windows show: so many at most and at least.
+/// Maximum and minimum number of windows, taken from the nearest, that determine the surface.
 const MAX_WINDOWS: usize = 60;
 const MIN_WINDOWS: usize = 5;
-/// Windows further from the median of a surface than this are on something else, m; so often the median is taken anew.
+/// Maximum distance of a window's height from the median of its surface, m; and number of iterations of the median.
 const INLIER_M: f64 = 0.001;
 const NUM_SHIFTS: usize = 4;
-/// So many of all windows are on a surface, at least.
+/// Minimum share of all windows on a surface.
 const MIN_SHARE: f64 = 0.3;
-/// They lie in so many of the four quadrants around the part, at least: what lies beside the part is on one side of it.
+/// Minimum number of the four quadrants around the part that contain windows of the surface: an object beside the part
+/// is only on one side.
 const MIN_QUADRANTS: usize = 3;
-/// Windows overlap: of so many one counts.
+/// Overlapping windows are not independent: this number of them counts as one.
 const WINDOWS_PER_VOTE: f64 = 4.0;
-/// What resampling errs by in every window alike, m. Fitted with WINDOWS_PER_VOTE by `heights`, so that errors over their sigmas spread by 1.
+/// Resampling error common to all windows, m. Fitted together with WINDOWS_PER_VOTE by `heights`, so that errors
+/// divided by their sigmas have a spread of 1.
 const COMMON_SIGMA_M: f64 = 0.12e-3;
 
 /// A picture and its camera.
@@ -60,14 +63,14 @@ pub(crate) struct SurfaceHeight {
     pub(crate) sigma_m: f64,
 }
 
-/// What is known of the part before.
+/// Prior knowledge of the part.
 #[derive(Debug, Clone)]
 pub(crate) struct PartOnSurface<'a> {
     /// Its outline from above, base frame, m.
     pub(crate) outline_m: &'a Polygon,
-    /// Its top over the surface, m: what it hides.
+    /// Height of its top over the surface, m, which determines what it hides.
     pub(crate) top_m: f64,
-    /// The surface's height to expect, m, and how far from it is looked.
+    /// Expected height of the surface, m, and the searched distance from it.
     pub(crate) expected_m: f64,
     pub(crate) within_m: f64,
 }
@@ -82,13 +85,13 @@ impl PosedPicture {
         Self { camera, width, height, gray: gray.collect() }
     }
 
-    /// Brightness of a window's samples at a height; false where the picture does not show all of it.
+    /// Brightness of a window's samples at a height; false if the window is not completely in the picture.
     fn sample(&self, middle: &Point2<f64>, height_m: f64, offsets: &[Vector2<f64>], into: &mut Vec<f32>) -> bool {
         into.clear();
         let project = |p: Point2<f64>| self.camera.project(&Point3::new(p.x, p.y, height_m));
         let ends = [Vector2::new(WINDOW_M, 0.0), Vector2::new(0.0, WINDOW_M)].map(|end| project(middle + end));
         let (Some(at), [Some(right), Some(up)]) = (project(*middle), ends) else { return false };
-        // So small a window is shown by a linear map.
+        // For such a small window, a linear map is exact enough.
         let (by_x, by_y) = ((right - at) / WINDOW_M, (up - at) / WINDOW_M);
         for offset in offsets {
             let p = at + by_x * offset.x + by_y * offset.y - Vector2::new(0.5, 0.5);
@@ -107,7 +110,7 @@ impl PosedPicture {
     }
 }
 
-/// The height of the surface beside a part; `None` where it shows nothing, or several surfaces.
+/// The height of the surface beside a part; `None` if there is no texture, or several surfaces.
 pub(crate) fn surface_height(pictures: [&PosedPicture; 2], part: &PartOnSurface<'_>) -> Option<SurfaceHeight> {
     let offsets = window();
     let mut windows: Vec<(Point2<f64>, f64)> = Vec::new();
@@ -121,12 +124,12 @@ pub(crate) fn surface_height(pictures: [&PosedPicture; 2], part: &PartOnSurface<
     }
     let center = part.outline_m.centroid();
     let min_windows = MIN_WINDOWS.max((MIN_SHARE * windows.len() as f64).ceil() as usize);
-    // What a part lies on is higher than what is around that.
+    // The surface that carries the part is higher than its surroundings.
     windows.sort_by(|one, other| other.1.total_cmp(&one.1));
     windows.iter().find_map(|(_, height_m)| one_surface(&windows, *height_m, &center, min_windows))
 }
 
-/// The surface that windows at about a height are on, where there are enough of them and they lie around the part.
+/// The surface of the windows at about a height, if there are enough of them around the part.
 fn one_surface(
     windows: &[(Point2<f64>, f64)],
     about_m: f64,
@@ -162,7 +165,7 @@ fn window() -> Vec<Vector2<f64>> {
         .collect()
 }
 
-/// Middles of windows beside the part that it hides from no camera, the nearest first.
+/// Centres of windows beside the part that are not hidden from either camera, the nearest first.
 fn middles(pictures: [&PosedPicture; 2], part: &PartOnSurface<'_>) -> Vec<Point2<f64>> {
     let outline = part.outline_m;
     let bounds = outline.bounds();
@@ -174,7 +177,7 @@ fn middles(pictures: [&PosedPicture; 2], part: &PartOnSurface<'_>) -> Vec<Point2
     let is_clear = |p: &Point2<f64>| {
         pictures.iter().all(|picture| {
             let camera_m = picture.camera.world_from_camera.translation.vector;
-            // Upwards a line of sight goes towards the camera.
+            // Upwards, a line of sight approaches the camera.
             let slope = (camera_m.xy() - p.coords) / (camera_m.z - part.expected_m);
             [0.5, 1.0].into_iter().all(|share| {
                 let above = p + slope * (share * part.top_m);
@@ -192,7 +195,7 @@ fn middles(pictures: [&PosedPicture; 2], part: &PartOnSurface<'_>) -> Vec<Point2
     beside.into_iter().map(|(_, p)| p).collect()
 }
 
-/// The one height at which both pictures show the same in a window.
+/// The single height at which both pictures agree in a window.
 fn height_of_window(
     pictures: [&PosedPicture; 2],
     middle: &Point2<f64>,
@@ -221,16 +224,16 @@ fn height_of_window(
     if best - second.fold(f64::NEG_INFINITY, f64::max) < MIN_LEAD {
         return None;
     }
-    // The top of the parabola through the maximum and its neighbours.
+    // Vertex of the parabola through the maximum and its neighbours.
     let [before, after] = [correlations[best_idx - 1], correlations[best_idx + 1]];
     let bend = before - 2.0 * best + after;
     let shift = if bend < 0.0 { 0.5 * (before - after) / bend } else { 0.0 };
     Some(lowest_m + (best_idx as f64 + shift) * STEP_M)
 }
 
-/// Normalised cross-correlation; `None` where one of them shows nothing.
+/// Normalised cross-correlation; `None` if one of them has no texture.
 fn correlation(one: &[f32], other: &[f32]) -> Option<f64> {
-    /// Standard deviation below which a window is plain, in grey levels: half a level is rounding.
+    /// Standard deviation below which a window has no texture, in grey levels: half a level is rounding.
     const MIN_CONTRAST: f64 = 0.5;
     let count = one.len() as f64;
     let mean = |values: &[f32]| values.iter().map(|value| f64::from(*value)).sum::<f64>() / count;
@@ -254,7 +257,7 @@ mod tests {
     use sdg_geometry::PinholeCamera;
     use std::f64::consts::PI;
 
-    /// Grain of about 2 mm, the same at a place from everywhere.
+    /// Grain of about 2 mm that depends only on the position.
     fn grain(x_m: f64, y_m: f64) -> f64 {
         let noise = |x: i64, y: i64| {
             let mixed = (x.wrapping_mul(0x9e37_79b9) ^ y.wrapping_mul(0x85eb_ca6b)).wrapping_mul(0x27d4_eb2f);
@@ -267,7 +270,7 @@ mod tests {
         row(low) * (1.0 - up) + row(low + 1) * up
     }
 
-    /// A surface whose height depends on the place, seen straight down from 0.3 m and from `x_m`.
+    /// A surface whose height depends on the position, seen straight down from 0.3 m and from `x_m`.
     fn view(x_m: f64, surface_m: fn(&Point2<f64>) -> f64, brightness: fn(f64, f64) -> f64) -> PosedPicture {
         let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI);
         let world_from_camera = Isometry3::from_parts(Vector3::new(x_m, 0.0, 0.3).into(), down);
@@ -310,9 +313,9 @@ mod tests {
     #[test]
     fn nothing_to_see_is_no_height() {
         assert_eq!(measured(|_| 0.011, |_, _| 128.0), None);
-        // Stripes along the baseline are the same at every height.
+        // Stripes along the baseline look the same at every height.
         assert_eq!(measured(|_| 0.011, |_, y_m| grain(0.0, y_m)), None);
-        // What lies elsewhere is not looked for.
+        // Heights outside the range are not searched.
         assert_eq!(measured(|_| 0.060, grain), None);
     }
 
@@ -325,7 +328,8 @@ mod tests {
             let ahead = all.filter(|p| p.coords.dot(&direction) > 0.8 * p.coords.norm());
             ahead.map(|p| p.coords.dot(&direction)).fold(f64::INFINITY, f64::min)
         };
-        // Beside the baseline a window of 5 mm begins 2 mm from the outline; along it the top hides 30 mm · 0.085 / 0.3 more.
+        // Along the normal of the baseline, a window of 5 mm begins 2 mm from the outline; along the baseline the top
+        // hides 30 mm · 0.085 / 0.3 more.
         let (along, beside) = (nearest(Vector2::x()), nearest(Vector2::y()));
         assert!((0.0265..0.033).contains(&beside) && along > beside + 0.004, "{along} {beside}");
     }

@@ -1,4 +1,4 @@
-//! The map of a workcell: the base's x to the right, its y up.
+//! The map of a workcell: the base's x points right, its y up.
 
 use image::{Rgb, RgbImage};
 use nalgebra::{Point2, Point3};
@@ -10,15 +10,15 @@ use sdg_robot::{LookOut, Place};
 
 use crate::hand_reach::Reach;
 
-/// Pixels for a metre, and around the map.
+/// Pixels per metre, and margin around the map.
 const PX_PER_M: f64 = 720.0;
 const FRAME_PX: f64 = 46.0;
-/// Room below the map for the key.
+/// Height of the legend below the map.
 const KEY_PX: f64 = 74.0;
 const TEXT_PX: f64 = 9.0;
-/// The arm's foot, seen from above, m.
+/// The footprint of the arm's base, m.
 const FOOT_M: [[f64; 2]; 2] = [[-0.17, 0.09], [-0.11, 0.11]];
-/// Lines of the grid are so far apart, m.
+/// Spacing of the grid lines, m.
 const LINES_M: f64 = 0.1;
 
 const GROUND: Rgb<u8> = Rgb([250, 249, 246]);
@@ -31,14 +31,14 @@ const OBSTACLE: Color = Color([122, 92, 150]);
 const LOOK: Color = Color([20, 120, 150]);
 const PAPER: Color = Color([250, 249, 246]);
 
-/// The area that is drawn, x and y in the base frame, m.
+/// The drawn area, x and y in the base frame, m.
 pub struct WorkcellMap {
     x_m: [f64; 2],
     y_m: [f64; 2],
 }
 
 impl WorkcellMap {
-    /// All of the workspace, the table and the arm's foot.
+    /// Covers the workspace, the table and the arm's base.
     pub fn around(workcell: &Workcell) -> Self {
         let (min, max) = (workcell.workspace.min_m, workcell.workspace.max_m);
         let mut map = Self { x_m: [min.x.min(FOOT_M[0][0]), max.x], y_m: [min.y.min(-0.2), max.y.max(0.2)] };
@@ -54,7 +54,7 @@ impl WorkcellMap {
         Self { x_m: round(map.x_m), y_m: round(map.y_m) }
     }
 
-    /// The area that is drawn, x and y in the base frame, m.
+    /// The drawn area, x and y in the base frame, m.
     pub fn area_m(&self) -> [[f64; 2]; 2] {
         [self.x_m, self.y_m]
     }
@@ -72,7 +72,7 @@ impl WorkcellMap {
         BoundingBox { x1: upper_left.x, y1: upper_left.y, x2: lower_right.x, y2: lower_right.y }
     }
 
-    /// Draws everything.
+    /// Draws the map.
     pub fn draw(&self, workcell: &Workcell, reach: &Reach) -> RgbImage {
         let width = (self.x_m[1] - self.x_m[0]) * PX_PER_M + 2.0 * FRAME_PX;
         let height = (self.y_m[1] - self.y_m[0]) * PX_PER_M + 2.0 * FRAME_PX + KEY_PX;
@@ -140,7 +140,7 @@ impl WorkcellMap {
 
     fn draw_obstacle(&self, image: &mut RgbImage, obstacle: &Obstacle, labels: &mut Labels) {
         let Some(outline) = seen_from_above(obstacle) else {
-            // A wall without an end is not drawn as an area.
+            // An unbounded wall is not drawn as an area.
             return;
         };
         let polygon = self.polygon(&outline);
@@ -210,7 +210,7 @@ impl WorkcellMap {
     }
 }
 
-/// Labels that keep apart from each other.
+/// Labels that do not overlap.
 #[derive(Default)]
 struct Labels(Vec<(Point2<f64>, String, Color)>);
 
@@ -227,7 +227,7 @@ impl Labels {
                     bounds.x1 < other.x2 && other.x1 < bounds.x2 && bounds.y1 < other.y2 && other.y1 < bounds.y2
                 })
             };
-            // Down, step by step, until nothing is below it.
+            // Moved down step by step until nothing is in its way.
             let mut place = at;
             let mut bounds = label_bounds(image, place, &text, TEXT_PX);
             while overlaps(&bounds) && bounds.y2 < f64::from(image.height()) - 1.0 {
@@ -263,7 +263,7 @@ fn seen_from_above(obstacle: &Obstacle) -> Option<Vec<Point2<f64>>> {
             [-half_length_m, half_length_m].into_iter().flat_map(|z| ring(radius_m, z)).collect()
         }
         Shape::Capsule { radius_m, half_length_m } => {
-            // Balls at both ends: a circle around each, whichever way it lies.
+            // Balls at both ends: a circle around each, in any orientation.
             let ends = [-half_length_m, half_length_m].map(|z| base_from_obstacle * Point3::new(0.0, 0.0, z));
             let circles =
                 ends.iter().flat_map(|end| ring(radius_m, 0.0).map(move |p| Point2::new(end.x + p.x, end.y + p.y)));

@@ -1,14 +1,15 @@
-//! Grasps with no height told, from tables that are higher than told and from blocks that nothing was told of: how exactly heights are measured, and
-//! how many grasps hold. Model S, taught from the shipped photos.
+//! Grasps without a given height, of parts on tables that are higher than configured and on blocks of unknown height:
+//! accuracy of the measured heights, and number of grasps that hold. Model S, taught from the shipped photos.
 //!
 //! ```text
-//! heights grasp [ATTEMPTS [SEED [PART]…]]   10 1: ten of each part; odd seeds on a table 0 to 40 mm higher than told, even ones on a block
-//!                                           5 to 30 mm high
-//! heights measure …                         the same, each ended once the height is measured
-//! heights raw …                             prints what the pictures showed, too, as JSON lines
-//! heights told …                            the same scenes with their true heights told and nothing measured, to compare with
+//! heights grasp [ATTEMPTS [SEED [PART]…]]   10 1: ten of each part; with odd seeds the table is 0 to 40 mm too high,
+//!                                           with even ones the part is on a block 5 to 30 mm high
+//! heights measure …                         the same; each attempt ends once the height is measured
+//! heights raw …                             also prints the measurements in the pictures, as JSON lines
+//! heights told …                            for comparison: the same scenes with true heights given, nothing measured
 //! ```
-//! Ends with an error where the median of the errors is above 0.7 mm, fewer than 95 of 100 are within 2 mm, or fewer than 116 of 120 grasps hold.
+//! Fails if the median error is above 0.7 mm, fewer than 95 of 100 errors are within 2 mm, or fewer than 116 of 120
+//! grasps hold.
 
 use std::error::Error;
 use std::ops::ControlFlow;
@@ -32,13 +33,13 @@ use serde_json::json;
 
 const TABLES_HIGHER_M: std::ops::Range<f64> = 0.0..0.040;
 const BLOCKS_M: std::ops::Range<f64> = 0.005..0.030;
-/// Blocks reach so far beyond the part on every side, m.
+/// Margin of blocks around the part on every side, m.
 const BLOCK_MARGINS_M: std::ops::Range<f64> = 0.005..0.025;
 const MAX_MEDIAN_M: f64 = 0.7e-3;
 const WITHIN_M: f64 = 2e-3;
 const MIN_SHARE_WITHIN: f64 = 0.95;
 const MIN_SHARE_HELD: f64 = 116.0 / 120.0;
-/// A part whose lowest point is so far over where it lay is lifted, m.
+/// A part is lifted if its lowest point has risen by this much, m.
 const LIFTED_M: f64 = 0.10;
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -75,7 +76,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     if is_as_asked(&all, how) { Ok(()) } else { Err("not as asked for".into()) }
 }
 
-/// What is done with each case.
+/// The task for each case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum How {
     Grasp,
@@ -90,7 +91,7 @@ impl How {
     }
 }
 
-/// Model S from the shipped photo, with the lengths of the camera that took it.
+/// Model S from the shipped photo, taught with the camera that took it.
 fn taught(spec: &ObjectSpec) -> Result<GraspModel, Box<dyn Error>> {
     let mut options = TeachOptions::new(1);
     options.kind = ModelKind::S;
@@ -104,19 +105,19 @@ fn taught(spec: &ObjectSpec) -> Result<GraspModel, Box<dyn Error>> {
     Ok(taught.model.with_lengths(lengths, f64::INFINITY)?)
 }
 
-/// A part that lies higher than told.
+/// A part that lies higher than the configuration says.
 struct Case {
     spec: ObjectSpec,
     seed: u64,
     scene: SceneVariation,
     block: Option<Obstacle>,
-    /// How much higher the table is than told, and the part over the table, m.
+    /// Height of the table over the configured one, and of the part over the table, m.
     higher_m: [f64; 2],
 }
 
 impl Case {
     fn draw(spec: &ObjectSpec, seed: u64) -> Self {
-        // Parts differ, too.
+        // The parts' heights differ too.
         let name = spec.name.bytes().fold(seed, |mixed, byte| mixed.wrapping_mul(31).wrapping_add(u64::from(byte)));
         let seed_of_part = name.wrapping_mul(0x9e37_79b9_7f4a_7c15);
         let rng = &mut Pcg64Mcg::seed_from_u64(seed_of_part);
@@ -183,7 +184,7 @@ impl Case {
     }
 }
 
-/// What the simulated wrist camera sees.
+/// Pictures of the simulated wrist camera.
 struct WristPictures;
 
 impl Pictures<Workcell> for WristPictures {
@@ -210,7 +211,7 @@ struct Found {
 }
 
 impl Found {
-    /// Error and its sigma, m.
+    /// Error and its standard deviation, m.
     fn error_m(&self) -> Option<[f64; 2]> {
         let measured = self.report.height.as_ref()?.measured?;
         Some([measured.height_m - self.marks_m, measured.sigma_m])
@@ -238,7 +239,7 @@ impl Found {
         )
     }
 
-    /// What the pictures showed.
+    /// The measurements in the pictures.
     fn raw(&self, case: &Case) -> String {
         let HeightReport { sightings, why_not, .. } = self.report.height.clone().unwrap_or_default();
         let sightings = sightings.iter().map(|sighting| {

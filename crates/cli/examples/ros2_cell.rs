@@ -1,10 +1,11 @@
-//! A cell in MuJoCo as a ROS user's own would be: the wrist camera is published, the arm and the hand are action servers.
+//! A cell in MuJoCo with the interface of a real ROS cell: the wrist camera is published, arm and hand are action
+//! servers.
 //!
 //! ```text
 //! ros2_cell PART [SEED [DOMAIN [RMW]]]
 //! image, camera_info, /tf: 5 a second │ /joint_states: 50 │ FollowJointTrajectory, GripperCommand
 //! ```
-//! examples/ros2/README.md drives it with `sdg ros2`. Time is the clock's: a millisecond of simulation in a millisecond.
+//! examples/ros2/README.md drives it with `sdg ros2`. Simulated time follows the clock.
 
 use std::time::{Duration, Instant, SystemTime};
 
@@ -27,16 +28,17 @@ const CAMERA_FRAME: &str = "camera_optical_frame";
 const BASE_FRAME: &str = "panda_link0";
 const PICTURE_EVERY: Duration = Duration::from_millis(200);
 const STATES_EVERY: Duration = Duration::from_millis(20);
-/// The simulation may be so far behind the clock, s: longer than a picture takes to draw, or every picture would hold up the arm.
+/// Maximum lag of the simulation behind the clock, s. It is longer than rendering a picture; otherwise every picture
+/// would delay the arm.
 const MAX_BEHIND_SECS: f64 = 0.5;
-/// Fingers that move by less within a tenth of a second stand still, m.
+/// Fingers that move less than this within a tenth of a second are at rest, m.
 const STILL_M: f64 = 2e-4;
-/// A hand this near to its opening is there, m.
+/// A hand within this distance of its target opening has reached it, m.
 const THERE_M: f64 = 1e-3;
-/// A hand has time for its force to build up.
+/// Minimum duration of a hand command, so that the force builds up.
 const MIN_HAND: Duration = Duration::from_millis(400);
 const MAX_HAND: Duration = Duration::from_secs(3);
-/// A part this high above where it lay is lifted, m.
+/// A part is lifted if it has risen by this much, m.
 const LIFTED_M: f64 = 0.05;
 
 type Trajectories = ActionServer<FollowJointTrajectoryGoal, FollowJointTrajectoryResult, FollowJointTrajectoryFeedback>;
@@ -50,9 +52,9 @@ struct Cell {
     infos: Publisher<CameraInfo>,
     transforms: Publisher<TfMessage>,
     states: Publisher<JointState>,
-    /// The motion under way, since when, and from where.
+    /// The current motion, its start time, and its start position.
     motion: Option<(JointTrajectory, f64, JointVector)>,
-    /// Where the arm is held.
+    /// Position that the arm holds.
     held: JointVector,
     hand: Option<(HandCommand, Instant, f64)>,
     secs: f64,
@@ -97,7 +99,8 @@ impl Cell {
         let lay_m = self.workcell.base_from_object().context("a part")?.translation.z;
         let mut is_lifted = false;
         loop {
-            // What a slow computer does not get done is left out, or requests would wait for ever and the arm would hurry after the clock.
+            // On a slow computer, simulation time is dropped: otherwise requests would wait for ever and the arm would
+            // move too fast to catch up.
             let behind_secs = begun.elapsed().as_secs_f64() - self.secs - MAX_BEHIND_SECS;
             begun += Duration::from_secs_f64(behind_secs.max(0.0));
             let until_secs = begun.elapsed().as_secs_f64();
@@ -122,7 +125,7 @@ impl Cell {
         }
     }
 
-    /// A millisecond of the simulation.
+    /// Advances the simulation by a millisecond.
     fn advance(&mut self) -> Result<()> {
         let zero = JointVector::zeros();
         let (q, dq, ddq) = match &self.motion {
@@ -185,7 +188,7 @@ impl Cell {
         let is_still = (opening_m - before_m).abs() < STILL_M;
         let is_over = is_there || is_still || since.elapsed() > MAX_HAND;
         if !is_over {
-            // Looked at again after as long as the fingers need to move by more than a still one does.
+            // Checked again after the time in which moving fingers exceed `STILL_M`.
             self.hand = Some((command, Instant::now() - MIN_HAND + Duration::from_millis(100), opening_m));
             return Ok(());
         }
@@ -232,8 +235,8 @@ fn joints(values: &[f64]) -> JointVector {
     JointVector::from_iterator(values.iter().copied())
 }
 
-/// Positions, velocities and accelerations at a time; `None` after the end. Cubic between the points, as ros2_control's splines are with
-/// positions and velocities.
+/// Positions, velocities and accelerations at a time; `None` after the end. Cubic interpolation, as in ros2_control for
+/// points with positions and velocities.
 fn at(trajectory: &JointTrajectory, from: &JointVector, secs: f64) -> Option<(JointVector, JointVector, JointVector)> {
     let next = trajectory.points.iter().position(|point| point.time_from_start.secs() >= secs)?;
     let to = &trajectory.points[next];

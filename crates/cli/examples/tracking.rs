@@ -1,9 +1,10 @@
 //! Tracking on rendered frames with the real threads: `tracking ADDRESS FRAMES [MODEL_FILE]`, as
 //! `tracking 'pendulum?speed=50&noise=2&beside=mirrored' 500`.
 //!
-//! Frames are rendered first, then tracked once as fast as they can be taken, and once at the pace of the camera. Prints
-//! frames a second, the time of following a frame, the processor time of all threads, and the errors against the truth, beside those
-//! of detections in single frames. Without a model file, model S is taught from the shipped photo.
+//! Frames are rendered first, then tracked twice: as fast as possible, and at the camera's frame rate. Prints frames
+//! per second, the time to track a frame, the processor time of all threads, and the errors against the ground truth,
+//! with those of detections in single frames for comparison. Without a model file, model S is taught from the shipped
+//! photo.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -19,7 +20,7 @@ use sdg_grasp::{
 use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::table_camera::{MovingTruth, TableCamera};
 
-/// Frames between two detections without tracking.
+/// Number of frames between two detections without tracking.
 const DETECT_EVERY: usize = 20;
 
 type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;
@@ -68,7 +69,7 @@ fn main() -> Result<()> {
     detect(&model, &shown, part.symmetry)
 }
 
-/// The same errors of detections in single frames, which have no past.
+/// The same errors for detections in single frames.
 fn detect(model: &GraspModel, shown: &[Shown], symmetry: RotationalSymmetry) -> Result<()> {
     let (mut pixels, mut degrees, mut walls, mut missed) = (Vec::new(), Vec::new(), Vec::new(), 0);
     for frame in shown.iter().step_by(DETECT_EVERY) {
@@ -104,7 +105,7 @@ fn track(model: &GraspModel, shown: &[Shown], symmetry: RotationalSymmetry, is_p
         if is_paced {
             std::thread::sleep(frame.time.saturating_sub(start.elapsed()));
         }
-        // The first search is not what is measured.
+        // The first search is not measured.
         if idx == 0 && !is_paced {
             while !tracker.frame(frame.picture.clone(), frame.time)?.iter().any(TrackedPart::is_followed) {
                 if start.elapsed() > Duration::from_secs(10) {
@@ -138,7 +139,7 @@ fn spread(values: &mut [f64]) -> String {
     format!("mean {mean:.2}, median {:.2}, 95 % {:.2}, most {:.2}", at(0.5), at(0.95), at(1.0))
 }
 
-/// Errors of what is followed, and how many frames in which a part is shown have no followed part there.
+/// Errors of tracked parts, and the number of frames with a visible part that is not tracked.
 fn report_errors(shown: &[Shown], all: &[Vec<TrackedPart>], symmetry: RotationalSymmetry) {
     let (mut pixels, mut degrees, mut scores) = (Vec::new(), Vec::new(), Vec::new());
     let (mut num_shown, mut within, mut wrong, mut first) = (0, 0, 0, None);

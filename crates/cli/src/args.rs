@@ -1,4 +1,4 @@
-//! The verbs. What each takes, with its help, stands in `commands/`, in the file of the verb.
+//! The verbs of the command line. Each verb's arguments and help are in its file in `commands/`.
 
 use clap::{Parser, Subcommand};
 
@@ -33,36 +33,36 @@ pub struct Args {
 pub enum Command {
     /// Teach a shipped object from one photo, then grasp it in simulation
     Demo(DemoArgs),
-    /// Mark the grasp on photos in the browser, look at training samples, teach a model and try it
+    /// Mark the grasp on photos in the browser, inspect training samples, teach a model and try it
     Annotate(AnnotateArgs),
-    /// Teach a grasp model from demonstrations, into one file
+    /// Teach a grasp model from demonstrations and write it to one file
     Teach(TeachArgs),
     /// Find planar grasps in images or live pictures
     Detect(DetectArgs),
-    /// Attempt grasps in MuJoCo, and report them
+    /// Run grasp attempts in MuJoCo and report them
     Rehearse(RehearseArgs),
-    /// Serve a simulated robot on the network, for other programs
+    /// Serve a simulated robot on the network to other programs
     #[cfg(feature = "simulation")]
     Simulate(crate::commands::simulate::SimulateArgs),
-    /// Measure every model on every part by the paper's protocol; or test a model on your own labelled pictures
+    /// Evaluate every model on every part by the paper's protocol, or test a model on your own labelled pictures
     Evaluate(Box<EvaluateArgs>),
     /// Grasp a part with a real or a simulated arm, from the picture to the lifted part
     Grasp(GraspArgs),
-    /// Detect parts in the pictures of a ROS 2 topic and publish their grasps; teach and grasp as services
+    /// Detect parts in the pictures of a ROS 2 topic and publish their grasps; teaching and grasping are services
     #[cfg(feature = "ros2")]
     Ros2(Box<crate::commands::ros2::args::Ros2Args>),
-    /// A node of ROS 2; not in this build, which is without cargo's feature "ros2"
+    /// A ROS 2 node; not in this build, which lacks cargo's feature "ros2"
     #[cfg(not(feature = "ros2"))]
     Ros2(WithoutRos2Args),
-    /// Plan a motion around the obstacles of a workcell, and draw it; nothing moves
+    /// Plan a motion around the obstacles of a workcell and draw it; nothing moves
     Plan(PlanArgs),
-    /// Draw a workcell's file seen from above, with what the arm reaches of its table
+    /// Draw a workcell's file from above, with the part of the table that the arm reaches
     #[command(subcommand)]
     Workcell(WorkcellCommand),
-    /// Show the state of a real arm, bring it home, recover it after an error, open and close its hand
+    /// Show the state of a real arm, move it home, recover it after an error, open and close its hand
     #[command(subcommand)]
     Robot(RobotCommand),
-    /// Write augmented samples as pictures and COCO JSON, to look at
+    /// Write augmented samples as pictures and COCO JSON, for inspection
     Augment(AugmentArgs),
     /// Convert annotation files from one tool's format to another's
     Annotation(AnnotationArgs),
@@ -79,11 +79,11 @@ pub enum Command {
     Devices(DevicesArgs),
 }
 
-/// Any arguments of `sdg ros2` in a build without it, which says so.
+/// Accepts any arguments of `sdg ros2` in a build without ROS 2; the command then fails with an error that says so.
 #[cfg(not(feature = "ros2"))]
 #[derive(Debug, clap::Args)]
 pub struct WithoutRos2Args {
-    /// Not read.
+    /// Ignored.
     #[arg(trailing_var_arg = true, allow_hyphen_values = true, hide = true)]
     arguments: Vec<String>,
 }

@@ -1,11 +1,11 @@
-//! How long a person has waited: from the program's start, not from where the work of a verb begins.
+//! Time since the program's start, so that reported durations include everything that a person waited for.
 
 use std::sync::OnceLock;
 use std::time::Instant;
 
 static STARTED: OnceLock<Instant> = OnceLock::new();
 
-/// Notes the program's start; called first, and once.
+/// Records the program's start. Call it once, before anything else.
 pub fn start() {
     STARTED.get_or_init(Instant::now);
 }

@@ -9,20 +9,20 @@ use sdg_inputs::demonstrations::read_pair;
 
 use crate::exit::Usage;
 
-/// Reads one demonstration from each argument.
+/// Reads a demonstration from each argument.
 pub fn read_all(arguments: &[String]) -> Result<Vec<Demonstration>> {
     pairs(arguments)?.iter().map(|(photo, marks)| read_pair(photo, marks)).collect()
 }
 
-/// The two files of each argument.
+/// The photo and the annotation file of each argument.
 ///
 /// # Errors
-/// A photo that is not there or has no marks beside it; [`Usage`] for what is no such argument.
+/// A photo does not exist or has no marks beside it; [`Usage`] for a malformed argument.
 pub fn pairs(arguments: &[String]) -> Result<Vec<(PathBuf, PathBuf)>> {
     arguments.iter().map(|argument| photo_and_marks(argument)).collect()
 }
 
-/// The two files of an argument; a photo alone has its marks beside it.
+/// The photo and the annotation file of an argument; for a photo alone, the annotation beside it.
 pub fn photo_and_marks(argument: &str) -> Result<(PathBuf, PathBuf)> {
     let photo = Path::new(argument);
     if argument.contains(':') && !photo.exists() {
@@ -31,12 +31,12 @@ pub fn photo_and_marks(argument: &str) -> Result<(PathBuf, PathBuf)> {
     if argument.is_empty() {
         return Err(Usage("--demo: expected IMAGE or IMAGE:ANNOTATION, found nothing".to_owned()).into());
     }
-    // A missing photo is reported as missing, not as one without marks.
+    // Checked first, so that a missing photo is not reported as a photo without marks.
     sdg_files::check_readable(photo)?;
     Ok((photo.to_owned(), beside_photo(photo)?))
 }
 
-/// Splits at a colon. Paths may have colons of their own: of several, the one between two files that exist.
+/// Splits at a colon. Paths may contain colons themselves: of several, the one between two existing files is chosen.
 pub fn split(argument: &str) -> Result<(PathBuf, PathBuf)> {
     let splits: Vec<(PathBuf, PathBuf)> = argument
         .match_indices(':')

@@ -1,12 +1,12 @@
-//! What every help text and manual page ends with: two examples, and the exit codes.
+//! The end of every help text and manual page: two examples and the exit codes.
 
 use clap::Command;
 
-/// What every help text and manual page ends with.
+/// The last line of every help text and manual page.
 const EXIT_CODES: &str =
     "Exit codes: 0 done, 1 failed, 2 wrong usage, 3 found nothing, 4 poor model (docs/command-line.md)";
 
-/// Two calls of each verb.
+/// Two example calls of each verb.
 const EXAMPLES: &[[&str; 2]] = &[
     ["sdg demo", "sdg demo --object rod_end --attempts 20 --seed 2"],
     ["sdg annotate photo.png", "sdg annotate --from v4l: --size 1280x720"],
@@ -83,7 +83,7 @@ const EXAMPLES: &[[&str; 2]] = &[
     ["sdg devices", "sdg devices --json"],
 ];
 
-/// The command and all below it, each with its examples and the exit codes at the end of its help.
+/// The command and all its subcommands, with examples and exit codes at the end of their help.
 pub fn with_examples(command: Command) -> Command {
     with_ending(command, "")
 }
@@ -117,7 +117,7 @@ mod tests {
     use crate::args::Args;
     use clap::{CommandFactory, Parser};
 
-    /// Longer lines of a help are broken, and cannot be copied as they stand.
+    /// Longer lines are wrapped in the help and cannot be copied.
     const MAX_CHARS: usize = 98;
 
     fn verbs(command: &Command, parents: &str) -> Vec<String> {

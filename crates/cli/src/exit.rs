@@ -1,4 +1,4 @@
-//! Exit codes, and an error as one line.
+//! Exit codes, and the one-line form of errors.
 
 use std::fmt;
 use std::io;
@@ -10,14 +10,14 @@ use sdg_grasp::{GraspError, RegionError};
 use sdg_inputs::ConfigError;
 use sdg_robot::RobotError;
 
-/// How a command ended that did not fail.
+/// The result of a command that did not fail.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
     /// 0.
     Done,
-    /// 3: it ran, but found nothing to grasp.
+    /// 3: no grasp was found.
     NothingToGrasp,
-    /// 4: the model was written, but fails its own held-back samples.
+    /// 4: the model was written, but fails on its held-back samples.
     ModelFails,
 }
 
@@ -32,7 +32,7 @@ impl Outcome {
     }
 }
 
-/// Arguments that clap lets pass and that make no sense all the same: exit code 2, as for any wrong usage.
+/// Arguments that clap accepts but that are invalid: exit code 2, as for any wrong usage.
 #[derive(Debug)]
 pub struct Usage(pub String);
 
@@ -47,12 +47,12 @@ impl std::error::Error for Usage {}
 /// The error of a verb that needs the simulator, in a build without it.
 #[cfg(not(feature = "simulation"))]
 pub fn without_simulator() -> anyhow::Error {
-    let needs = "this sdg was built without the simulator, which demo, rehearse and evaluate (but for --pictures) need: \
+    let needs = "this sdg was built without the simulator, which demo, rehearse and evaluate (except for --pictures) need: \
                  expected a build with cargo's feature \"simulation\"";
     Usage(needs.to_owned()).into()
 }
 
-/// The error of `sdg ros2` in a build without it.
+/// The error of `sdg ros2` in a build without ROS 2.
 #[cfg(not(feature = "ros2"))]
 pub fn without_ros2() -> anyhow::Error {
     Usage(
@@ -67,14 +67,14 @@ pub fn code_of(error: &anyhow::Error) -> u8 {
     if error.is::<Usage>() { 2 } else { 1 }
 }
 
-/// Whether the reader of our output went away, as `head` does; no failure of ours.
+/// Whether the reader of our output closed the pipe, as `head` does; this is not a failure.
 pub fn is_closed_pipe(error: &anyhow::Error) -> bool {
     error.chain().any(|cause| {
         cause.downcast_ref::<io::Error>().is_some_and(|io_error| io_error.kind() == io::ErrorKind::BrokenPipe)
     })
 }
 
-/// The error and its causes on one line, and the option that helps.
+/// The error and its causes on one line, followed by the option that helps.
 pub fn one_line(error: &anyhow::Error) -> String {
     let line = sdg_inputs::one_line(error);
     match error.chain().find_map(remedy) {
@@ -83,7 +83,7 @@ pub fn one_line(error: &anyhow::Error) -> String {
     }
 }
 
-/// The option that helps with an error of a library, which knows no options.
+/// The option that helps with a library's error; libraries do not know options.
 fn remedy(cause: &(dyn std::error::Error + 'static)) -> Option<String> {
     let of_model = |error: &GraspError| match error {
         GraspError::Region(RegionError::OtherPicture { .. }) => Some(
@@ -113,7 +113,7 @@ fn remedy(cause: &(dyn std::error::Error + 'static)) -> Option<String> {
             }
             CalibrationError::OtherBoard { .. } => Some("give its squares with --squares".to_owned()),
             CalibrationError::HandEyeDisagrees { is_other_mount: true, .. } => {
-                Some("with --mount the other one is chosen".to_owned())
+                Some("choose the other one with --mount".to_owned())
             }
             _ => None,
         };
@@ -132,7 +132,7 @@ fn remedy(cause: &(dyn std::error::Error + 'static)) -> Option<String> {
             Some("sdg camera hand-eye --mount base or sdg camera table --sheet-in-base-mm measures it".to_owned())
         }
         _ => match cause.downcast_ref() {
-            Some(RobotError::NoRealTime { .. }) => Some("--no-realtime goes without".to_owned()),
+            Some(RobotError::NoRealTime { .. }) => Some("--no-realtime does without".to_owned()),
             _ => None,
         },
     }

@@ -1,4 +1,4 @@
-//! A detection as a line of text, and why it is refused.
+//! A detection as a line of text, and the reasons for its refusal.
 
 use sdg_calibration::Frame;
 use sdg_cell::{DEFAULT_MIN_SCORE, Found, Perception};
@@ -6,12 +6,12 @@ use sdg_grasp::{Advice, EvidenceKind, GraspDetection};
 
 use crate::paint::{Paint, Tone};
 
-/// Below it nothing resembles the part: advice would mislead. Chosen by hand.
+/// Minimum score for advice: below it nothing resembles the part, and advice would mislead. Chosen by hand.
 pub const MIN_ADVISED_SCORE: f64 = 0.03;
-/// Sizes nearer to the photo's than this are no reason to name. Chosen by hand.
+/// Deviations from the photo's size below this are not given as a reason. Chosen by hand.
 const SAME_SIZE: f64 = 0.03;
 
-/// The advice for a refused detection that is the part after all, in words.
+/// The advice, in words, for a refused detection that is the part after all.
 pub fn advice_in_words(advice: Advice) -> &'static str {
     match advice {
         Advice::CheckSize => {
@@ -24,22 +24,22 @@ pub fn advice_in_words(advice: Advice) -> &'static str {
     }
 }
 
-/// What the words about the detections in a picture depend on.
+/// Inputs of the texts about the detections in a picture.
 #[derive(Debug, Clone, Copy)]
 pub struct Wording<'a> {
-    /// What found them.
+    /// The perception that found them.
     pub detector: &'a Perception,
     /// Width and height of the picture.
     pub picture_size: [u32; 2],
-    /// The score from which they are accepted.
+    /// Minimum score of accepted detections.
     pub min_score: f64,
     /// Colours of the lines.
     pub paint: Paint,
 }
 
 impl Wording<'_> {
-    /// A detection in words, in metres as well where the camera is known; for a refused one with the reasons, for an accepted one with the parts
-    /// that its jaws touch.
+    /// A detection in words, also in metres if the camera is known. For a refused one the reasons follow, for an
+    /// accepted one the parts that its jaws would touch.
     pub fn line(&self, found: &Found, touched: &[&GraspDetection]) -> String {
         let Found { detection, pose } = found;
         let grasp = detection.grasp;
@@ -78,7 +78,8 @@ impl Wording<'_> {
         )
     }
 
-    /// For each detection those whose parts its jaws touch, as numbers in the list; between accepted ones alone.
+    /// For each detection, the indices in the list of the parts that its jaws would touch; only accepted detections are
+    /// compared.
     pub fn touched(&self, detections: &[&GraspDetection]) -> Vec<Vec<usize>> {
         let accepted: Vec<usize> = (0..detections.len()).filter(|&idx| self.is_accepted(detections[idx])).collect();
         let among: Vec<&GraspDetection> = accepted.iter().map(|&idx| detections[idx]).collect();
@@ -93,12 +94,12 @@ impl Wording<'_> {
         self.paint.text(Tone::Doubtful, text)
     }
 
-    /// Whether a detection counts as the part.
+    /// Whether the detection is accepted as the part.
     pub fn is_accepted(&self, detection: &GraspDetection) -> bool {
         detection.score >= self.min_score
     }
 
-    /// What the score is made of, the network's share only where there is a network.
+    /// The components of the score; the network's share only if there is a network.
     fn measured(&self, detection: &GraspDetection) -> String {
         let network =
             self.detector.model().kind().has_network().then(|| format!("network {:.2}", detection.network_score));
@@ -106,17 +107,17 @@ impl Wording<'_> {
         [network, agreement].into_iter().flatten().collect::<Vec<_>>().join(", ")
     }
 
-    /// Indices of the refused detections, best first, that are worth a picture's dots and words: the best one, and further ones
+    /// Indices of the refused detections, best first, that get marks and text in a picture: the best one, and others
     /// that resemble the part.
     pub fn explained<'d>(&self, detections: impl Iterator<Item = &'d GraspDetection>) -> Vec<usize> {
-        /// More of them would cover each other.
+        /// More texts would overlap.
         const MAX_EXPLAINED: usize = 3;
         let refused = detections.enumerate().filter(|(_, found)| !self.is_accepted(found)).enumerate();
         let worth_it = refused.filter(|(rank, (_, found))| *rank == 0 || found.score >= MIN_ADVISED_SCORE);
         worth_it.map(|(_, (idx, _))| idx).take(MAX_EXPLAINED).collect()
     }
 
-    /// Why a detection is refused, the strongest reason first, and what would help; `None` for what is accepted.
+    /// The reasons for refusing a detection, strongest first, and advice; `None` for an accepted one.
     pub fn refusal(&self, detection: &GraspDetection) -> Option<String> {
         if self.is_accepted(detection) {
             return None;
@@ -132,7 +133,7 @@ impl Wording<'_> {
         ))
     }
 
-    /// The strongest reasons, at most so many, in words.
+    /// The strongest reasons in words, `most` at most.
     pub fn reasons(&self, detection: &GraspDetection, most: usize) -> String {
         let Some(evidence) = &detection.evidence else { return "the network is not sure".to_owned() };
         let size = self.detector.size_of(detection, self.picture_size).filter(|size| (size - 1.0).abs() >= SAME_SIZE);
@@ -149,8 +150,8 @@ impl Wording<'_> {
         if reasons.is_empty() { "all evidence together is too weak".to_owned() } else { reasons.join("; also ") }
     }
 
-    /// The line of a picture in which nothing is accepted: how many were refused, and the best of them; `are_listed` where a line of
-    /// each follows.
+    /// The line of a picture without accepted detections: the number of refused ones, and the best of them.
+    /// `are_listed` says whether a line for each of them follows.
     pub fn nothing(&self, refused: &[&GraspDetection], are_listed: bool) -> String {
         let Some(best) = refused.iter().max_by(|a, b| a.score.total_cmp(&b.score)) else {
             let nothing = self.doubtful("nothing to grasp");
@@ -160,7 +161,7 @@ impl Wording<'_> {
         let see_all = if are_listed { "" } else { " (see --all)" };
         let (x, y) = (best.grasp.x, best.grasp.y);
         let why = self.refusal(best).unwrap_or_default();
-        // Where advice was given, another one would only compete with it.
+        // A second advice would only compete with the first.
         let other_size =
             best.advice().filter(|_| best.score >= MIN_ADVISED_SCORE).map_or_else(|| self.of_other_size(), |_| None);
         format!(
@@ -174,12 +175,12 @@ impl Wording<'_> {
         )
     }
 
-    /// Where a part of the picture is searched: which.
+    /// Names the searched region, if not the whole picture is searched.
     fn in_region(&self) -> String {
         self.detector.region().map(|region| format!(" in {region}")).unwrap_or_default()
     }
 
-    /// Where the picture has another number of pixels than the photo: that the part may have a size that is not looked for.
+    /// If the picture's size differs from the photo's: a hint that the part may have a size outside the searched range.
     fn of_other_size(&self) -> Option<String> {
         if self.detector.camera_over_table().is_some() {
             return None;

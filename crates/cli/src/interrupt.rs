@@ -1,10 +1,10 @@
-//! Ctrl-C: the first ends the run with what there is, the second at once.
+//! Ctrl-C: the first ends the run with the results so far, the second ends it at once.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Signals this close are one: `timeout -s INT` sends it to the process and to its group.
+/// Signals closer together than this count as one: `timeout -s INT` sends the signal to the process and to its group.
 const SAME_PRESS: Duration = Duration::from_millis(500);
 
 /// Whether Ctrl-C was pressed.
@@ -12,12 +12,12 @@ const SAME_PRESS: Duration = Duration::from_millis(500);
 pub struct Interrupt(Arc<AtomicBool>);
 
 impl Interrupt {
-    /// Watches for Ctrl-C from now on.
+    /// Starts watching for Ctrl-C.
     pub fn watch() -> Self {
         let interrupt = Self::default();
         let flag = Arc::clone(&interrupt.0);
         let mut first: Option<Instant> = None;
-        // Without a handler Ctrl-C ends the process, which leaves nothing half-written either.
+        // Without a handler Ctrl-C ends the process; this too leaves no half-written file.
         let _ = ctrlc::set_handler(move || {
             flag.store(true, Ordering::SeqCst);
             if first.get_or_insert_with(Instant::now).elapsed() > SAME_PRESS {
@@ -27,7 +27,7 @@ impl Interrupt {
         interrupt
     }
 
-    /// Whether it was pressed.
+    /// Whether Ctrl-C was pressed.
     pub fn is_requested(&self) -> bool {
         self.0.load(Ordering::SeqCst)
     }

@@ -5,15 +5,16 @@ use std::io;
 use serde::Serialize;
 use serde_json::ser::{CompactFormatter, Formatter};
 
-/// Digits after the point: a millionth of a metre, a pixel, a degree or a second is less than anything here is exact to.
+/// Six digits after the point: a millionth of a metre, pixel, degree or second is below the accuracy of every value
+/// here.
 const ROUND_TO: f64 = 1e6;
-/// Larger numbers have no more digits after the point than that in any case, and rounding would lose some before it.
+/// Larger numbers have at most six digits after the point anyway, and rounding would lose digits before it.
 const MAX_ROUNDED: f64 = 4e9;
 
-/// A line of compact JSON without its end, with at most six digits after each point.
+/// A line of compact JSON without a line end, with at most six digits after each point.
 ///
 /// # Errors
-/// Those of the value's own serialisation.
+/// The value cannot be serialised.
 pub fn json_line<T: Serialize>(value: &T) -> serde_json::Result<String> {
     let mut line = Vec::new();
     value.serialize(&mut serde_json::Serializer::with_formatter(&mut line, Rounded))?;
@@ -29,7 +30,7 @@ impl Formatter for Rounded {
 
     fn write_f64<W: io::Write + ?Sized>(&mut self, writer: &mut W, value: f64) -> io::Result<()> {
         let rounded = if value.abs() < MAX_ROUNDED { (value * ROUND_TO).round() / ROUND_TO } else { value };
-        // A negative number that is rounded to nothing is no negative zero.
+        // A small negative number must not be rounded to negative zero.
         CompactFormatter.write_f64(writer, rounded + 0.0)
     }
 }

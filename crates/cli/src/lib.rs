@@ -4,11 +4,11 @@
 //! args ─ commands/<verb>.rs ─ inputs, cell, evaluation, annotate, ros2-node
 //! ```
 //!
-//! Without the features `simulation` and `annotate` (`cargo build -p sdg-cli --no-default-features`) it is a small program for
-//! small machines: it teaches and detects, and neither MuJoCo nor EGL nor the annotation page is in it.
+//! Without the features `simulation` and `annotate` (`cargo build -p sdg-cli --no-default-features`) the program is
+//! small, for small machines: it teaches and detects, without MuJoCo, EGL and the annotation page.
 //!
-//! The binary is a thin shell around [`run`]. What the command line does stands in the other crates; here are its arguments, words, progress
-//! and exit codes. Nothing here is an interface for programs.
+//! The binary only calls [`run`]. The work is done in other crates; this crate has the arguments, texts, progress and
+//! exit codes. It is not an interface for other programs.
 //!
 //! ```
 //! use clap::Parser;
@@ -52,20 +52,20 @@ use crate::exit::Outcome;
 use crate::paint::{Paint, Tone};
 
 #[doc(hidden)]
-/// The definition of the command line, with what no verb says by itself.
+/// The definition of the command line, with examples and exit codes.
 pub fn command() -> ClapCommand {
     examples::with_examples(Args::command())
 }
 
 #[doc(hidden)]
-/// Reads arguments, the program's name first; wrong ones end this process with their message, as `--help` does with its text.
+/// Parses arguments, the program's name first. Wrong arguments and `--help` end the process with their text.
 pub fn parse_args(arguments: impl IntoIterator<Item = OsString>) -> Args {
     clock::start();
     Args::from_arg_matches(&command().get_matches_from(arguments)).unwrap_or_else(|error| error.exit())
 }
 
 #[doc(hidden)]
-/// Runs one command; prints the one line of an error and returns the exit code.
+/// Runs one command; prints errors on one line and returns the exit code.
 pub fn run(args: &Args) -> u8 {
     let done = match &args.command {
         #[cfg(feature = "simulation")]
@@ -121,7 +121,7 @@ pub fn run(args: &Args) -> u8 {
     }
 }
 
-/// Verbs that a person waits for, and that show the time of a part of their work or none; the others that are long tell theirs in their own lines.
+/// Verbs whose total time is printed at the end: those that take long and do not report it in their own lines.
 fn tells_its_time(command: &Command) -> bool {
     match command {
         Command::Demo(_) | Command::Rehearse(_) | Command::Augment(_) => true,

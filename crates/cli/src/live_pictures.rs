@@ -1,4 +1,4 @@
-//! `--from ADDRESS`: a camera, by whichever crate opens it.
+//! `--from ADDRESS`: opens a camera with the crate for its address.
 
 use anyhow::{Context, Result};
 use clap::Args;
@@ -6,15 +6,16 @@ use sdg_camera::{Address, Camera, Encoding, Frame, OpenOptions};
 
 use crate::exit::Usage;
 
-/// A camera and what is asked of it.
+/// A camera and its settings.
 #[derive(Debug, Args)]
 pub struct LiveArgs {
-    /// Where pictures come from: v4l:, v4l:/dev/video0, v4l:NAME, http://HOST/PATH, 'cmd:PROGRAM ARGUMENTS', dir:FOLDER, file:PATH, sim: or ros2:TOPIC
+    /// The camera: v4l:, v4l:/dev/video0, v4l:NAME, http://HOST/PATH, 'cmd:PROGRAM ARGUMENTS', dir:FOLDER, file:PATH,
+    /// sim: or ros2:TOPIC
     ///
-    /// Of folders and files, options follow a question mark: dir:FOLDER?fps=10&loop, dir:FOLDER?follow.
+    /// Folders and files take options after a question mark: dir:FOLDER?fps=10&loop, dir:FOLDER?follow.
     #[arg(long, value_name = "ADDRESS")]
     pub from: Address,
-    /// What the camera is asked for
+    /// Settings of the camera
     #[command(flatten)]
     pub request: RequestArgs,
 }
@@ -22,24 +23,24 @@ pub struct LiveArgs {
 /// The heading of these options in the help.
 const LIVE: &str = "Live pictures";
 
-/// The size that a V4L2 camera is asked for.
+/// Default size requested from a V4L2 camera.
 const DEFAULT_SIZE: (u32, u32) = (640, 480);
-/// The time without a frame after which a camera is stale.
+/// Default time without a frame after which a camera is stale.
 const DEFAULT_STALL_SECS: f64 = 2.0;
-/// Consecutive faults after which a camera is given up: at the default stall timeout, half a minute.
+/// Number of consecutive faults after which reading ends: half a minute with the default stall timeout.
 const MAX_FAULTS: u32 = 15;
 
-/// What a camera is asked for.
+/// Settings of a camera.
 #[derive(Debug, Args)]
 #[command(next_help_heading = LIVE)]
 pub struct RequestArgs {
-    /// Width and height in pixels that a V4L2 camera is asked for; without this option, 640x480
+    /// Width and height in pixels requested from a V4L2 camera; default: 640x480
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     pub size: Option<(u32, u32)>,
-    /// Frames a second that a V4L2 camera is asked for; snapshots a second over HTTP
+    /// Frames per second requested from a V4L2 camera; snapshots per second over HTTP
     #[arg(long, value_name = "N")]
     pub fps: Option<f64>,
-    /// How a V4L2 camera encodes its frames; without it, what loses least
+    /// Encoding of a V4L2 camera's frames; default: the one with the smallest loss
     #[arg(long, value_name = "NAME")]
     pub encoding: Option<EncodingName>,
     /// A fixed exposure time of a V4L2 camera
@@ -48,7 +49,7 @@ pub struct RequestArgs {
     /// A fixed white balance of a V4L2 camera
     #[arg(long, value_name = "KELVIN")]
     pub white_balance_kelvin: Option<u32>,
-    /// Without a frame for so long a camera is stale; without this option, for 2 seconds
+    /// Seconds without a frame after which a camera is stale; default: 2
     #[arg(long, value_name = "SECS")]
     pub stall_secs: Option<f64>,
 }
@@ -56,9 +57,9 @@ pub struct RequestArgs {
 /// The names of encodings on the command line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum EncodingName {
-    /// 4:2:2, two bytes a pixel
+    /// 4:2:2, two bytes per pixel
     Yuyv,
-    /// Three bytes a pixel
+    /// Three bytes per pixel
     Rgb24,
     /// Motion JPEG
     Mjpeg,
@@ -75,18 +76,18 @@ impl From<EncodingName> for Encoding {
 }
 
 impl LiveArgs {
-    /// What the camera is asked for.
+    /// The settings in the form of the camera crate.
     pub(crate) fn options(&self) -> OpenOptions {
         self.request.options()
     }
 }
 
 impl RequestArgs {
-    /// Refuses what only a camera can be asked for, where no camera is given; `own` are a verb's further options of this kind, and
-    /// whether they are given.
+    /// Rejects camera settings given without a camera; `own` lists the verb's further options of this kind, with
+    /// whether each is given.
     ///
     /// # Errors
-    /// [`Usage`], which names the options that are given.
+    /// [`Usage`] with the names of the given options.
     pub(crate) fn refuse_without_camera(&self, own: &[(&'static str, bool)], found: &str) -> Result<(), Usage> {
         let asked = [
             ("--size", self.size.is_some()),
@@ -103,7 +104,7 @@ impl RequestArgs {
         Err(Usage(format!("{}: expected live pictures (--from ADDRESS), found {found}", given.join(", "))))
     }
 
-    /// The same for the crate that opens it.
+    /// The settings in the form of the crate that opens the camera.
     pub(crate) fn options(&self) -> OpenOptions {
         let (width, height) = self.size.unwrap_or(DEFAULT_SIZE);
         OpenOptions {
@@ -113,7 +114,7 @@ impl RequestArgs {
             encoding: self.encoding.map(Encoding::from),
             exposure_secs: self.exposure_ms.map(|ms| ms / 1e3),
             white_balance_kelvin: self.white_balance_kelvin,
-            // What is no time at all is refused with its number when the camera is opened.
+            // Invalid times are rejected, with their value, when the camera is opened.
             stall_timeout: std::time::Duration::try_from_secs_f64(self.stall_secs.unwrap_or(DEFAULT_STALL_SECS))
                 .unwrap_or_default(),
             ..OpenOptions::default()
@@ -124,7 +125,7 @@ impl RequestArgs {
 /// Opens a camera.
 ///
 /// # Errors
-/// It does not open, or does not take what is asked of it.
+/// The camera cannot be opened, or rejects a setting.
 pub(crate) fn open(address: &Address, options: &OpenOptions) -> Result<Box<dyn Camera>> {
     match address {
         #[cfg(feature = "simulation")]
@@ -160,10 +161,10 @@ fn parse_size(text: &str) -> Result<(u32, u32), String> {
     sides.ok_or_else(|| "expected width and height in pixels, as in 640x480".to_owned())
 }
 
-/// The next frame; passing faults are printed and passed over, but not for ever.
+/// The next frame; temporary faults are printed and skipped, up to a maximum number.
 ///
 /// # Errors
-/// One that does not pass, and too many in a row that do.
+/// A permanent fault, or too many temporary ones in a row.
 pub fn next_frame(camera: &mut dyn Camera) -> Result<Option<Frame>> {
     let mut num_faults = 0;
     loop {

@@ -1,4 +1,4 @@
-//! The `sdg` binary: parses, runs, sets the exit code.
+//! The `sdg` binary: parses the arguments, runs the command, sets the exit code.
 #![forbid(unsafe_code)]
 
 use std::process::ExitCode;

@@ -1,4 +1,4 @@
-//! Grasp models for the annotation page, which does not see them.
+//! Teaching and detection for the annotation page; its crate does not depend on grasp models.
 
 use std::borrow::Cow;
 use std::ops::ControlFlow;
@@ -31,7 +31,8 @@ use crate::paint::Paint;
 pub struct PageTeacher {
     /// Network, training and augmentation.
     pub preset: Preset,
-    /// The camera that takes the photos and the pictures to try, and the heights of marks and grasp over the table in metres.
+    /// The camera of the photos and of the pictures to try, and the heights of marks and grasp over the table in
+    /// metres.
     pub camera: Option<(CameraFile, [f64; 2])>,
 }
 
@@ -81,7 +82,7 @@ impl GraspTeacher for PageTeacher {
 }
 
 impl PageTeacher {
-    /// A model, and the demonstrations as it was taught them: from above where a camera is known.
+    /// A model, and its demonstrations as taught: in the plan view if a camera is known.
     fn taught_file<'m>(
         &self,
         material: &'m TeachingMaterial,
@@ -135,7 +136,7 @@ fn page_region(region: &SearchRegion) -> Region {
     Region { x, y, width, height, picture }
 }
 
-/// `seconds` is what the person waited: teaching, and trying the model on held-back samples.
+/// `seconds` is the time that the person waited: teaching, and testing the model on held-back samples.
 fn summary(model: &GraspModel, figures: Option<Figures>, seconds: f64) -> TaughtSummary {
     let negatives =
         model.facts().negatives.map(|said| NegativesRefused { refused: said.refused, pictures: said.pictures });
@@ -176,11 +177,11 @@ fn step(event: &TeachingEvent) -> TeachingStep {
     }
 }
 
-/// One look at a time: each uses every core.
+/// One search at a time: each uses all cores.
 struct PageModel {
     detector: Mutex<Perception>,
     summary: TaughtSummary,
-    /// Its file.
+    /// Contents of its file.
     bytes: Vec<u8>,
 }
 
@@ -243,7 +244,7 @@ impl TaughtModel for PageModel {
     }
 }
 
-/// What would help, for a person who has buttons instead of options.
+/// Advice in words for the page, which has buttons instead of options.
 fn remedy(advice: Advice) -> String {
     let words = match advice {
         Advice::CheckSize => "if it is the part, learn from it: it is taught at this size, too",
@@ -255,7 +256,7 @@ fn remedy(advice: Advice) -> String {
     words.to_owned()
 }
 
-/// What it touches is not known of one alone.
+/// `jaws_touch` stays empty: it depends on the other detections.
 fn found_grasp(detector: &Perception, found: &Found, wording: &Wording<'_>) -> FoundGrasp {
     let detection = &found.detection;
     FoundGrasp {
@@ -299,7 +300,7 @@ mod tests {
         RgbImage::from_fn(200, 120, |x, y| image::Rgb([(x * 5 % 251) as u8, (y * 7 % 241) as u8, 90]))
             .save(&photo)
             .unwrap();
-        // The outline is twice as wide beside the middle of the line, under its ends.
+        // Beside the middle of the line the outline is twice as wide as at its ends.
         let labelme = r#"{"imageWidth": 200, "imageHeight": 120, "shapes": [
             {"label": "bar", "shape_type": "polygon", "group_id": 1, "points": [[20, 40], [60, 40], [60, 20], [80, 20], [80, 40],
                 [180, 40], [180, 80], [80, 80], [80, 100], [60, 100], [60, 80], [20, 80]]},

@@ -1,19 +1,19 @@
-//! Colours for people at a terminal: none in files and pipes, none where `NO_COLOR` is set (https://no-color.org) or the terminal is dumb.
+//! Terminal colours: none in files and pipes, with `NO_COLOR` (https://no-color.org) or on a dumb terminal.
 
 use std::io::IsTerminal;
 
-/// What a colour says; the words say it, too.
+/// The meaning of a colour; the text states it too.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Tone {
     /// Found.
     Good,
-    /// To be looked at: refused, a warning.
+    /// Needs attention: refused, or a warning.
     Doubtful,
     /// An error.
     Bad,
 }
 
-/// Whether a stream shows colours.
+/// Whether a stream is coloured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Paint(bool);
 
@@ -32,7 +32,7 @@ impl Paint {
         Self(std::io::stderr().is_terminal() && is_wanted(|name| std::env::var_os(name)))
     }
 
-    /// The text in a tone's colour, of the terminal's own palette.
+    /// The text in the tone's colour from the terminal's palette.
     pub fn text(self, tone: Tone, text: &str) -> String {
         let code = match tone {
             Tone::Good => 32,

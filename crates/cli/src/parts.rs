@@ -1,4 +1,4 @@
-//! Shipped parts by the names that options give.
+//! Shipped parts by name.
 
 use anyhow::Result;
 use sdg_simulation::objects::ObjectSpec;
@@ -8,7 +8,7 @@ use crate::exit::Usage;
 /// The shipped part that an option names.
 ///
 /// # Errors
-/// [`Usage`] with the option and the names that there are.
+/// [`Usage`] with the option and the known names.
 pub(crate) fn part_named(option: &str, name: &str) -> Result<ObjectSpec> {
     ObjectSpec::by_name(name).map_err(|error| Usage(format!("{option}: {error}")).into())
 }

@@ -1,4 +1,4 @@
-//! An evaluation as it is seen: a line for every unit that ends, and on a terminal a bar below; on standard error.
+//! Progress of an evaluation on standard error: a line per finished unit, and on a terminal a bar below.
 
 use std::io::IsTerminal;
 use std::sync::Mutex;
@@ -8,7 +8,7 @@ use std::time::Instant;
 use indicatif::{ProgressBar, ProgressStyle};
 use sdg_evaluation::Progress;
 
-/// Shows what was done; shared by all workers.
+/// Shows progress; shared by all workers.
 pub struct EvaluationProgress {
     bar: Option<ProgressBar>,
     started: Instant,
@@ -61,7 +61,7 @@ impl Progress for EvaluationProgress {
         let mut counted = self.counted.lock().unwrap_or_else(PoisonError::into_inner);
         counted.done += 1;
         let (done, of) = (counted.done, counted.of);
-        // Under the lock, so that lines stand in the order of their numbers.
+        // Printed while the lock is held, so that lines are in the order of their numbers.
         self.print_line(&format!("[{done}/{of}, {:.0} s] {what}", self.started.elapsed().as_secs_f64()));
         if let Some(bar) = &self.bar {
             bar.inc(1);

@@ -1,4 +1,4 @@
-//! Arguments that several verbs take, and the values that they may have.
+//! Arguments that several verbs share, and their value types.
 
 use std::path::PathBuf;
 
@@ -6,10 +6,10 @@ use clap::Args as ClapArgs;
 use sdg_grasp::{ComputeBackend, SearchRegion};
 use sdg_robot::height::ToldHeight;
 
-/// Where a network computes.
+/// Device for the network.
 #[derive(Debug, ClapArgs)]
 pub struct ComputeArgs {
-    /// Where the network computes: flex, or what this build adds; see sdg devices
+    /// Device for the network: flex, or one that this build adds; see sdg devices
     #[arg(long, default_value = "flex", value_name = "NAME", value_parser = backend)]
     pub device: ComputeBackend,
 }
@@ -17,14 +17,14 @@ pub struct ComputeArgs {
 /// The camera that took the photos to teach from.
 #[derive(Debug, ClapArgs)]
 pub struct TaughtCameraArgs {
-    /// The calibrated camera that took the photos, as ROS's camera_info YAML with the camera's pose over the table: the model
-    /// then knows the part's size and works with every calibrated camera
+    /// The calibrated camera that took the photos, as ROS camera_info YAML with the camera's pose over the table. The
+    /// model then knows the part's size and works with every calibrated camera
     #[arg(id = "camera", long = "camera", value_name = "FILE", requires = "mark_height_mm")]
     pub file: Option<PathBuf>,
-    /// Height of the marks over the table: of the surface that they lie on, not of the table
+    /// Height over the table of the surface with the marks
     #[arg(long, value_name = "MM", value_parser = height_mm, requires = "camera")]
     pub mark_height_mm: Option<f64>,
-    /// Height over the table at which the gripper closes; without it, half of the marks' height
+    /// Height over the table at which the gripper closes; default: half of the marks' height
     #[arg(long, value_name = "MM", value_parser = height_mm, requires = "camera")]
     pub grasp_height_mm: Option<f64>,
 }
@@ -37,40 +37,41 @@ impl TaughtCameraArgs {
     }
 }
 
-/// How high the part lies, where that is known.
+/// The part's height, if known.
 #[derive(Debug, Clone, Copy, ClapArgs)]
 pub struct ToldHeightArgs {
-    /// Height of the marks over the workcell's table. With a camera on the hand it may be left out: it is measured from two pictures on the
-    /// way down; where it is given, the more certain of both is used, and a grasp is refused where they contradict each other
+    /// Height of the marks over the workcell's table. With a camera on the hand it may be omitted: it is then measured
+    /// from two pictures on the way down. If both are known, the more certain one is used, and a grasp is refused if
+    /// they contradict each other
     #[arg(long, value_name = "MM", value_parser = height_mm)]
     pub mark_height_mm: Option<f64>,
-    /// How far that height may be off: one standard deviation
+    /// Standard deviation of that height
     #[arg(long, value_name = "MM", value_parser = sigma_mm, default_value_t = 1.0, requires = "mark_height_mm")]
     pub mark_height_sigma_mm: f64,
 }
 
 impl ToldHeightArgs {
-    /// The height that was told, over a table at this z of the base, m.
+    /// The given height for a table at `table_height_m` in the base frame, m.
     pub fn told(&self, table_height_m: f64) -> Option<ToldHeight> {
         let height_m = table_height_m + 1e-3 * self.mark_height_mm?;
         Some(ToldHeight { height_m, sigma_m: 1e-3 * self.mark_height_sigma_mm })
     }
 }
 
-/// What the photo does not show of the user's own part.
+/// Properties of the user's own part that the photo does not show.
 #[derive(Debug, Clone, ClapArgs)]
 pub struct OwnPartArgs {
-    /// Instead of --object the part that the model was taught from, with its outline and photo: its height over the table; not
-    /// needed for a model taught with --camera
+    /// Rehearse the part that the model was taught from, with its outline and photo, in place of --object: its height
+    /// over the table; not needed for a model taught with --camera
     #[arg(long, value_name = "MM", value_parser = size_mm, conflicts_with = "object", help_heading = OWN_PART)]
     pub height_mm: Option<f64>,
-    /// The longer side of its box; not needed for a model taught with --camera
+    /// Length of the longer side of its box; not needed for a model taught with --camera
     #[arg(long, value_name = "MM", value_parser = size_mm, conflicts_with = "object", help_heading = OWN_PART)]
     pub length_mm: Option<f64>,
-    /// What it weighs; without it, what its volume would at 1.5 g/cm3
+    /// Mass; default: that of its volume at 1.5 g/cm3
     #[arg(long, value_name = "G", value_parser = positive, conflicts_with = "object", help_heading = OWN_PART)]
     pub mass_g: Option<f64>,
-    /// Coefficient of friction of its surface; without it, 0.6
+    /// Coefficient of friction of its surface; default: 0.6
     #[arg(long, value_name = "MU", value_parser = positive, conflicts_with = "object", help_heading = OWN_PART)]
     pub friction: Option<f64>,
 }
@@ -78,7 +79,7 @@ pub struct OwnPartArgs {
 /// The heading of these options in the help.
 const OWN_PART: &str = "Your own part";
 
-/// Smallest and largest size of a part over the nominal one.
+/// Smallest and largest size of a part relative to its nominal size.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SizeTolerance {
     /// From 0.5 to 1.
@@ -93,19 +94,19 @@ impl SizeTolerance {
     }
 }
 
-/// The part of pictures that is searched.
+/// The region of pictures that is searched.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RegionArg {
-    /// All of them.
+    /// The whole picture.
     All,
     Part(SearchRegion),
 }
 
-/// What a region looks like.
+/// Expected form of a region.
 const REGION: &str =
     "expected X,Y,W,H in whole pixels of the picture (left edge, upper edge, width, height), such as 100,50,200,200";
 
-/// Four numbers: a region of at least a pixel.
+/// Parses four numbers: a region of at least one pixel.
 pub fn region(text: &str) -> Result<SearchRegion, String> {
     let numbers: Option<Vec<u32>> = text.split(',').map(|number| number.trim().parse().ok()).collect();
     match numbers.as_deref() {
@@ -117,7 +118,7 @@ pub fn region(text: &str) -> Result<SearchRegion, String> {
     }
 }
 
-/// The same, or `all`.
+/// Parses a region, or `all`.
 pub fn region_or_all(text: &str) -> Result<RegionArg, String> {
     if text.eq_ignore_ascii_case("all") {
         return Ok(RegionArg::All);
@@ -125,12 +126,12 @@ pub fn region_or_all(text: &str) -> Result<RegionArg, String> {
     region(text).map(RegionArg::Part).map_err(|error| format!("{error}; or all, for all of the picture"))
 }
 
-/// A device's name.
+/// Parses a device's name.
 pub fn backend(text: &str) -> Result<ComputeBackend, String> {
     text.parse().map_err(|error: sdg_grasp::GraspError| error.to_string())
 }
 
-/// Two numbers with a hyphen between them: [`SizeTolerance`].
+/// Parses two numbers separated by a hyphen.
 pub fn size_tolerance(text: &str) -> Result<SizeTolerance, String> {
     let bounds = text.split_once('-').map(|(low, high)| (low.trim().parse(), high.trim().parse()));
     match bounds {
@@ -141,7 +142,7 @@ pub fn size_tolerance(text: &str) -> Result<SizeTolerance, String> {
     }
 }
 
-/// A number from 0 to 1.
+/// Parses a number from 0 to 1.
 pub fn share(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(share) if (0.0..=1.0).contains(&share) => Ok(share),
@@ -149,7 +150,7 @@ pub fn share(text: &str) -> Result<f64, String> {
     }
 }
 
-/// A positive, finite number.
+/// Parses a positive, finite number.
 pub fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
@@ -157,7 +158,7 @@ pub fn positive(text: &str) -> Result<f64, String> {
     }
 }
 
-/// A positive, finite number of seconds.
+/// Parses a positive, finite number of seconds.
 pub fn seconds(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(secs) if secs.is_finite() && secs > 0.0 => Ok(secs),
@@ -165,22 +166,23 @@ pub fn seconds(text: &str) -> Result<f64, String> {
     }
 }
 
-/// A height over the table. A part higher than half a metre was given in another unit.
+/// Parses a height over the table. A larger number than half a metre suggests another unit.
 pub fn height_mm(text: &str) -> Result<f64, String> {
     millimetres(text, "a height", [0.0, 500.0])
 }
 
-/// How far a height may be off.
+/// Parses the standard deviation of a height.
 fn sigma_mm(text: &str) -> Result<f64, String> {
     millimetres(text, "a standard deviation", [0.1, 100.0])
 }
 
-/// The size of a part. No part is smaller than a millimetre; one that no hand takes is refused by its jaws.
+/// Parses the size of a part, at least 1 mm. A part too large for the hand is rejected later, by its grasp width.
 fn size_mm(text: &str) -> Result<f64, String> {
     millimetres(text, "a size", [1.0, 5000.0])
 }
 
-/// A length from `min` to `max`. A tenth of a millimetre is less than anything here is known to: such a number is in metres.
+/// Parses a length from `min` to `max`. A number below 0.1 mm is finer than any accuracy here: it was probably given in
+/// metres.
 pub fn millimetres(text: &str, name: &str, [min, max]: [f64; 2]) -> Result<f64, String> {
     const MIN_MM: f64 = 0.1;
     let number = text.parse().unwrap_or(f64::NAN);

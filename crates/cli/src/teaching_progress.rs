@@ -1,4 +1,4 @@
-//! A teaching's progress on standard error: a bar on a terminal, plain lines elsewhere.
+//! Progress of a teaching on standard error: a bar on a terminal, plain lines elsewhere.
 
 use std::io::IsTerminal;
 use std::ops::ControlFlow;
@@ -8,17 +8,17 @@ use sdg_grasp::{TeachingEvent, ValidationRecord};
 
 use crate::interrupt::Interrupt;
 
-/// Steps between plain lines.
+/// Number of steps between plain lines.
 const LINE_EVERY: usize = 20;
-/// Share of the newest loss in the smoothed one that is shown.
+/// Weight of the newest loss in the displayed moving average.
 const SMOOTHING: f64 = 0.1;
 
-/// The bar; the message takes what is left of the terminal's width, and is cut there.
+/// The bar; the message gets the rest of the terminal's width and is cut there.
 const TEMPLATE: &str = "teaching {bar:12.cyan/blue} {pos}/{len} {wide_msg}";
-/// What follows the last step, and takes a while.
+/// Shown after the last step, while the model is tested.
 const AFTER_LAST_STEP: &str = "trying it on held-back samples";
 
-/// Shows events and passes Ctrl-C on.
+/// Shows events, and stops the teaching on Ctrl-C.
 pub struct TeachingProgress {
     bar: Option<ProgressBar>,
     interrupt: Interrupt,
@@ -28,13 +28,13 @@ pub struct TeachingProgress {
 }
 
 impl TeachingProgress {
-    /// A bar if standard error is a terminal, lines if not.
+    /// Shows a bar if standard error is a terminal, else lines.
     pub fn new(interrupt: Interrupt) -> Self {
         let bar = std::io::stderr().is_terminal().then(|| bar_on(ProgressDrawTarget::stderr()));
         Self { bar, interrupt, told_of_interrupt: false, loss: None, last_validation: String::new() }
     }
 
-    /// Shows one event; breaks when Ctrl-C was pressed.
+    /// Shows one event; breaks after Ctrl-C.
     pub fn show(&mut self, event: &TeachingEvent) -> ControlFlow<()> {
         match event {
             TeachingEvent::Step { record, planned_steps, elapsed_secs } => {
@@ -77,7 +77,7 @@ impl TeachingProgress {
         if self.interrupt.is_requested() {
             if !self.told_of_interrupt {
                 self.told_of_interrupt = true;
-                self.line("interrupted: keeping the best network so far; once more to end at once");
+                self.line("interrupted: keeping the best network so far; press Ctrl-C again to stop at once");
             }
             return ControlFlow::Break(());
         }
@@ -133,12 +133,13 @@ fn show_step(bar: &ProgressBar, done: usize, planned: usize, message: String) {
     bar.set_message(message);
 }
 
-/// Seconds until the last step, by the pace so far; `None` after it, when more than that is to come.
+/// Estimated seconds until the last step at the pace so far; `None` after it, because an unknown amount of work
+/// follows.
 fn left_secs(elapsed_secs: f64, done: usize, planned: usize) -> Option<f64> {
     (done < planned).then(|| elapsed_secs / done as f64 * (planned - done) as f64)
 }
 
-/// Minutes and seconds, as a clock shows them; a remaining time is never shown as zero.
+/// Minutes and seconds, rounded up: a remaining time is never shown as zero.
 fn clock(secs: f64) -> String {
     let secs = secs.ceil() as u64;
     format!("{}:{:02}", secs / 60, secs % 60)
@@ -151,7 +152,7 @@ mod tests {
     use std::io;
     use std::sync::{Arc, Mutex};
 
-    /// A terminal of 80 columns that keeps what is written.
+    /// A terminal of 80 columns that records its output.
     #[derive(Debug, Clone, Default)]
     struct Terminal(Arc<Mutex<String>>);
 
@@ -186,7 +187,7 @@ mod tests {
         }
     }
 
-    /// Without the colours.
+    /// Removes the colours.
     fn plain(text: &str) -> String {
         let mut parts = text.split('\u{1b}');
         let first = parts.next().unwrap_or_default().to_owned();

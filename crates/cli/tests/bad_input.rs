@@ -1,4 +1,4 @@
-//! Wrong input, as a user would give it: one clear line, the exit code of docs/command-line.md, nothing half-written.
+//! Wrong user input: one clear line, the exit code of docs/command-line.md, no half-written file.
 
 use std::fs;
 use std::path::Path;
@@ -7,7 +7,7 @@ use sdg_evaluation::{Settings, Store};
 
 use crate::support::{Folder, sdg, shipped, taught_pendulum};
 
-/// Asserts exit code and one line on standard error that contains every part.
+/// Asserts the exit code, and one line on standard error with every part.
 fn assert_refused(arguments: &[&str], code: i32, parts: &[&str]) {
     let output = sdg(arguments);
     let stderr = String::from_utf8(output.stderr).unwrap();
@@ -53,7 +53,8 @@ fn unreadable_images_are_refused_by_name() {
 fn a_decompression_bomb_is_refused_before_memory_is_taken() {
     let folder = tempfile::tempdir().unwrap();
     let bomb = folder.path().join("bomb.png");
-    // A valid header that promises 60000 × 60000 pixels; width and height are bytes 16 to 23, their sum of IHDR follows.
+    // A valid header that announces 60000 × 60000 pixels; width and height are bytes 16 to 23, followed by the CRC of
+    // IHDR.
     let mut bytes = fs::read(shipped("pendulum", "image.png")).unwrap();
     bytes[16..20].copy_from_slice(&60_000u32.to_be_bytes());
     bytes[20..24].copy_from_slice(&60_000u32.to_be_bytes());
@@ -264,7 +265,7 @@ fn a_picture_of_another_size_with_nothing_in_it_is_answered_with_advice() {
 #[test]
 fn a_model_that_fails_its_own_samples_is_written_and_ends_with_4() {
     let folder = Folder::new();
-    // A patch of a checkerboard, which is everywhere.
+    // A patch of a checkerboard, which occurs everywhere in the picture.
     let photo = folder.path("checks.png");
     let checks =
         image::GrayImage::from_fn(640, 480, |x, y| image::Luma([if (x / 40 + y / 40) % 2 == 0 { 200 } else { 60 }]));

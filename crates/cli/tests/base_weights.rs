@@ -1,4 +1,4 @@
-//! `sdg teach --base-weights` as a user calls it.
+//! `sdg teach --base-weights` as called by a user.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -18,7 +18,7 @@ use serde_json::{Map, Value, json};
 
 use crate::support::sdg;
 
-/// Runs `sdg` with that much address space and no more.
+/// Runs `sdg` with its address space limited to `bytes`.
 fn sdg_within(bytes: u64, arguments: &[&str]) -> Output {
     let limited = format!("ulimit -v {}; exec \"$0\" \"$@\"", bytes / 1024);
     let sdg = env!("CARGO_BIN_EXE_sdg");
@@ -39,7 +39,7 @@ fn text(bytes: Vec<u8>) -> String {
     String::from_utf8(bytes).unwrap()
 }
 
-/// A checkpoint with names and shapes of torchvision's own model and random values of a size that features keep.
+/// A checkpoint with names and shapes of torchvision's model and random values, small enough that features stay finite.
 fn write_torchvision_model(model: &str, path: &Path) {
     let models: BTreeMap<String, BTreeMap<String, Vec<usize>>> =
         serde_json::from_slice(&fs::read(fixture("torchvision_names.json")).unwrap()).unwrap();
@@ -83,7 +83,7 @@ fn a_whole_r50_is_converted_and_taught_for_a_few_steps() {
     let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let (theirs, ours, out) = (at("torchvision.safetensors"), at("converted.safetensors"), at("part.sdg"));
     write_torchvision_model("keypointrcnn_resnet50_fpn", Path::new(&theirs));
-    // One and a half times the file is owed. Measured for its 237 MB: 13 MB at most, 0.8 s.
+    // The limit is one and a half times the file. Measured for its 237 MB: at most 13 MB, 0.8 s.
     let bytes = fs::metadata(&theirs).unwrap().len();
     let start = Instant::now();
     let converted = sdg_within(bytes * 3 / 2, &["weights", "convert", &theirs, &ours]);
@@ -106,14 +106,14 @@ fn a_whole_r50_is_converted_and_taught_for_a_few_steps() {
     let (stdout, stderr) = (text(taught.stdout), text(taught.stderr));
     assert!(stdout.contains("reinit      roi_heads.keypoint_head.score_lowres.weight"), "{stdout}");
     assert!(stdout.contains("0 missing, 0 mismatched, 0 unused, 2 re-initialised"), "{stdout}");
-    // Three steps teach a random network nothing: it is examined, found useless and not kept.
+    // Three steps teach a random network nothing: it fails validation and is not kept.
     assert!(stderr.contains("teaching: step 3 of 3"), "{stderr}");
     assert!(stderr.lines().last().unwrap().contains("held-back samples: too few to keep"), "{stderr}");
     assert_eq!(taught.status.code(), Some(1));
     assert!(!Path::new(&out).exists());
 }
 
-/// Asserts that a backbone alone fills the backbone of a network, the whole of it and nothing else.
+/// Asserts that a backbone fills all of a network's backbone and nothing else.
 fn assert_fills_backbone(path: &Path, network: &RcnnConfig, unused: &[&str]) -> BaseWeights {
     let mut told = Vec::new();
     let base = base_weights::read(path, network, &[], &mut |report| {
@@ -131,7 +131,7 @@ fn assert_fills_backbone(path: &Path, network: &RcnnConfig, unused: &[&str]) -> 
     base
 }
 
-/// The pyramid and the heads shrunk: nothing here looks at them.
+/// Narrow pyramid and heads; these tests do not use them.
 fn with_narrow_heads(mut network: RcnnConfig) -> RcnnConfig {
     network.fpn.channels = 8;
     network.roi_heads.box_head.fc_channels = 8;
@@ -173,14 +173,14 @@ fn msra_s_resnet_50_of_caffe2_fills_a_backbone() {
         *inner_channels = 1;
     }
     let path = fixture("msra_r50.pkl");
-    // The stem's bias belongs to a norm that is folded already; Detectron2 leaves it out, too.
+    // The stem's bias belongs to a norm that is already folded; Detectron2 omits it too.
     let base = assert_fills_backbone(Path::new(&path), &network, &["conv1_b"]);
     let values = |name: &str| &base.parameters[&format!("backbone.bottom_up.{name}")].values;
     assert_eq!(
         (&values("stem.conv1.norm.running_mean")[..], &values("stem.conv1.norm.running_var")[..]),
         (&[0.0; 2][..], &[1.0; 2][..])
     );
-    // The generator counts on through the file: the first scale is a quarter.
+    // The generator's values continue through the file: the first scale is a quarter.
     assert_eq!(values("stem.conv1.norm.weight"), &[0.25, 0.5]);
 }
 
@@ -202,7 +202,7 @@ fn weights_of_our_own_are_a_start_for_every_network_and_none_is_none() {
         let output = sdg(&[&["teach", "--demo", &demonstration, "--out", &out, "--steps", "2"], arguments].concat());
         (output.status.code(), text(output.stdout), text(output.stderr))
     };
-    // Two steps teach nothing; what is wrong with the weights would have come before.
+    // Two steps teach nothing; an error in the weights would have been reported before.
     for model in ["A", "D"] {
         let (code, stdout, stderr) = teach(&["--model", model, "--base-weights", &own]);
         assert!(stdout.contains("own.safetensors: seed 3"), "{stdout}");

@@ -1,4 +1,5 @@
-//! Many pictures at once: folders, standard input, broken files among others, other formats, marks beside their photo.
+//! Many pictures at once: folders, standard input, broken files among valid ones, other formats, marks beside their
+//! photo.
 
 use std::fs;
 use std::io::Write;
@@ -9,7 +10,7 @@ use crate::support::{Folder, pendulum_twice, sdg, shipped, stdout, taught_pendul
 use image::{ImageFormat, Rgb, RgbImage};
 use serde_json::Value;
 
-/// The lever's photo and its marks in a folder, and a model S taught from them.
+/// A folder with the lever's photo and marks, and a model S taught from them.
 fn taught(folder: &Folder) -> String {
     fs::copy(shipped("pendulum", "image.png"), folder.path("photo.png")).unwrap();
     fs::copy(shipped("pendulum", "annotation.json"), folder.path("photo.json")).unwrap();
@@ -35,7 +36,7 @@ fn with_input(arguments: &[&str], input: &[u8]) -> Output {
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    // A command that refuses its arguments does not read.
+    // A command that rejects its arguments does not read standard input.
     let _ = child.stdin.take().unwrap().write_all(input);
     child.wait_with_output().unwrap()
 }
@@ -70,11 +71,11 @@ fn a_batch_goes_on_past_what_cannot_be_read() {
     for line in &lines[2..5] {
         assert_eq!(line["detections"].as_array().unwrap().len(), 1, "{line}");
         assert!((line["detections"][0]["size"].as_f64().unwrap() - 1.0).abs() < 0.02, "{line}");
-        // Lossless, so that all three are the same picture.
+        // Lossless, so that all three pictures are identical.
         assert_eq!(line["detections"], lines[2]["detections"]);
     }
     let stderr = String::from_utf8(output.stderr).unwrap();
-    assert!(stderr.contains("skipped what is no picture: notes.txt"), "{stderr}");
+    assert!(stderr.contains("skipped files that are not pictures: notes.txt"), "{stderr}");
     assert!(stderr.contains("3 of 6 pictures could not be used"), "{stderr}");
     let summary = stderr.lines().find(|line| line.starts_with("found ")).expect("a summary");
     assert!(summary.ends_with(" of 3 pictures"), "{summary}");
@@ -103,7 +104,7 @@ fn a_picture_comes_from_standard_input() {
 fn a_refusal_says_why_and_what_would_help() {
     let folder = Folder::new();
     let model = taught(&folder);
-    // A sheet over a good half of the lever.
+    // A sheet covers more than half of the lever.
     let mut covered = photo();
     let line = &lines(&sdg(&["detect", "--grasp-model", &model, "--json", &folder.path("photo.png")]))[0];
     let bounds: Vec<f64> =
@@ -129,13 +130,13 @@ fn a_refusal_says_why_and_what_would_help() {
         "{text}"
     );
     assert!(!text.contains("network"), "model S has none: {text}");
-    // Red dots where its edges are covered.
+    // Red dots at the covered edges.
     let drawn = image::open(Path::new(&drawn).join("covered.png")).unwrap().to_rgb8();
     let dots = drawn.enumerate_pixels().filter(|(_, _, pixel)| pixel.0 == [255, 40, 60]);
     let on_sheet = dots.filter(|(x, y, _)| covered.get_pixel(*x, *y).0 == [128, 126, 122]).count();
     assert!(on_sheet > 50, "{on_sheet} dots on the sheet");
 
-    // Whoever knows better may set another limit.
+    // A user may set another limit.
     let json = |min_score: &str| {
         let output = sdg(&["detect", "--grasp-model", &model, "--json", "--min-score", min_score, &picture]);
         let line = lines(&output).remove(0);
@@ -216,7 +217,7 @@ fn another_of_the_part_in_the_photo_does_not_count_as_wrong() {
     let taught = stdout(&["teach", "--model", "S", "--demo", &photo, "--seed", "5", "--out", &model, "--json"]);
     let held_back = &serde_json::from_str::<Value>(&taught).unwrap()["held_back"];
     assert_eq!(held_back["others_in_photo"], 1, "{held_back}");
-    // With the other part among the background every sample has something wrong.
+    // With the other part in the background, every sample has a wrong detection.
     assert!(held_back["wrong"].as_u64().unwrap() <= 2, "{held_back}");
 }
 
@@ -236,7 +237,7 @@ fn jaws_that_would_touch_a_neighbour_are_told() {
     let folder = Folder::new();
     let model = taught(&folder);
     let (near, far) = (folder.path("near.png"), folder.path("far.png"));
-    // The neighbour's ring lies where a jaw of the first one comes down; the other neighbour is out of reach.
+    // A jaw of the first grasp would hit the neighbour's ring; the other neighbour is out of reach.
     pendulum_twice([59, -6]).save(&near).unwrap();
     pendulum_twice([-200, 100]).save(&far).unwrap();
     let printed = stdout(&["detect", "--grasp-model", &model, "--json", &near, &far]);
@@ -251,7 +252,7 @@ fn jaws_that_would_touch_a_neighbour_are_told() {
     let words = stdout(&["detect", "--grasp-model", &model, &near, &far]);
     let told = words.lines().filter(|line| line.contains("warning: the jaws would touch the part at ("));
     assert!(told.clone().count() >= 1 && told.clone().all(|line| line.contains("near.png")), "{words}");
-    // A part that does not count is not in the way.
+    // A part outside the region is not considered.
     let alone = sdg(&["detect", "--grasp-model", &model, "--all", "--min-score", "1", "--json", &near]);
     let alone = lines(&alone);
     let listed = alone[0]["detections"].as_array().unwrap();

@@ -1,4 +1,5 @@
-//! `sdg camera board`, `calibrate`, `table` and `hand-eye`, from the printed sheet to a file that `sdg detect --camera` takes, and what is refused.
+//! `sdg camera board`, `calibrate`, `table` and `hand-eye`, from the printed sheet to a file for `sdg detect --camera`,
+//! and rejected inputs.
 
 use std::fmt::Write;
 use std::fs;
@@ -13,16 +14,16 @@ use nalgebra::{Isometry3, Point2, Vector3};
 use sdg_geometry::PinholeCamera;
 use serde_json::Value;
 
-/// The focal length from 15 pictures, as a share of itself.
+/// Maximum relative error of the focal length from 15 pictures.
 const MAX_FOCAL_ERROR: f64 = 0.002;
-/// The camera over the table with intrinsics that are off by that much, from 0.3 m.
+/// Maximum error of the camera's position over the table, from 0.3 m, with that focal length error.
 const MAX_PLACE_ERROR_M: f64 = 0.001;
 
 fn json(arguments: &[&str]) -> Value {
     serde_json::from_str(&stdout(arguments)).unwrap()
 }
 
-/// Exit code, and a message with every part.
+/// Asserts the exit code, and a message with every part.
 fn assert_refused(arguments: &[&str], code: i32, parts: &[&str]) {
     let output = sdg(arguments);
     let stderr = String::from_utf8_lossy(&output.stderr);
@@ -43,7 +44,7 @@ impl Folder {
         self.picture(name, &render(&board(), camera, pose, &Exposure::ORDINARY, &mut Random(8)))
     }
 
-    /// The file of a camera of known intrinsics.
+    /// The file of a camera with known intrinsics.
     fn camera(&self, camera: &PinholeCamera) -> String {
         let camera = sdg_calibration::CalibratedCamera {
             name: "known".to_owned(),
@@ -64,12 +65,12 @@ fn translation(pose: &Value) -> Vector3<f64> {
     Vector3::new(number(&values[0]), number(&values[1]), number(&values[2]))
 }
 
-/// The number of an SVG element's attribute.
+/// The value of a numeric attribute of an SVG element.
 fn attribute(element: &str, name: &str) -> Option<f64> {
     element.split_once(&format!(" {name}=\""))?.1.split_once('"')?.0.parse().ok()
 }
 
-/// What the SVG's squares and dots print, by places in sides of a square from the first square's lower left corner.
+/// The area printed by the SVG's squares and dots, by positions in squares from the first square's lower left corner.
 fn printed(svg: &str) -> impl Fn(&Point2<f64>) -> bool + use<> {
     let squares: Vec<[f64; 3]> = svg
         .lines()
@@ -84,7 +85,7 @@ fn printed(svg: &str) -> impl Fn(&Point2<f64>) -> bool + use<> {
         .collect();
     assert_eq!(squares.len(), 27);
     let [left, top, side] = squares[0];
-    // Millions of places are asked for: only what lies within a side of a place's cell is looked through.
+    // There are millions of queries: only shapes near the position's cell are tested.
     const CELLS: usize = 32;
     let cell = move |value: f64, start: f64| ((value - start) / side).floor() + (CELLS / 2) as f64;
     let mut near = Vec::new();
@@ -165,7 +166,7 @@ fn from_the_sheet_to_a_camera_file_that_detects() {
     let written = fs::read_to_string(&out).unwrap();
     assert!(written.contains("exposure_us: 4000\n") && written.contains("table:\n  frame: table\n"), "{written}");
 
-    // The sheet's x along the base's -y, 400 mm in front of the robot, on a plate of 3 mm.
+    // The sheet's x is the base's -y; the sheet is 400 mm in front of the robot, on a plate of 3 mm.
     let based = files.path("based.yaml");
     let common = ["camera", "table", &on_table, "--camera", &out, "--board", &svg, "--json"];
     let place =
@@ -176,14 +177,14 @@ fn from_the_sheet_to_a_camera_file_that_detects() {
     assert_eq!(in_base["frame"], "base");
     assert!((translation(&in_base["frame_from_camera"]) - expected).norm() < 1e-9, "{in_base}");
 
-    // A printer that prints 100 mm as 98: the camera is nearer.
+    // The printer prints 100 mm as 98 mm: the camera is nearer.
     let scaled = json(&[&common[..], &["--measured-mm", "98", "--out", &based]].concat());
     assert!((translation(&scaled["frame_from_camera"]) - at * 0.98).norm() < 1e-6, "{scaled}");
 
     let model = files.path("part.sdg");
     taught_pendulum(&model, Some(Path::new(&files.text("wrist.yaml", WRIST_CAMERA))));
     let detected = sdg(&["detect", "--grasp-model", &model, "--camera", &out, "--json", &on_table]);
-    // There is no pendulum on the sheet.
+    // The pendulum is not on the sheet.
     assert_eq!(detected.status.code(), Some(3), "{}", String::from_utf8_lossy(&detected.stderr));
     let line: Value = serde_json::from_slice(&detected.stdout).unwrap();
     assert_eq!(line["width"], 640, "{line}");
@@ -197,7 +198,7 @@ fn a_camera_s_frames_are_taken_where_they_show_something_new() {
     fs::create_dir(&frames).unwrap();
     let poses = poses(&camera);
     let mut random = Random(4);
-    // Each view twice, and now and then nothing at all.
+    // Each view twice, with pictures without the board in between.
     for (k, pose) in poses.iter().enumerate() {
         for copy in 0..2 {
             let picture = render(&board(), &camera, pose, &Exposure::ORDINARY, &mut random);
@@ -216,7 +217,7 @@ fn a_camera_s_frames_are_taken_where_they_show_something_new() {
     assert!(output.status.success(), "{told}");
     let found: Value = serde_json::from_slice(&output.stdout).unwrap();
     let used = found["pictures"].as_array().unwrap();
-    // No view is taken twice, and it ends when nothing is lacking.
+    // No view is taken twice, and taking ends when nothing is missing.
     assert!((12..=poses.len()).contains(&used.len()), "{told}");
     assert_eq!(fs::read_dir(&taken).unwrap().count(), used.len());
     assert_eq!(told.lines().filter(|line| line.starts_with("taken: ")).count(), used.len(), "{told}");
@@ -251,7 +252,7 @@ fn a_camera_s_frames_are_taken_where_they_show_something_new() {
     );
 }
 
-/// As a phone: a straight lens, never calibrated.
+/// A phone: no lens distortion, never calibrated.
 const PHONE: PinholeCamera = PinholeCamera {
     width: 1280,
     height: 720,
@@ -384,7 +385,7 @@ fn pictures_and_files_that_cannot_be_used_are_refused_with_what_is_missing() {
     let text = files.text("text.png", "no picture");
     calibrate(&[&text], 1, &["text.png", "found none among 1"]);
 
-    // A file that cannot be updated is told before pictures are taken for it.
+    // A file that cannot be updated is reported before pictures are taken.
     let unusable = files.text("unusable.yaml", "{a: 1}");
     let (from, taken) = (format!("dir:{}?loop", files.path("")), files.path("taken"));
     let live = ["camera", "calibrate", "--from", &from, "--taken", &taken, "--no-browser", "--out", &unusable];

@@ -1,4 +1,4 @@
-//! `--camera` on the command line: a part taught with one camera, found in metres, and camera files that are none.
+//! `--camera` on the command line: a part taught with one camera, detected in metres, and invalid camera files.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -11,7 +11,8 @@ use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::views::{OTHER_CAMERAS, OnTable, other_view};
 use serde_json::{Value, json};
 
-/// The wrist camera as the shipped photos were taken: straight down from 0.58 m, the picture's right along -y of the base.
+/// The wrist camera in the pose of the shipped photos: straight down from 0.58 m; right in the picture is -y of the
+/// base.
 pub const WRIST_CAMERA: &str = include_str!("wrist.yaml");
 
 impl Folder {
@@ -26,7 +27,7 @@ impl Folder {
     }
 }
 
-/// Exit code, and one line on standard error that contains every part.
+/// Asserts the exit code, and one line on standard error with every part.
 fn assert_refused(output: &Output, code: i32, parts: &[&str]) {
     let stderr = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(code), "{stderr}");
@@ -53,7 +54,8 @@ fn a_part_taught_with_a_camera_is_found_in_metres() {
     };
     let line: Value = serde_json::from_str(&detect(&["--json"])).unwrap();
     let found = &line["detections"][0];
-    // By hand from the marks on the photo, which lies straight above: 550 pixels of focal length, 0.564 m above the marks.
+    // Calculated by hand from the marks on the photo, which is vertical: focal length 550 pixels, 0.564 m above the
+    // marks.
     let number = |value: &Value| value.as_f64().unwrap();
     let [x, y] = ["x", "y"].map(|axis| number(&found["grasp"][axis]));
     let pose = &found["pose"];
@@ -66,7 +68,7 @@ fn a_part_taught_with_a_camera_is_found_in_metres() {
     assert!((turn + 180.0).rem_euclid(360.0) - 180.0 < 1e-6, "{found}");
     let width = number(&found["grasp"]["width_px"]) * 0.564 / 550.0;
     assert!((number(&pose["opening_m"]) - width).abs() < 1e-6, "{found}");
-    // The photo that taught it, from straight above: within a pixel, 1.03 mm.
+    // The photo that it was taught from, which is vertical: within a pixel, 1.03 mm.
     assert!((0.01..1.03).contains(&number(&pose["sigma_mm"])), "{pose}");
     assert!((0.01..2.0).contains(&number(&pose["sigma_deg"])), "{pose}");
     let told = detect(&[]);
@@ -103,7 +105,7 @@ fn camera_files_that_are_none_and_pictures_of_other_cameras_are_refused() {
     assert_refused(&found, 1, &["no_camera.sdg", "taught with a camera", "--mark-height-mm"]);
 }
 
-/// A second camera, with a lens and a place of its own, and a picture that it took of the pendulum.
+/// A second camera with distortion and another pose, and its picture of the pendulum.
 struct SecondCamera {
     file: String,
     picture: RgbImage,
@@ -131,7 +133,7 @@ fn second_camera(files: &Folder) -> SecondCamera {
     }
 }
 
-/// What LabelMe writes: a box and the two points of the grasp.
+/// A LabelMe file: a box and the two points of the grasp.
 fn labelled(marks: [[f64; 2]; 2], file: &str, [width, height]: [u32; 2]) -> Value {
     let [[x1, y1], [x2, y2]] = marks;
     let [left, right, top, bottom] = [x1.min(x2) - 30.0, x1.max(x2) + 30.0, y1.min(y2) - 30.0, y1.max(y2) + 30.0];
@@ -180,7 +182,7 @@ fn a_model_taught_with_one_camera_is_tested_and_rehearsed_with_another() {
     let off = told["errors"]["median_mm"].as_f64().unwrap();
     assert!(off < 3.0, "{off} mm");
 
-    // The photo that it was taught from is no test, in the plan view neither.
+    // The photo that it was taught from is not used as a test, in the plan view either.
     for (from, to) in [("image.png", "image.png"), ("annotation.json", "image.json")] {
         fs::copy(shipped("pendulum", from), Path::new(&folder).join(to)).unwrap();
     }

@@ -1,4 +1,4 @@
-//! `sdg devices`, and `--device` as a user calls it, on whatever this build has.
+//! `sdg devices`, and `--device` as called by a user, on all devices of this build.
 
 use std::path::Path;
 
@@ -43,7 +43,7 @@ fn shipped(name: &str) -> String {
     folder.join(name).to_str().unwrap().to_owned()
 }
 
-/// Detectron2's and torchvision's own outputs, stage by stage, to the tolerances that flex has.
+/// The outputs of Detectron2 and torchvision, stage by stage, within the tolerances of flex.
 #[test]
 fn the_originals_outputs_are_met_on_every_device() {
     let golden = |name: &str| {

@@ -1,9 +1,9 @@
 //! `sdg weights convert --f16`: a trained network's detections against those of full precision.
 //!
-//! Rounding to half precision moves every box a little, and what is kept of boxes that overlap is decided by which scores
-//! best: where two nearly tie, rounding may decide. The kept box then jumps to its neighbour, though neither moved. So
-//! each detection is compared with the same candidate before suppression, and a jump is counted apart: it must have been
-//! a tie.
+//! Rounding to half precision moves every box a little. Non-maximum suppression keeps the highest score of overlapping
+//! boxes; if two scores nearly tie, rounding may change which one is kept, although no box has moved. So each detection
+//! is compared with the same candidate before suppression, and changes of the kept box are counted separately: each
+//! must be a tie.
 
 use std::cell::LazyCell;
 use std::collections::HashMap;
@@ -22,18 +22,18 @@ use sdg_inputs::base_weights;
 use sdg_layers::state_dict;
 use sdg_training::{Outcome, SampleSource, TrainingConfig, ValidationConfig, train};
 
-/// What boxes and keypoints may differ, in pixels of the image as given.
+/// Maximum difference of boxes and keypoints, in pixels of the original image.
 const MAX_PX: f64 = 0.1;
-/// Detections below are the network's own doubts.
+/// Minimum score of detections that are compared.
 const SURE: f64 = 0.5;
-/// Candidates whose scores are nearer to each other than this tie.
+/// Scores within this difference tie.
 const TIE: f64 = 2e-3;
-/// Steps of training: enough to be sure of most parts.
+/// Training steps: enough to detect most parts with a high score.
 const STEPS: usize = 90;
-/// Unseen pictures, with parts and without.
+/// Number of unseen pictures, with and without parts.
 const PICTURES: u64 = 30;
 
-/// The `edge` network, taught the pendulum from nothing.
+/// The `edge` network, trained on the pendulum from random initialisation.
 fn trained() -> GeneralizedRcnn {
     let demonstration = [shipped::demonstration("pendulum").unwrap()];
     let samples = AugmentationConfig::default().with_output_size(320, 240);
@@ -47,13 +47,13 @@ fn trained() -> GeneralizedRcnn {
         ..TrainingConfig::edge(1)
     };
     let source = SampleSource { frames: &|i| augmenter.sample(i), windows: &|i| windows.sample(i) };
-    // Nothing is chosen by a validation: the last checkpoint is the one.
+    // Without a validation, the last checkpoint is used.
     let unexamined = &mut |_: &GeneralizedRcnn| Ok(vec![Outcome::Missed]);
     let detector = network.init(&Device::flex().autodiff(), 1).unwrap();
     train(detector, &training, source, unexamined, &mut |_| ControlFlow::Continue(())).unwrap().detector
 }
 
-/// Writes a detector's weights in full precision, as a converted file has them.
+/// Writes a detector's weights in full precision, in the format of a converted file.
 fn write_checkpoint(detector: &GeneralizedRcnn, path: &Path) {
     let weights = state_dict::export(detector);
     let bytes: Vec<(String, Vec<usize>, Vec<u8>)> = weights
@@ -67,7 +67,7 @@ fn write_checkpoint(detector: &GeneralizedRcnn, path: &Path) {
     safetensors::serialize_to_file(views, Some(metadata), path).unwrap();
 }
 
-/// Converts a checkpoint and reads what became of it; also gives the file's size.
+/// Converts a checkpoint and reads the result; also returns the file's size.
 fn converted(checkpoint: &Path, network: &RcnnConfig, flags: &[&str]) -> (u64, state_dict::StateDict) {
     let place = tempfile::tempdir().unwrap();
     let out = place.path().join("converted.safetensors");
@@ -82,7 +82,7 @@ fn converted(checkpoint: &Path, network: &RcnnConfig, flags: &[&str]) -> (u64, s
     (std::fs::metadata(&out).unwrap().len(), base.parameters)
 }
 
-/// A detector, and the same without any suppression: all that it was sure of before.
+/// A detector, and the same without suppression, which gives all candidates.
 struct Detector {
     whole: GeneralizedRcnn,
     unsuppressed: GeneralizedRcnn,
@@ -109,7 +109,7 @@ fn detect(detector: &GeneralizedRcnn, image: &RgbImage) -> Detections {
     detector.detect(&[transformed]).remove(0)
 }
 
-/// The largest difference of two boxes' corners.
+/// The largest difference between two boxes' corners.
 fn box_difference(a: &Detections, i: usize, b: &Detections, j: usize) -> f64 {
     let (a, b) = (&a.boxes[i], &b.boxes[j]);
     [a.x1 - b.x1, a.y1 - b.y1, a.x2 - b.x2, a.y2 - b.y2].into_iter().fold(0.0f64, |most, d| most.max(d.abs()))
@@ -126,12 +126,12 @@ fn nearest(found: &Detections, i: usize, among: &Detections) -> Option<usize> {
     (0..among.boxes.len()).min_by(|a, b| distance(a).total_cmp(&distance(b)))
 }
 
-/// What rounding did to the detections of all pictures.
+/// Effects of rounding on the detections of all pictures.
 #[derive(Debug, Default)]
 struct Comparison {
-    /// Detections of full precision.
+    /// Number of detections in full precision.
     sure: usize,
-    /// Of those, kept instead of a neighbour that scores the same but for less than [`TIE`].
+    /// Of those, the number replaced by a neighbour whose score differs by less than [`TIE`].
     ties: usize,
     box_px: f64,
     keypoint_px: f64,
@@ -142,7 +142,7 @@ fn compare(exact: &Detector, rounded: &Detector, pictures: &[RgbImage]) -> Compa
     let mut made = Comparison::default();
     for picture in pictures {
         let [expected, found] = [&exact.whole, &rounded.whole].map(|detector| detect(detector, picture));
-        // Looked at in the few pictures that have a tie.
+        // Computed only for the few pictures with a tie.
         let unsuppressed =
             LazyCell::new(|| [&exact.unsuppressed, &rounded.unsuppressed].map(|detector| detect(detector, picture)));
         for i in (0..expected.boxes.len()).filter(|&i| expected.scores[i] >= SURE) {
@@ -154,7 +154,7 @@ fn compare(exact: &Detector, rounded: &Detector, pictures: &[RgbImage]) -> Compa
             } else {
                 made.ties += 1;
                 let [neighbours, candidates] = &*unsuppressed;
-                // The neighbour that is kept instead scored the same before rounding, too.
+                // The neighbour that is kept instead had the same score before rounding too.
                 let other = nearest(&found, j, neighbours).unwrap();
                 let margin = expected.scores[i] - neighbours.scores[other];
                 println!("a tie: {:.5} and {:.5}", expected.scores[i], neighbours.scores[other]);

@@ -1,11 +1,11 @@
-//! Model files that earlier versions wrote (datasets/models): this one reads them, and gives the grasps that they gave.
+//! Model files written by earlier versions (datasets/models): this version reads them and gives the same grasps.
 
 use crate::support::{shipped, stdout};
 use serde_json::Value;
 
-/// The file, the grasp's place in pixels and its angle in degrees on the part's shipped photo, as its writer found them.
+/// The file, and the grasp on the part's shipped photo as its writer found it: position in pixels and angle in degrees.
 const KEPT: [(&str, [f64; 3]); 1] = [("pendulum-shape-format-3", [320.024685, 220.452129, -141.544785])];
-/// Pixels and degrees: far above what instruction sets differ by, far below what a grasp notices.
+/// Pixels and degrees: far more than differences between instruction sets, far less than is relevant for a grasp.
 const TOLERANCE: f64 = 0.01;
 
 #[test]

@@ -1,4 +1,4 @@
-//! `sdg evaluate --pictures`: what is counted, against a naive reference and in both formats; wrong folders.
+//! `sdg evaluate --pictures`: counts, against a naive reference and in both formats; wrong folders.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use crate::support::{sdg, shipped, stdout, taught_pendulum};
 use serde_json::{Value, json};
 
-/// Samples: enough that some lack the part and some show it cut by the border.
+/// Number of samples: enough that some lack the part and some show it cut by the border.
 const NUM_SAMPLES: usize = 20;
 
 fn text(path: &Path) -> &str {
@@ -31,8 +31,8 @@ fn evaluate(pictures: &Path, model: &Path, report: &Path, more: &[&str]) -> Valu
     serde_json::from_str(&stdout(&arguments)).unwrap()
 }
 
-/// An instance of the pendulum: middle and direction of its marks in pixels and degrees, their length, and whether it may be
-/// missed.
+/// An instance of the pendulum: middle of its marks in pixels, their direction in degrees, their length, and whether it
+/// is optional.
 struct Marked {
     x: f64,
     y: f64,
@@ -53,8 +53,8 @@ fn marked(annotation: &Value) -> Marked {
     }
 }
 
-/// Found, wrong and false alarms as the definition says, written down once more: from what `sdg detect` prints, and the
-/// marks as they stand in the file. Samples show one part at most, so that a first hit settles it.
+/// Found, wrong and false alarms by an independent implementation of the definition, from the output of `sdg detect`
+/// and the marks in the file. Samples show at most one part, so the first hit decides.
 fn counted_naively(samples: &Path, model: &Path) -> [usize; 5] {
     let file = read_json(&samples.join("annotations.json"));
     let demonstration = read_json(&shipped("pendulum", "annotation.json"));
@@ -70,7 +70,7 @@ fn counted_naively(samples: &Path, model: &Path) -> [usize; 5] {
     let [mut parts, mut found, mut wrong, mut negatives, mut false_alarms] = [0; 5];
     for image in file["images"].as_array().unwrap() {
         let picture = samples.join(image["file_name"].as_str().unwrap());
-        // Exit code 3, nothing to grasp, is an answer, too.
+        // Exit code 3, nothing to grasp, is a valid answer too.
         let printed = sdg(&["detect", "--grasp-model", text(model), "--json", text(&picture)]).stdout;
         let printed: Value = serde_json::from_slice(&printed).unwrap();
         let detections = printed["detections"].as_array().unwrap();
@@ -92,7 +92,7 @@ fn counted_naively(samples: &Path, model: &Path) -> [usize; 5] {
                     found += usize::from(!truth.optional);
                     is_free = false;
                 }
-                // Without marks to compare with, its box is what it hits.
+                // Without marks to compare with, the box decides.
                 (false, true) if is_free && iou(detection, here.unwrap()) >= 0.5 => is_free = false,
                 (false, _) => wrong += 1,
             }
@@ -101,7 +101,7 @@ fn counted_naively(samples: &Path, model: &Path) -> [usize; 5] {
     [parts, found, wrong, negatives, false_alarms]
 }
 
-/// Overlap of a detection's box (corners) with a marked one (x, y, width, height), over their union.
+/// Intersection over union of a detection's box (corners) and a marked one (x, y, width, height).
 fn iou(detection: &Value, annotation: &Value) -> f64 {
     let number = |list: &Value, at: usize| list[at].as_f64().unwrap();
     let (found, marked) = (&detection["box"], &annotation["bbox"]);
@@ -119,7 +119,7 @@ fn counts(evaluated: &Value) -> [usize; 5] {
         .map(|name| evaluated[name].as_u64().unwrap() as usize)
 }
 
-/// The samples' marks once more, as LabelMe keeps them: a file beside each picture.
+/// Writes the samples' marks as LabelMe: one file beside each picture.
 fn write_labelme(samples: &Path, folder: &Path) {
     fs::create_dir(folder).unwrap();
     let file = read_json(&samples.join("annotations.json"));
@@ -163,14 +163,14 @@ fn what_augment_writes_is_counted_as_a_naive_reference_does() {
     let expected = counted_naively(&samples, &model);
     assert_eq!(counts(&evaluated), expected);
     let [parts, found, _, negatives, _] = expected;
-    // Otherwise nothing was compared.
+    // Otherwise nothing would have been compared.
     assert!(found > 0 && negatives > 0 && parts > found / 2, "{expected:?}");
     assert_eq!(evaluated["pictures"].as_array().unwrap().len(), NUM_SAMPLES);
     assert_eq!(evaluated["missed"], json!(parts - found));
     let html = fs::read_to_string(report.join("index.html")).unwrap();
     assert!(html.contains("000019.png") && html.contains("<svg"), "every picture and a chart are on the page");
 
-    // At 0.5 the sweep says what the totals say, and a limit of 1 finds nothing.
+    // At 0.5 the sweep equals the totals, and a limit of 1 finds nothing.
     let at = |min_score: f64| {
         let swept = evaluated["by_min_score"].as_array().unwrap();
         swept.iter().find(|at| at["min_score"] == json!(min_score)).unwrap()
@@ -179,7 +179,8 @@ fn what_augment_writes_is_counted_as_a_naive_reference_does() {
     assert_eq!(at(0.5)["false_alarms"], evaluated["false_alarms"]);
     assert!(at(0.0)["found"].as_u64() >= at(0.5)["found"].as_u64());
 
-    // The same marks in the other format, beside the photo that the model was taught from and another program's JSON.
+    // The same marks in the other format, with the photo that the model was taught from and another program's JSON in
+    // the folder.
     let labelme = folder.path().join("labelme");
     write_labelme(&samples, &labelme);
     fs::copy(shipped("pendulum", "image.png"), labelme.join("photo.png")).unwrap();
@@ -203,7 +204,7 @@ struct Case {
 impl Case {
     fn new(name: &str, labels: &str) -> Self {
         let case = Self { folder: tempfile::tempdir().unwrap() };
-        // The shipped photo, but for one pixel: the model was not taught from it.
+        // The shipped photo with one changed pixel: the model was not taught from it.
         let mut picture = image::open(shipped("pendulum", "image.png")).unwrap().into_rgb8();
         let [width, height] = [picture.width(), picture.height()];
         for x in 0..width {
@@ -252,7 +253,8 @@ fn instance(label: &str, group: u32, x: f64) -> Vec<Value> {
     ]
 }
 
-/// The shipped photo turned by quarters, with its marks moved along by a share of their length, as LabelMe.
+/// The shipped photo rotated by quarter turns, with its marks shifted along their direction by a share of their length,
+/// as LabelMe.
 fn write_turned(folder: &Path, name: &str, quarters: u32, along: f64) {
     let demonstration = read_json(&shipped("pendulum", "annotation.json"));
     let mut photo = image::open(shipped("pendulum", "image.png")).unwrap().into_rgb8();
@@ -289,7 +291,7 @@ fn labels_of_another_grasp_and_a_copy_of_the_taught_photo_are_told() {
     let model = teach(folder.path());
     let pictures = folder.path().join("pictures");
     fs::create_dir(&pictures).unwrap();
-    // Saved as JPEG under another name, it is the photo that the model was taught from all the same.
+    // Saved as JPEG under another name, it is still recognised as the photo that the model was taught from.
     write_turned(&pictures, "copy.jpg", 0, 0.0);
     for quarters in 1..4 {
         write_turned(&pictures, &format!("turned-{quarters}.png"), quarters, 0.8);

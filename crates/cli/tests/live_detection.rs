@@ -1,4 +1,4 @@
-//! `sdg detect --from`: parts in live pictures, a line for each frame.
+//! `sdg detect --from`: parts in live pictures, one line per frame.
 
 use std::fs;
 use std::io::{BufRead, BufReader, Read, Write};
@@ -35,7 +35,7 @@ fn a_folder_is_played_and_its_part_followed() {
     let pictures = folder.path().join("pictures");
     fs::create_dir(&pictures).unwrap();
     fs::copy(shipped("pendulum", "image.png"), pictures.join("a.png")).unwrap();
-    // Three seconds, within which searches take as long as other work on the machine lets them.
+    // Three seconds, during which searches take as long as the machine's load requires.
     let from = format!("dir:{}?loop&fps=25", pictures.display());
     let detected = sdg(&["detect", "--grasp-model", &model, "--from", &from, "--frames", "75", "--json"]);
     assert_eq!(detected.status.code(), Some(0), "{}", String::from_utf8_lossy(&detected.stderr));
@@ -43,7 +43,7 @@ fn a_folder_is_played_and_its_part_followed() {
     assert_eq!(lines.len(), 75);
     let last = &lines[74];
     assert_eq!((&last["frame"], &last["width"]), (&74.into(), &640.into()), "{last}");
-    // The last frame's part is followed.
+    // The part of the last frame is tracked.
     let part = &last["detections"][0];
     assert_eq!((&part["state"], &part["track"]), (&"followed".into(), &lines[73]["detections"][0]["track"]), "{last}");
     let alone = sdg(&["detect", "--grasp-model", &model, "--json", shipped("pendulum", "image.png").to_str().unwrap()]);
@@ -59,7 +59,7 @@ fn a_folder_is_played_and_its_part_followed() {
     assert!(told.lines().count() == 2 && told.starts_with("frame 0: grasp at ("), "{told}");
 }
 
-/// The demonstration's part in one place after the other, and once away, as PNG.
+/// The demonstration's part at several places in turn, and once absent, as PNG.
 fn unrelated_pictures() -> Vec<Vec<u8>> {
     let photo = image::open(shipped("pendulum", "image.png")).unwrap();
     let table = RgbImage::from_pixel(photo.width(), photo.height(), *photo.to_rgb8().get_pixel(3, 3));
@@ -74,7 +74,7 @@ fn unrelated_pictures() -> Vec<Vec<u8>> {
         .collect()
 }
 
-/// Where the grasps of a line are.
+/// The grasps' positions in a line.
 fn grasps(line: &Value) -> Vec<Value> {
     line["detections"].as_array().unwrap().iter().map(|detection| detection["grasp"].clone()).collect()
 }
@@ -109,7 +109,7 @@ fn pictures_of_a_folder_and_on_request_show_what_files_show() {
     server.join().unwrap();
 }
 
-/// A camera that gives these pictures, one for each request.
+/// A camera that serves these pictures, one per request.
 fn serve(pictures: Vec<Vec<u8>>) -> (String, std::thread::JoinHandle<()>) {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let url = format!("http://{}/snapshot.png", listener.local_addr().unwrap());
@@ -141,7 +141,7 @@ fn frames_of_another_size_than_the_regions_are_skipped_and_told_once() {
         let count = pictures.len().to_string();
         let (url, server) = serve(pictures.iter().map(|&picture| picture.clone()).collect());
         let output = sdg(&[&["detect", "--grasp-model", &model, "--from", &url, "--frames", &count], further].concat());
-        // A stream that is ended at its first frame leaves requests unasked.
+        // A stream that ends at its first frame leaves requests unanswered.
         if output.status.code() == Some(0) {
             server.join().unwrap();
         }
@@ -157,12 +157,12 @@ fn frames_of_another_size_than_the_regions_are_skipped_and_told_once() {
     for line in [&lines[0], &lines[2]] {
         assert_eq!(line["detections"].as_array().unwrap().len(), 1, "{line}");
     }
-    // People read the number of a part from 1 on; programs read it as it always was.
+    // In the text, parts are numbered from 1; in JSON, the numbering is unchanged.
     assert_eq!(lines[0]["detections"][0]["track"], 0, "{}", lines[0]);
     let words = String::from_utf8(detect(&[&right], &[]).stdout).unwrap();
     assert!(words.contains("part 1 found again, ") || words.contains("part 1 followed, "), "{words}");
 
-    // A stream whose size is another one finds nothing ever: that is an error.
+    // A stream with another size never finds anything: that is an error.
     let output = detect(&[&small, &small], &[]);
     let error = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(1), "{error}");
@@ -209,7 +209,7 @@ fn a_rendered_part_is_followed_in_metres() {
         assert!(part["pose"]["sigma_mm"].as_f64().unwrap() < 5.0, "{part}");
         num_followed += 1;
     }
-    // The first frame is searched before it is answered.
+    // The first frame is searched before the answer.
     assert_eq!(num_followed, 120, "{num_followed} of 120");
 }
 
@@ -228,7 +228,7 @@ fn drawn_frames_are_served_to_browsers() {
     BufReader::new(child.stderr.take().unwrap()).read_line(&mut first).unwrap();
     let url = first.trim().strip_prefix("pictures at http://").unwrap_or_else(|| panic!("{first}"));
     let host = url.trim_end_matches('/');
-    // Until the first frame is drawn there is none to be had.
+    // Until the first frame is drawn there is no picture to fetch.
     let picture = (0..100).find_map(|_| {
         let mut stream = TcpStream::connect(host).ok()?;
         write!(stream, "GET /snapshot.jpg HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n").ok()?;

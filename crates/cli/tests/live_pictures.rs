@@ -1,4 +1,4 @@
-//! `sdg camera list`, `grab` and `watch`, and addresses that are none.
+//! `sdg camera list`, `grab` and `watch`, and invalid addresses.
 
 use std::fs;
 use std::path::Path;
@@ -12,7 +12,7 @@ fn lines(output: &Output) -> Vec<Value> {
     String::from_utf8_lossy(&output.stdout).lines().map(|line| serde_json::from_str(line).unwrap()).collect()
 }
 
-/// Exit code, and one line on standard error that contains every part.
+/// Asserts the exit code, and one line on standard error with every part.
 fn assert_refused(output: &Output, code: i32, parts: &[&str]) {
     let stderr = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(code), "{stderr}");
@@ -22,7 +22,7 @@ fn assert_refused(output: &Output, code: i32, parts: &[&str]) {
     assert!(!stderr.contains("panicked"), "{stderr}");
 }
 
-/// A folder with three pictures of levels 60, 90, 120.
+/// A folder with three pictures of brightness 60, 90, 120.
 fn pictures() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     for (name, level) in [("a.png", 60), ("b.png", 90), ("c.png", 120)] {
@@ -40,7 +40,7 @@ fn list_says_what_there_is_or_that_there_is_nothing() {
     let told = sdg(&["camera", "list"]);
     let listed = lines(&sdg(&["camera", "list", "--json"]));
     let cameras = listed[0]["cameras"].as_array().unwrap();
-    // A machine with a camera is as good as one without.
+    // The test passes on machines with and without a camera.
     assert_eq!(told.status.code(), Some(if cameras.is_empty() { 3 } else { 0 }));
     let text = String::from_utf8_lossy(&told.stdout).into_owned();
     assert!(text.contains(if cameras.is_empty() { "no V4L2 camera" } else { "v4l:/dev/video" }), "{text}");
@@ -73,7 +73,7 @@ fn one_frame_goes_to_a_file_and_several_to_a_folder() {
 #[test]
 fn frames_come_at_their_times_and_are_the_newest() {
     let out = tempfile::tempdir().unwrap();
-    // Ten pictures a second, the level of each is 10 more than the last one's.
+    // Ten pictures per second; each is 10 levels brighter than the one before.
     let picture =
         |level: u32| format!("printf 'P6 1 1 255 '; printf '\\\\{level:o}\\\\{level:o}\\\\{level:o}'; sleep 0.1;");
     let script: String = (1..20).map(|i| picture(i * 10)).collect();
@@ -87,7 +87,7 @@ fn frames_come_at_their_times_and_are_the_newest() {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     assert!(start.elapsed().as_secs_f64() >= 1.0);
     let numbers: Vec<u64> = lines(&output).iter().map(|line| line["number"].as_u64().unwrap()).collect();
-    // Half a second is five pictures, fewer on a busy machine; in order they would be 0, 1, 2.
+    // Half a second is five pictures, fewer on a busy machine; without skipping they would be 0, 1, 2.
     assert!(numbers[1] >= numbers[0] + 2 && numbers[2] >= numbers[1] + 2, "{numbers:?}");
 }
 
@@ -104,7 +104,7 @@ fn watch_tells_rate_brightness_and_faults() {
     assert!(fps > 5.0 && fps < 52.0, "{fps}");
     assert!(told[0]["faults"].as_array().unwrap().is_empty(), "files may repeat: {}", told[0]);
 
-    // The same picture again and again from a live camera, and black ones.
+    // The same picture repeated by a live camera, and black pictures.
     let watch = |line: &str| {
         let address = format!("cmd:yes '{line}'");
         let output = sdg(&["camera", "watch", "--from", &address, "--seconds", "1.2"]);
@@ -129,7 +129,7 @@ fn cameras_that_are_none_are_refused() {
     assert_refused(&grab("cmd:no-such-program", &[]), 1, &["cannot be started"]);
     assert_refused(&grab("cmd:sh -c 'echo no camera here >&2; exit 4'", &[]), 1, &["exit status: 4", "no camera here"]);
     assert_refused(&grab("cmd:true", &[]), 1, &["expected a frame"]);
-    // Nobody listens on port 1.
+    // No server listens on port 1.
     assert_refused(&grab("http://127.0.0.1:1/", &[]), 1, &["http://127.0.0.1:1/", "no connection"]);
     let file = format!("file:{}", from.path().join("a.png").display());
     assert_refused(&grab(&file, &["--size", "640"]), 2, &["640x480"]);

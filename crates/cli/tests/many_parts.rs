@@ -1,4 +1,4 @@
-//! `sdg teach --demos`: a folder of demonstrations to a folder of models and a page that says which parts look alike.
+//! `sdg teach --demos`: a folder of demonstrations to a folder of models, with a page that lists similar parts.
 
 use std::fs;
 use std::path::Path;
@@ -17,7 +17,7 @@ fn demonstrations(folder: &Folder) -> String {
     };
     copy("pendulum", "lever.png");
     copy("rod_end", "rod_end.png");
-    // Several photos of a part lie in a folder of its name.
+    // Several photos of one part are in a folder with its name.
     copy("pendulum", "twin/first.png");
     fs::copy(shipped("key", "image.png"), Path::new(&demos).join("unmarked.png")).unwrap();
     demos
@@ -28,7 +28,7 @@ fn parts_that_look_alike_are_told() {
     let folder = Folder::new();
     let (demos, out) = (demonstrations(&folder), folder.path("out"));
     let teach = |more: &[&str]| sdg(&[&["teach", "--model", "S", "--demos", &demos, "--out", &out][..], more].concat());
-    // One part, as a task of an array does it.
+    // One part, as in a task of a job array.
     assert!(teach(&["--part", "twin"]).status.success());
     let record = |part: &str| fs::read(Path::new(&out).join("parts").join(format!("{part}.json"))).unwrap();
     let twin = record("twin");
@@ -48,11 +48,11 @@ fn parts_that_look_alike_are_told() {
     }
     let page = fs::read_to_string(found["report"].as_str().unwrap()).unwrap();
     assert!(page.contains("3 parts taught") && page.contains("Which look alike"));
-    // Each part's photo is on it, beside what its model finds.
+    // The page shows each part's photo with the detections of its model.
     for part in ["lever", "rod_end", "twin"] {
         assert!(page.contains(&format!("{part}: ")), "{part}");
     }
-    // What was taught was taken, its times too; with another seed it would not be.
+    // Existing models are reused with their times; with another seed they would not be.
     assert_eq!(record("twin"), twin);
     let text = stdout(&["teach", "--model", "S", "--demos", &demos, "--out", &out]);
     assert!(text.contains("look alike: lever and twin"), "{text}");

@@ -1,4 +1,4 @@
-//! Marks are checked against the photo wherever they are read, and what is taken from them without having been marked is said.
+//! Marks are checked against the photo whenever they are read, and derived values are reported.
 
 use std::fs;
 
@@ -16,7 +16,7 @@ fn marks() -> Value {
     serde_json::from_slice(&fs::read(shipped("pendulum", "annotation.json")).unwrap()).unwrap()
 }
 
-/// The same with every point at another place, and no size that would tell.
+/// The same marks with every point moved, and without an image size that would reveal it.
 fn mapped(map: impl Fn([f64; 2]) -> [f64; 2]) -> Value {
     let mut file = marks();
     for key in ["imageWidth", "imageHeight"] {
@@ -91,7 +91,7 @@ fn marks_in_another_reading_are_told_as_that() {
 fn marks_of_another_picture_that_is_there_are_told() {
     let folder = Folder::new();
     let marks = folder.text("marks.json", &marks().to_string().replace("image.png", "other.png"));
-    // The part in the middle of both, turned by half a turn, so that the box fits both.
+    // The part in the middle of both, rotated by half a turn, so that the box fits both.
     let convert = |image: &str| run(&["annotation", "convert", &marks, &folder.path("o.json"), "--image", image]);
     fs::copy(shipped("pendulum", "image.png"), folder.path("other.png")).unwrap();
     photo().save(folder.path("renamed.bmp")).unwrap();
@@ -111,7 +111,7 @@ fn other_objects_without_a_grasp_are_passed_over_in_teaching() {
     let marks = folder.text("marks.json", &file.to_string());
     let demonstration = format!("{}:{marks}", shipped("pendulum", "image.png").display());
     let (code, told) = run(&["teach", "--model", "S", "--demo", &demonstration, "--out", &folder.path("o.sdg")]);
-    assert!(code == Some(0) && told.contains("passed over `screw`, which has no grasp"), "{told}");
+    assert!(code == Some(0) && told.contains("skipped `screw`, which has no grasp"), "{told}");
 }
 
 #[test]

@@ -1,10 +1,10 @@
-//! No output replaces a file that the command reads, and a model replaces nothing but a model.
+//! No output replaces an input of the command, and a model replaces only a model.
 
 use std::fs;
 
 use crate::support::{Folder, sdg, shipped, stdout};
 
-/// A folder with the key's photo and its marks.
+/// A folder with the key's photo and marks.
 fn photographed() -> (Folder, String, String) {
     let folder = Folder::new();
     let [photo, marks] = [("image.png", "photo.png"), ("annotation.json", "photo.json")].map(|(shipped_name, name)| {
@@ -14,7 +14,7 @@ fn photographed() -> (Folder, String, String) {
     (folder, photo, marks)
 }
 
-/// The call fails with one line that contains `part`, and changes no byte of the files.
+/// Asserts that the call fails with one line that contains `part`, and changes none of the files.
 fn refused(arguments: &[&str], part: &str, files: &[&str]) {
     let before: Vec<Vec<u8>> = files.iter().map(|file| fs::read(file).unwrap()).collect();
     let output = sdg(arguments);
@@ -33,7 +33,7 @@ fn a_model_replaces_neither_photo_nor_marks_nor_other_files() {
     }
     let notes = folder.text("notes.sdg", "not a model");
     refused(&[&teach[..], &[&notes]].concat(), "a grasp model to replace", &[&notes]);
-    // A model, and an empty file as mktemp makes it, are replaced.
+    // A model may be replaced, and so may an empty file as made by mktemp.
     let model = folder.text("model.sdg", "");
     for _ in 0..2 {
         stdout(&[&teach[..], &[&model]].concat());
@@ -70,7 +70,7 @@ fn frames_and_samples_replace_no_picture() {
     let from = format!("dir:{pictures}");
     let grab = ["camera", "grab", "--from", &from, "--count", "2", "--out", &pictures];
     refused(&grab, "found an input of this command", &[&first]);
-    // Before the first sample is written.
+    // Reported before the first sample is written.
     let list = folder.path("pictures/annotations.json");
     fs::copy(&marks, &list).unwrap();
     let demo = format!("{photo}:{list}");

@@ -1,4 +1,5 @@
-//! Pictures as cameras and programs write them: one picture gives one result, whatever it is stored as and however it is opened.
+//! Pictures in the formats of cameras and programs: the result does not depend on the storage format or the way of
+//! opening.
 
 use std::fs;
 use std::io::Cursor;
@@ -8,9 +9,9 @@ use serde_json::Value;
 
 use crate::support::{Folder, sdg, shipped, taught_pendulum};
 
-/// Between two ways of storing the same picture.
+/// Maximum difference between two lossless storage formats.
 const SAME_PX: f64 = 0.5;
-/// JPEG has changed the pixels.
+/// Maximum difference after JPEG, which changes pixels.
 const JPEG_PX: f64 = 1.0;
 
 fn photo() -> RgbImage {
@@ -42,7 +43,7 @@ pub(crate) fn with_orientation(picture: &DynamicImage, orientation: u8) -> Vec<u
     jpeg
 }
 
-/// The pixels that an orientation shows as the picture: the inverse of what it says.
+/// The stored pixels for which this orientation shows the picture: the inverse of the orientation.
 pub(crate) fn stored_for(picture: &RgbImage, orientation: u8) -> DynamicImage {
     let picture = DynamicImage::from(picture.clone());
     match orientation {
@@ -184,7 +185,7 @@ fn a_calibrated_camera_shows_the_sensors_pixels() {
     assert!(found.len() == 3 && found[0].len() == 1 && found.iter().all(|one| *one == found[0]), "{found:?}");
     let live = format!("dir:{frames}");
     assert_eq!(grasps(&[calibrated.as_slice(), &["--every-frame", "--from", &live]].concat()), found);
-    // Which of the two frames the marks of such a photo are in is not known.
+    // It is unknown whether the marks of such a photo refer to the stored or to the upright pixels.
     let turned = teach(&format!("{frames}/3.jpg"), &folder.path("o.sdg"));
     let told = String::from_utf8_lossy(&turned.stderr).into_owned();
     assert!(turned.status.code() == Some(1) && told.contains("3.jpg") && told.contains("Exif"), "{told}");
@@ -194,7 +195,7 @@ fn a_calibrated_camera_shows_the_sensors_pixels() {
 fn photos_of_phones_are_not_too_large() {
     let folder = Folder::new();
     let model = taught(&folder);
-    // 50.3 megapixels, as phones make them.
+    // 50.3 megapixels, as from a phone.
     let large = GrayImage::from_pixel(8192, 6144, Luma([90]));
     fs::write(folder.path("phone.jpg"), encoded(&large.into(), ImageFormat::Jpeg)).unwrap();
     let output = sdg(&["detect", "--grasp-model", &model, &folder.path("phone.jpg")]);

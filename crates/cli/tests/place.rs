@@ -1,4 +1,4 @@
-//! `--place` of `sdg grasp` and `sdg rehearse`, cells with obstacles, `sdg workcell show`, and what is refused.
+//! `--place` of `sdg grasp` and `sdg rehearse`, cells with obstacles, `sdg workcell show`, and rejected inputs.
 
 use std::fs;
 use std::path::Path;
@@ -6,7 +6,7 @@ use std::path::Path;
 use crate::support::{Folder, sdg, taught_pendulum};
 use serde_json::Value;
 
-/// A wall between where parts lie and where they are put.
+/// A wall between the parts and their places.
 const PLACES: &str = r#"
 [[obstacle]]
 name = "wall"
@@ -29,7 +29,7 @@ fn workcell_toml() -> String {
     fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets/workcell/workcell.toml")).unwrap()
 }
 
-/// The shipped workcell with more in it, and the shipped camera beside it.
+/// The shipped workcell with additions, and the shipped camera beside it.
 fn workcell(folder: &Folder, name: &str, further: &str) -> String {
     let camera = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets/workcell/camera.yaml");
     fs::copy(camera, folder.path("camera.yaml")).unwrap();
@@ -79,7 +79,7 @@ fn the_simulated_arm_puts_the_part_down_behind_a_wall_and_looks_where_it_lies() 
     let out = folder.path("drawn");
     let dry = sdg(&[&call[..], &["--dry-run", "--out", &out]].concat());
     let told = String::from_utf8(dry.stderr).unwrap();
-    assert!(dry.status.success() && told.contains("down softly until something is felt, about "), "{told}");
+    assert!(dry.status.success() && told.contains("down softly until contact, about "), "{told}");
     assert!(told.ends_with("nothing was moved\n"), "{told}");
 
     let done = sdg(&[&call[..], &["--json", "--out", &out]].concat());
@@ -148,7 +148,7 @@ fn places_and_cells_that_cannot_be_are_refused_by_name_and_line() {
         let cell = workcell(&folder, "odd.toml", further);
         grasp(&cell, &["--place", "a"], 1, &["odd.toml", &at(further), expected]);
     }
-    // What stands around the robot, or where the part is to lie, is named; nothing moves.
+    // An obstacle around the robot or at the part's place is named; nothing moves.
     let hall = workcell(
         &folder,
         "hall.toml",
@@ -180,7 +180,7 @@ fn a_workcell_is_drawn_from_above() {
         let is_near = |p: &&image::Rgb<u8>| (0..3).all(|k| p.0[k].abs_diff(wanted[k]) < 12);
         picture.pixels().filter(is_near).count()
     };
-    // Reached ground, and the wall in its colour over ground that is not reached.
+    // Reachable ground, and the wall in its colour over ground that is not reachable.
     assert!(near([158, 209, 184]) > 20_000, "{}", near([158, 209, 184]));
     assert!(near([192, 178, 203]) > 2_000, "{}", near([192, 178, 203]));
     refused(&["workcell", "show", &cell, "--grid-mm", "1"], 2, &["--grid-mm: expected a number from 5 to 200"]);

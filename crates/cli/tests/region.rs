@@ -1,4 +1,4 @@
-//! `--region`: only a part of pictures is searched, by `sdg teach` and `sdg detect`.
+//! `--region`: `sdg teach` and `sdg detect` search only a part of pictures.
 
 use std::fs;
 
@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use crate::support::{Folder, sdg, shipped, stdout, taught_pendulum};
 
 const CAMERA: &str = include_str!("wrist.yaml");
-/// The pendulum lies about (325, 225) on its photo, which has 640 × 480 pixels.
+/// The pendulum is near (325, 225) on its photo of 640 × 480 pixels.
 const ON_IT: &str = "220,140,200,200";
 const BESIDE_IT: &str = "10,10,200,200";
 
@@ -73,7 +73,7 @@ fn a_model_keeps_its_region_and_detect_overrides_it() {
         assert!(line["detections"][0]["score"].as_f64().unwrap() > 0.5, "{line}");
     }
     assert!(all.get("region").is_none());
-    // Pictures of another size are not those that the region is for.
+    // The region does not apply to pictures of another size.
     let smaller = folder.path("smaller.png");
     let picture = image::open(&copy).unwrap();
     picture.resize(600, 450, image::imageops::FilterType::Triangle).save(&smaller).unwrap();
@@ -82,7 +82,7 @@ fn a_model_keeps_its_region_and_detect_overrides_it() {
     for part in ["expected a picture of 640 × 480 pixels", "found 600 × 450", "--region all"] {
         assert!(error.contains(part), "{part} in {error}");
     }
-    // Of two pictures that one has its turn all the same.
+    // Of two pictures, the valid one is still searched.
     let both = lines(&["detect", "--grasp-model", &model, "--json", &smaller, &copy]);
     assert!(both[0]["error"].is_string() && both[1]["detections"].is_array());
 }
@@ -124,7 +124,7 @@ fn with_a_camera_the_region_is_one_of_its_pictures() {
     let outside =
         refusal(&["detect", "--grasp-model", &model, "--camera", &camera, "--region", "600,0,100,100", &photo()]);
     assert!(outside.1.contains("--region: expected a region within the picture of 640 × 480"), "{}", outside.1);
-    // Taught with the camera, too.
+    // Taught with the camera too.
     let again = folder.path("again.sdg");
     let demo = format!("{}:{}", photo(), shipped("pendulum", "annotation.json").display());
     let teach = |region: &str| {
@@ -145,7 +145,7 @@ fn an_evaluation_leaves_pictures_of_another_size_out() {
     assert!(sdg(&["teach", "--model", "S", "--demo", &demo, "--region", ON_IT, "--out", &model]).status.success());
     std::fs::create_dir(&pictures).unwrap();
     let image = image::open(photo()).unwrap();
-    // Not the photo itself, which would be left out as taught.
+    // Not the photo itself, which would be left out because the model was taught from it.
     image.brighten(12).save(format!("{pictures}/same.png")).unwrap();
     image.thumbnail(320, 240).save(format!("{pictures}/small.png")).unwrap();
     for (name, side) in [("same", [640, 480]), ("small", [320, 240])] {
@@ -176,7 +176,7 @@ fn wrong_regions_are_one_clear_error_each() {
         assert!(found == Some(code) && error.contains(part), "{region}: {found:?} {error}");
         assert_eq!(error.matches("expected").count(), 1, "one error: {error}");
     }
-    // A folder that is read as a camera's pictures: none of them can be searched.
+    // A folder read as a camera: none of its pictures can be searched.
     let from = format!("dir:{}", shipped("pendulum", "image.png").parent().unwrap().display());
     let output =
         sdg(&["detect", "--grasp-model", &model, "--from", &from, "--region", "600,10,100,100", "--every-frame"]);

@@ -1,4 +1,4 @@
-//! `sdg grasp` and `sdg robot`: a grasp with the simulated arm, what is refused, and the question before anything moves.
+//! `sdg grasp` and `sdg robot`: a grasp with the simulated arm, rejected inputs, and the confirmation before motions.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -24,7 +24,7 @@ fn text(path: &Path) -> &str {
     path.to_str().unwrap()
 }
 
-/// The pendulum taught with the shipped camera, whose marks lie 16 mm above the table.
+/// The pendulum taught with the shipped camera; its marks are 16 mm above the table.
 fn taught(folder: &Path, with_camera: bool) -> PathBuf {
     let out = folder.join("model.sdg");
     let camera = shipped("workcell/camera.yaml");
@@ -58,7 +58,7 @@ fn the_simulated_arm_grasps_what_the_shipped_workcell_shows_it() {
     assert!(stderr.contains("hand close on about 16 mm with 40 N"), "{stderr}");
     assert!(stderr.ends_with("nothing was moved\n"), "{stderr}");
     assert_eq!(&fs::read(out.join("dry-run.gif")).unwrap()[..6], b"GIF89a");
-    // The part stands in the picture, in its colour: some ten millimetres of it at this size.
+    // The part is drawn in the picture, in its colour: about ten millimetres of it at this size.
     let drawn = image::open(out.join("dry-run.png")).unwrap().into_rgb8();
     let is_part = |pixel: &image::Rgb<u8>| pixel[0] > 120 && pixel[0] > pixel[1] + 50 && pixel[1] > pixel[2] + 20;
     let num_part = drawn.pixels().filter(|pixel| is_part(pixel)).count();
@@ -71,13 +71,13 @@ fn the_simulated_arm_grasps_what_the_shipped_workcell_shows_it() {
     assert_eq!((&line["held"], &line["step"], &line["looks"]), (&true.into(), &"hold".into(), &vec![1, 1].into()));
     let width_m = line["closed_width_m"].as_f64().unwrap();
     assert!((width_m - 0.0158).abs() < 0.002, "{line}");
-    // Nothing was told of the part's height.
+    // The part's height was not given.
     let height = &line["height"];
     let [height_mm, sigma_mm] = ["mark_height_mm", "sigma_mm"].map(|key| height[key].as_f64().unwrap());
     assert!(height["source"] == "measured" && (height_mm - 16.0).abs() < 1.0 && sigma_mm < 3.0, "{line}");
     assert!(!states.exists(), "nothing went wrong");
 
-    // A height that contradicts what is measured is refused, and 0 is a height.
+    // A height that contradicts the measurement is refused, and 0 is a height.
     let states_of = ["--states", text(&states), "--speed", "0.6", "--from", "sim:pendulum?seed=3"];
     let wrong = sdg(&[&base[..], &states_of, &["--mark-height-mm", "0", "--mark-height-sigma-mm", "0.5"]].concat());
     let stderr = String::from_utf8(wrong.stderr).unwrap();
@@ -85,7 +85,7 @@ fn the_simulated_arm_grasps_what_the_shipped_workcell_shows_it() {
     assert!(stderr.contains("detect: expected marks at the told height of 0.0 ± 0.5 mm, measured 1"), "{stderr}");
     fs::remove_file(&states).unwrap();
 
-    // A part that is not the taught one is not grasped.
+    // Another part than the taught one is not grasped.
     let other = sdg(&[&base[..], &["--from", "sim:key?seed=3", "--speed", "0.6", "--states", text(&states)]].concat());
     assert_eq!(other.status.code(), Some(3), "{}", String::from_utf8_lossy(&other.stderr));
 }
@@ -157,7 +157,7 @@ fn wrong_files_and_options_are_refused_before_anything_moves() {
     grasp(&nowhere, &sim, 1, &["nowhere.toml: line 30: missing field `at_mm`"]);
     let model_name = write("robot.toml", "\"panda\"", "\"ur5\"");
     grasp(&model_name, &sim, 1, &["robot.toml: line 6: model: expected \"panda\" or \"fr3\", found \"ur5\""]);
-    // The camera's file is looked for beside the workcell's.
+    // The camera's file is searched in the workcell file's folder.
     let moved = write("moved.toml", "format = 1", "format = 1");
     grasp(&moved, &sim, 1, &["camera.yaml"]);
     let base = write("base.toml", "\"hand\"", "\"base\"");
@@ -187,7 +187,7 @@ fn wrong_files_and_options_are_refused_before_anything_moves() {
 
 #[test]
 fn an_arm_that_is_not_there_is_one_line() {
-    // Port 9 of this computer answers nobody.
+    // No server listens on port 9 of this computer.
     for verb in [&["state"][..], &["recover", "--yes"], &["open"], &["close"]] {
         let output = sdg(&[&["robot"], verb, &["--robot", "127.0.0.1:9"]].concat());
         let stderr = String::from_utf8(output.stderr).unwrap();
@@ -207,7 +207,7 @@ fn an_arm_that_is_not_there_is_one_line() {
     assert_refused(&["robot", "state", "--robot", "a b"], 2, &["expected HOST or HOST:PORT"]);
 }
 
-/// Runs `sdg` as a user who may not use `SCHED_FIFO`.
+/// Runs `sdg` as a user without permission for `SCHED_FIFO`.
 fn sdg_without_realtime(arguments: &[&str]) -> (Option<i32>, String) {
     let script = "if [ \"$(id -u)\" = 0 ]; then exec setpriv --bounding-set=-sys_nice \"$@\"; fi; exec prlimit --rtprio=0:0 \"$@\"";
     let sdg = env!("CARGO_BIN_EXE_sdg");
@@ -224,7 +224,7 @@ fn a_real_arm_is_not_driven_without_real_time_scheduling() {
     let grasp = ["grasp", "--from", &pictures, "--grasp-model", text(&model), "--workcell", text(&workcell)];
     let home = ["robot", "home", "--workcell", text(&workcell)];
     for command in [&grasp[..], &home] {
-        // Nobody is at this address: it is refused before anything is connected to.
+        // No robot has this address: the call is rejected before it connects.
         let command = [command, &["--robot", "127.0.0.1:9"]].concat();
         let (code, line) = sdg_without_realtime(&command);
         assert_eq!(code, Some(1), "{line}");
@@ -249,7 +249,7 @@ fn a_robot_of_another_model_than_the_workcells_is_refused() {
     assert_refused(&arguments, 1, &[expected]);
 }
 
-/// The command that a real arm is driven by: a live camera beside the robot, detection, the arm over TCP and UDP.
+/// The same command as for a real arm: a live camera beside the robot, detection, the arm over TCP and UDP.
 #[test]
 fn an_arm_on_the_network_grasps_what_a_live_camera_shows() {
     const SEED: u64 = 3;
@@ -257,7 +257,7 @@ fn an_arm_on_the_network_grasps_what_a_live_camera_shows() {
     let file = |name: &str| folder.path().join(name);
     let model = taught(folder.path(), true);
 
-    // The camera stands where the demonstration was photographed from, and sees the scene of the simulated Panda.
+    // The camera is in the pose of the demonstration and shows the scene of the simulated Panda.
     let base_from_camera = camera_looking_down(0.48, 0.0, 0.58, 0.0);
     let table = TablePose { frame: Frame::Base, height_m: 0.0, frame_from_camera: base_from_camera, workspace: None };
     let camera = CalibratedCamera {
@@ -274,7 +274,7 @@ fn an_arm_on_the_network_grasps_what_a_live_camera_shows() {
     let mut aside = ready_pose();
     aside[0] = 1.6;
     cell.reset(&aside).unwrap();
-    // Two pictures in turn: a camera that shows the same bits for long is broken.
+    // Two pictures in turn: a camera that repeats the same bits is reported as frozen.
     let mut picture = cell.wrist_view().unwrap().image;
     picture.save(file("0.png")).unwrap();
     picture.put_pixel(0, 0, image::Rgb([1, 2, 3]));
@@ -292,7 +292,7 @@ fn an_arm_on_the_network_grasps_what_a_live_camera_shows() {
     let simulated = Simulated::start(&["--object", "pendulum", "--seed", "3"]);
     let from = format!("cmd:sh {}", frames.display());
     let (workcell, states) = (file("workcell.toml"), file("states.csv"));
-    // A slow machine is no reason to fail: the part does not move.
+    // A slow machine must not fail the test: the part does not move.
     let grasp = [
         "grasp",
         "--robot",

@@ -1,4 +1,5 @@
-//! Programs and robots that end in a motion: the arm stops, one line says why, and nothing moves until a person has said so.
+//! Programs and robots that fail during a motion: the arm stops, one line gives the reason, and nothing moves until a
+//! person confirms.
 
 use std::fs;
 use std::io::{BufRead, BufReader, Read};
@@ -11,7 +12,7 @@ use crate::simulated_arm::Simulated;
 use crate::support::sdg;
 use serde_json::Value;
 
-/// The shipped workcell, whose home is where joint 1 stands at 50 degrees.
+/// The shipped workcell with a home position that has joint 1 at 50 degrees.
 fn workcell(folder: &Path) -> PathBuf {
     let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets/workcell");
     let whole = fs::read_to_string(shipped.join("workcell.toml")).unwrap();
@@ -21,8 +22,8 @@ fn workcell(folder: &Path) -> PathBuf {
     path
 }
 
-/// How long a motion goes on before something happens to it. A program that had not begun to move by then is tried again with the
-/// next: how soon it begins depends on the machine.
+/// Times after the start at which the motion is disturbed. If the program had not begun to move by then, the next time
+/// is tried: how soon it begins depends on the machine.
 const MOVING: [Duration; 5] = [
     Duration::from_millis(500),
     Duration::from_secs(1),
@@ -31,7 +32,7 @@ const MOVING: [Duration; 5] = [
     Duration::from_secs(8),
 ];
 
-/// The first of these times after which a motion was under way.
+/// Tries these times until a motion was in progress.
 fn once_moving<T>(attempt: impl FnMut(Duration) -> Option<T>) -> T {
     MOVING.into_iter().find_map(attempt).expect("the arm moves within 8 s")
 }
@@ -43,7 +44,7 @@ struct Moving {
 }
 
 impl Moving {
-    /// At a hundredth of the speed the motion takes a minute of simulated time.
+    /// At a hundredth of the speed, the motion takes a minute of simulated time.
     fn start(simulated: &Simulated, workcell: &Path, states: &Path, moving_for: Duration) -> Self {
         let mut child = Command::new(env!("CARGO_BIN_EXE_sdg"))
             .args(["robot", "home", "--robot", &simulated.address, "--yes", "--no-realtime", "--speed", "0.01"])
@@ -64,7 +65,7 @@ impl Moving {
         assert!(sent.success());
     }
 
-    /// What it writes to its end, and its exit code.
+    /// Its remaining output and its exit code.
     fn finish(mut self) -> (String, Option<i32>) {
         let mut text = String::new();
         self.stderr.read_to_string(&mut text).unwrap();
@@ -81,12 +82,12 @@ fn state(simulated: &Simulated) -> (Vec<f64>, String) {
     (joints, line["mode"].as_str().unwrap().to_owned())
 }
 
-/// Whether the arm is beside where it began, and not at the end.
+/// Whether the arm has left its start and not reached the end.
 fn is_on_its_way(simulated: &Simulated) -> bool {
     (1e-4..0.8).contains(&state(simulated).0[0])
 }
 
-/// It stands where it stands at the next look, too.
+/// Asserts that the arm does not move, and returns its position.
 fn assert_stands(simulated: &Simulated) -> Vec<f64> {
     let (joints, _) = state(simulated);
     thread::sleep(Duration::from_millis(200));
@@ -95,7 +96,7 @@ fn assert_stands(simulated: &Simulated) -> Vec<f64> {
     later
 }
 
-/// The number of states of the last second in a file.
+/// The number of recorded states in a file.
 fn num_states(path: &Path) -> usize {
     let text = fs::read_to_string(path).unwrap();
     assert!(text.starts_with("time_secs,mode,q_rad_1,"), "{text}");
@@ -122,7 +123,7 @@ fn a_program_that_is_killed_leaves_the_arm_standing_until_a_person_recovers_it()
     assert_eq!(refused.status.code(), Some(1), "{stderr}");
     assert!(stderr.contains("nothing moves until a person has looked and runs `sdg robot recover`"), "{stderr}");
 
-    // Nobody at the terminal has not agreed.
+    // Without a terminal, there is no consent.
     let recover = ["robot", "recover", "--robot", &simulated.address];
     assert!(sdg(&recover).status.success());
     assert_eq!(state(&simulated).1, "reflex");

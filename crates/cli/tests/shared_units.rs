@@ -1,5 +1,5 @@
-//! An evaluation's units shared by several processes, with model S on one part: the tables are those of the ordinary run, and
-//! whatever is missing, failed, stale or doubled keeps a table from being made.
+//! An evaluation's units shared by several processes, with model S on one part: the tables equal those of the ordinary
+//! run, and missing, failed, stale or duplicate units prevent the tables.
 
 use std::fs::{self, File};
 use std::io::{BufRead, BufReader};
@@ -14,7 +14,7 @@ const LOOK: &str = "look-rod_end";
 const GRASP: &str = "grasp-S-rod_end";
 const TIME: &str = "time-rod_end";
 
-/// The smallest evaluation that there is, in a folder.
+/// Arguments of the smallest possible evaluation, in a folder.
 fn arguments<'a>(out: &'a str, more: &[&'a str]) -> Vec<&'a str> {
     const SMALLEST: [&str; 14] = [
         "evaluate",
@@ -39,7 +39,7 @@ fn evaluate(out: &str, more: &[&str]) -> Output {
     sdg(&arguments(out, more))
 }
 
-/// The one JSON object that a call prints which succeeds.
+/// The JSON object printed by a call that succeeds.
 fn json(output: &Output) -> Value {
     assert!(output.status.success(), "{}", error_of(output));
     serde_json::from_slice(&output.stdout).unwrap()
@@ -49,7 +49,7 @@ fn error_of(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
-/// Standard error of a call that fails with this code; it holds all of `parts`.
+/// Standard error of a call that fails with this code; it contains all of `parts`.
 fn refused(output: &Output, code: i32, parts: &[&str]) -> String {
     let error = error_of(output);
     assert_eq!(output.status.code(), Some(code), "{error}");
@@ -59,7 +59,7 @@ fn refused(output: &Output, code: i32, parts: &[&str]) -> String {
     error
 }
 
-/// A JSON object without what differs from run to run: times, and sizes of files that have times in them.
+/// A JSON object without values that differ between runs: times, and sizes of files that contain times.
 fn timeless(value: Value) -> Value {
     const TIMES: [&str; 6] =
         ["seconds", "teaching_secs", "longest_teaching_secs", "frames_per_second", "bytes", "largest_bytes"];
@@ -104,7 +104,7 @@ fn record(path: &Path) -> Value {
     serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
 }
 
-/// The only file of a unit whose name begins so.
+/// The only file of a unit whose name has this prefix.
 fn file_of(out: &str, unit: &str, begins: &str) -> std::path::PathBuf {
     let entries = fs::read_dir(Path::new(out).join("units").join(unit)).unwrap().map(|entry| entry.unwrap().path());
     let found: Vec<_> =
@@ -126,7 +126,7 @@ fn units_done_by_several_processes_make_the_tables_of_one() {
     assert!(!Path::new(&shared).exists(), "listing makes nothing");
 
     json(&evaluate(&shared, &["--unit", TEACH]));
-    // Nothing may be counted before all is there, and each that is missing is told.
+    // Nothing is counted before all units are done, and each missing unit is named.
     let error =
         refused(&evaluate(&shared, &["--collect"]), 1, &["3 of 4 units cannot be counted", "look-rod_end: missing"]);
     assert!(error.contains("grasp-S-rod_end: missing") && error.contains("time-rod_end: missing"), "{error}");
@@ -147,7 +147,7 @@ fn units_done_by_several_processes_make_the_tables_of_one() {
     }
     let receipt = record(&file_of(&shared, GRASP, "done-"));
     let before = fs::read(Path::new(&shared).join("cells/S-rod_end.attempts-verified.json")).unwrap();
-    // What is done is left, among what is not.
+    // Finished units are skipped.
     let ended = json(&evaluate(&shared, &["--unit", GRASP, TIME]));
     assert_eq!((&ended["units"][0]["ended"], &ended["units"][1]["ended"]), (&"already".into(), &"done".into()));
     assert_eq!(fs::read(Path::new(&shared).join("cells/S-rod_end.attempts-verified.json")).unwrap(), before);
@@ -162,7 +162,7 @@ fn units_done_by_several_processes_make_the_tables_of_one() {
         screen.starts_with("4 of 4 units done, 0 running, 0 failed, 0 waiting\nteach 1 of 1, look 1 of 1,"),
         "{screen}"
     );
-    // The ordinary run takes what is there.
+    // The ordinary run reuses the results.
     assert_eq!(json(&evaluate(&shared, &["--jobs", "1"]))["remaining"], 0);
     damaged_results_are_refused(&shared);
 }
@@ -170,7 +170,7 @@ fn units_done_by_several_processes_make_the_tables_of_one() {
 #[test]
 fn a_missing_simulator_is_told_once_and_before_anything_is_done() {
     let (libraries, folder) = (Folder::new(), Folder::new());
-    // Found before the installed one, and no library.
+    // This file is found before the installed library, and is not a library.
     for name in ["libmujoco.so.2.2.2", "libmujoco.so"] {
         File::create(libraries.path(name)).unwrap();
     }
@@ -183,16 +183,16 @@ fn a_missing_simulator_is_told_once_and_before_anything_is_done() {
     let error = refused(&without_mujoco(&[TEACH, LOOK, GRASP]), 1, &["MuJoCo could not be loaded", "libmujoco2.2.2"]);
     assert_eq!(error.lines().count(), 1, "{error}");
     assert!(!Path::new(&out).exists());
-    // Teachings need none.
+    // Teachings do not need the simulator.
     assert_eq!(json(&without_mujoco(&[TEACH]))["units"][0]["ended"], "done");
 }
 
-/// Everything that can be wrong with a folder in which all units are done.
+/// Faults of a folder in which all units are done.
 fn damaged_results_are_refused(shared: &str) {
     let at = |name: &str| Path::new(shared).join(name);
     let is_refused = |parts: &[&str]| refused(&evaluate(shared, &["--collect"]), 1, parts);
 
-    // Other settings: the pictures' number is no matter of the teaching.
+    // Other settings: the teaching does not depend on the number of pictures.
     let with_two_views = |more: &[&str]| {
         let mut arguments = arguments(shared, more);
         let views = arguments.iter().position(|argument| *argument == "--views").unwrap();
@@ -203,14 +203,14 @@ fn damaged_results_are_refused(shared: &str) {
     assert!(!error.contains(TEACH), "{error}");
     refused(&with_two_views(&["--unit", LOOK]), 1, &["done with other settings", "--out"]);
 
-    // A receipt twice.
+    // Two receipts of one unit.
     let receipt = file_of(shared, LOOK, "done-");
     let second = receipt.with_file_name("done-elsewhere-7-1.json");
     fs::copy(&receipt, &second).unwrap();
     is_refused(&["look-rod_end: duplicate: done by", "1 of 4 units"]);
     fs::remove_file(second).unwrap();
 
-    // A file that is not the one that the receipt tells of, and one that is gone.
+    // A file that differs from its receipt, and a missing one.
     let (file, kept) = (at("cells/S-rod_end.look.json"), at("cells/kept"));
     fs::copy(&file, &kept).unwrap();
     fs::write(&file, fs::read_to_string(&file).unwrap() + "\n").unwrap();
@@ -219,7 +219,7 @@ fn damaged_results_are_refused(shared: &str) {
     is_refused(&["look-rod_end: stale: cells/S-rod_end.look.json is gone"]);
     fs::rename(&kept, &file).unwrap();
 
-    // Another program's results, one of them and all.
+    // Results of another program version: one of them, and all.
     let whole = fs::read_to_string(&receipt).unwrap();
     let program = record(&receipt)["settings"]["program"].as_str().unwrap().to_owned();
     assert_eq!(program.len(), 64);
@@ -231,14 +231,14 @@ fn damaged_results_are_refused(shared: &str) {
     is_refused(&["settings.json: made with other settings (program: expected"]);
     fs::write(at("settings.json"), settings).unwrap();
 
-    // Two collectors at once, and one beside a run of the ordinary kind.
+    // Two collectors at once, and a collector beside an ordinary run.
     let lock = File::create(at(".collect.lock")).unwrap();
     lock.lock().unwrap();
     is_refused(&["another --collect is at work in this folder"]);
     drop(lock);
     let lock = File::open(at(".lock")).unwrap();
     lock.lock().unwrap();
-    is_refused(&["another evaluation is at work in this folder"]);
+    is_refused(&["another evaluation is running in this folder"]);
     drop(lock);
     json(&evaluate(shared, &["--collect"]));
 }
@@ -247,9 +247,9 @@ fn damaged_results_are_refused(shared: &str) {
 fn failures_are_recorded_and_told() {
     let folder = Folder::new();
     let out = folder.path("run");
-    // Without its teaching a unit has nothing to work with.
+    // A unit without its teaching cannot run.
     refused(&evaluate(&out, &["--unit", GRASP]), 1, &["expected teach-S-rod_end to be done before", "is it shared"]);
-    // A folder where a file should be: even root cannot write it.
+    // A folder in place of a file: even root cannot write it.
     let obstacle = Path::new(&out).join("cells/S-rod_end.teaching.json");
     fs::create_dir(&obstacle).unwrap();
     for _ in 0..2 {
@@ -263,12 +263,12 @@ fn failures_are_recorded_and_told() {
     let watched = json(&sdg(&["evaluate", "--watch", &out, "--json"]));
     let teach = watched["failed"].as_array().unwrap().iter().find(|failed| failed["unit"] == TEACH).unwrap();
     assert!(teach["tries"] == 2 && teach["why"].as_str().unwrap().contains("teaching.json"), "{teach}");
-    // Twice is the last time, and nothing else can begin: the watch ends.
+    // The second failure is final, and no other unit can begin: the watch ends.
     let ended = sdg(&["evaluate", "--watch", &out]);
-    refused(&ended, 1, &["4 of 4 units came to nothing"]);
+    refused(&ended, 1, &["4 of 4 units have no result"]);
     assert!(String::from_utf8(ended.stdout).unwrap().contains("\nfailed:\n  teach-S-rod_end  2 times, last on "));
 
-    // A unit at work, and one whose process went away without a word.
+    // A running unit, and one whose process was killed.
     fs::remove_dir(&obstacle).unwrap();
     let unit = Path::new(&out).join("units").join(LOOK);
     fs::create_dir_all(&unit).unwrap();
@@ -279,7 +279,7 @@ fn failures_are_recorded_and_told() {
     refused(&evaluate(&out, &["--collect"]), 1, &["look-rod_end: still at work on n7 (process 12, job 31)"]);
     let watched = json(&sdg(&["evaluate", "--watch", &out, "--json"]));
     assert_eq!((&watched["running"][0]["unit"], &watched["running"][0]["by"]["host"]), (&LOOK.into(), &"n7".into()));
-    // Whoever wants to do it, too, waits until it is free.
+    // A second process for the same unit waits until it is free.
     let mut command = Command::new(env!("CARGO_BIN_EXE_sdg"));
     command.args(arguments(&out, &["--unit", LOOK])).stdout(Stdio::null()).stderr(Stdio::piped());
     let mut waiting = command.spawn().unwrap();
@@ -288,12 +288,12 @@ fn failures_are_recorded_and_told() {
     assert!(told.starts_with("look-rod_end: at work elsewhere, by n7 (process 12, job 31); waiting"), "{told}");
     assert!(waiting.try_wait().unwrap().is_none());
     drop(lock);
-    // Then it begins, and says what it misses.
+    // Then it begins, and reports what is missing.
     assert_eq!(waiting.wait().unwrap().code(), Some(1));
     fs::write(unit.join("running.json"), running).unwrap();
     let gone = "look-rod_end: missing: n7 (process 12, job 31) ended without a result";
     refused(&evaluate(&out, &["--collect"]), 1, &[gone]);
-    // Tried again, it is done.
+    // A second try succeeds.
     json(&evaluate(&out, &["--unit", TEACH, LOOK]));
 }
 
@@ -312,7 +312,7 @@ fn wrong_usage_and_folders_are_told() {
     refused(&evaluate(&out, &["--collect", "--list-units"]), 2, &["--list-units"]);
     refused(&evaluate(&out, &["--yes"]), 2, &["--submit"]);
 
-    // A disk that takes no more: files of a kilobyte at most. Nothing is half-written, and the reason is kept.
+    // A full disk: files are limited to a kilobyte. Nothing is half-written, and the reason is recorded.
     let words: Vec<String> = arguments(&out, &["--unit", TEACH]).iter().map(|word| format!("'{word}'")).collect();
     let line = format!("trap '' XFSZ; ulimit -f 1; exec '{}' {}", env!("CARGO_BIN_EXE_sdg"), words.join(" "));
     let full = Command::new("bash").args(["-c", &line]).output().unwrap();
@@ -333,7 +333,7 @@ fn the_submit_script_is_one_that_bash_reads() {
     let path = folder.text("submit.sh", script);
     assert!(Command::new("bash").args(["-n", &path]).status().unwrap().success());
     assert!(!Path::new(&out).exists(), "printing makes nothing");
-    // Without Slurm it says so.
+    // Without Slurm the error says so.
     let mut command = Command::new(env!("CARGO_BIN_EXE_sdg"));
     command.args(arguments(&out, &["--submit", "slurm", "--yes"])).env("PATH", "/bin/nothing:/usr/bin");
     if !Path::new("/usr/bin/sbatch").exists() {

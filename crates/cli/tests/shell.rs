@@ -1,4 +1,4 @@
-//! What the shell gets: completions, manual pages, and the page of a teaching.
+//! Shell completions, manual pages, and the page of a teaching.
 
 use std::fs;
 use std::io::Write;
@@ -35,7 +35,7 @@ fn completions_know_every_command_and_bash_reads_them() {
 #[test]
 fn bash_completes_an_option() {
     let script = String::from_utf8(sdg(&["completions", "bash"]).stdout).unwrap();
-    // As bash itself would ask after `sdg detect --gr<TAB>`.
+    // The query that bash sends for `sdg detect --gr<TAB>`.
     let ask = "COMP_WORDS=(sdg detect --gr) COMP_CWORD=2; _sdg sdg --gr detect; printf '%s\\n' \"${COMPREPLY[@]}\"";
     let done = Command::new("bash").args(["-c", &format!("{script}\n{ask}")]).output().unwrap();
     let replies = String::from_utf8(done.stdout).unwrap();

@@ -1,4 +1,4 @@
-//! `truth.json` and `sdg evaluate --split`: figures against the rule written down once more, `--tuned`, wrong files.
+//! `truth.json` and `sdg evaluate --split`: figures against an independent implementation, `--tuned`, wrong files.
 
 use std::fs;
 use std::path::Path;
@@ -6,7 +6,7 @@ use std::path::Path;
 use crate::support::{Folder, sdg, shipped, stdout, taught_pendulum};
 use serde_json::{Value, json};
 
-/// Samples: enough that some with each difference of [`write_set`] are accepted, and some that are left as they are.
+/// Number of samples: enough that some with each change of [`write_set`] are accepted, and some unchanged ones.
 const NUM_SAMPLES: &str = "20";
 
 fn read_json(path: &str) -> Value {
@@ -30,7 +30,7 @@ fn write_set(folder: &Folder, name: &str) -> String {
     ];
     for image in labels["images"].as_array().unwrap() {
         let name = &image["file_name"];
-        // Samples without the part, and parts that the border cuts off, have no entry.
+        // Samples without the part, and parts cut off by the border, have no entry.
         let annotation = annotations.iter().find(|annotation| annotation["image_id"] == image["id"]);
         let Some(k) = annotation.and_then(|annotation| annotation["keypoints"].as_array()) else { continue };
         let k: Vec<f64> = k.iter().map(|number| number.as_f64().unwrap()).collect();
@@ -60,7 +60,7 @@ fn write_set(folder: &Folder, name: &str) -> String {
     set
 }
 
-/// A split of that set and of one on the reported side, whose folder is not there.
+/// A split of that set and a second set on the reported side, whose folder does not exist.
 fn write_split(folder: &Folder) -> String {
     let set = |name: &str, side: &str| {
         format!("[[set]]\nname = \"{name}\"\nside = \"{side}\"\nfolder = \"{name}\"\ndemo = \"demo.png\"\n")
@@ -68,13 +68,13 @@ fn write_split(folder: &Folder) -> String {
     folder.text("split.toml", &(set("lever", "tuned") + &set("gone", "reported")))
 }
 
-/// Parts, found, accepted on pictures with the part, wrong, pictures without, false alarms: by the rule of the sets' own
-/// scripts, from what `sdg detect` prints.
+/// Parts, found, accepted on pictures with the part, wrong, pictures without it, false alarms: by the rule of the sets'
+/// own scripts, from the output of `sdg detect`.
 fn counted_naively(set: &str, model: &str) -> [u64; 6] {
     let [mut parts, mut found, mut accepted, mut wrong, mut negatives, mut false_alarms] = [0; 6];
     for entry in read_json(&format!("{set}/truth.json")).as_array().unwrap() {
         let picture = format!("{set}/{}", entry["image"].as_str().unwrap());
-        // Exit code 3, nothing to grasp, is an answer, too.
+        // Exit code 3, nothing to grasp, is a valid answer too.
         let printed = sdg(&["detect", "--grasp-model", model, "--json", &picture]).stdout;
         let printed: Value = serde_json::from_slice(&printed).unwrap();
         let detections = printed["detections"].as_array().unwrap();

@@ -1,9 +1,10 @@
-//! A walk with a stop-watch: from a photograph to a model that was tried, on sets of photographs that are not in this repository
+//! A timed walk-through: from a photograph to a tried model, on sets of photographs that are not in this repository
 //! (`make walk SETS="FOLDER …"`; a folder has demo.* and further pictures with LabelMe marks beside them).
 //!
-//! What the page makes a person wait for is measured. What a person takes is added by the keystroke-level model (Card, Moran,
-//! Newell 1980) for what is done, and by 238 words a minute (Brysbaert 2019) for every line that the page shows for the first time.
-//! `SDG_WALK_WORDS=1` prints these lines. A line in which only numbers or its full stop have changed is not read again, and what is there for screen readers alone is not shown.
+//! The page's waiting times are measured. The user's times are added: for actions by the keystroke-level model (Card,
+//! Moran, Newell 1980), and 238 words a minute (Brysbaert 2019) for every line that the page shows for the first time.
+//! `SDG_WALK_WORDS=1` prints these lines. A line in which only numbers or the full stop change is not counted again;
+//! text for screen readers is not counted.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -12,30 +13,30 @@ use std::time::Instant;
 use crate::browser::page::Page;
 use sdg_demonstration::{Annotation, ImageFacts};
 
-/// Issue 19: from a photo to a tried model in under three minutes with model S.
+/// The limit of issue 19: from a photo to a tried model in under three minutes with model S.
 const MAX_SECONDS: f64 = 180.0;
-/// Issue 47: under 140 seconds, of which 40 are actions and, on a computer with nothing else to do, 7 are waiting.
+/// The limit of issue 47: under 140 seconds, of which 40 are actions and, on an idle computer, 7 are waiting.
 const MAX_WORDS: usize = 370;
-/// Finding out what to do next, moving the pointer to it, pressing.
+/// Deciding on the next action, moving the pointer to it, pressing.
 const ACTION_SECONDS: f64 = 1.35 + 1.1 + 0.2;
 const WORDS_PER_SECOND: f64 = 238.0 / 60.0;
-/// A person's box is drawn a little outside the part.
+/// Relative margin of a person's box around the part.
 const BOX_LOOSENESS: f64 = 0.03;
 const MAX_TRIED: usize = 3;
 
-/// What was done so far, and how long it took.
+/// The steps so far and their times.
 struct StopWatch {
     page: Page,
     set: String,
     actions: usize,
-    /// The letters of lines that were shown so far.
+    /// The letters of lines shown so far.
     lines: BTreeSet<String>,
     words: usize,
     waited: f64,
 }
 
 impl StopWatch {
-    /// Does something, waits until `done` says so, and counts what there is to read then.
+    /// Performs an action, waits until `done` holds, and counts the new text.
     fn step(&mut self, name: &str, actions: usize, act: impl FnOnce(&Page), done: &str) {
         let start = Instant::now();
         act(&self.page);
@@ -63,7 +64,7 @@ impl StopWatch {
     }
 }
 
-/// What is seen of the page: `.sr` is for screen readers, and a closed list shows its chosen line alone.
+/// The visible text of the page: without `.sr`, which is for screen readers, and only the chosen line of a closed list.
 fn visible_text(page: &Page) -> String {
     let script = "const sheet = document.styleSheets[0]; sheet.insertRule('.sr { display: none !important }', 0);
         const text = document.body.innerText; sheet.deleteRule(0);
@@ -163,6 +164,6 @@ fn from_a_photograph_to_a_tried_model_in_three_minutes() {
         let seconds = walk(Path::new(folder), symmetry);
         slowest = slowest.max(seconds);
     }
-    // All sets are walked first, so that each is told.
+    // All sets are walked first, so that each is reported.
     assert!((1.0..MAX_SECONDS).contains(&slowest), "{slowest:.0} s");
 }

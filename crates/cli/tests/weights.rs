@@ -1,4 +1,4 @@
-//! `sdg weights` as a user calls it.
+//! `sdg weights` as called by a user.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -17,7 +17,7 @@ fn fixture(name: &str) -> String {
     folder.join(name).to_str().unwrap().to_owned()
 }
 
-/// The short form of a configuration: the widths of `detectron2_keypoint.pkl`.
+/// A short configuration: the widths of `detectron2_keypoint.pkl`.
 fn config(folder: &Path, classes: usize) -> PathBuf {
     let path = folder.join("config.json");
     let config = json!({
@@ -53,7 +53,7 @@ fn a_detectron2_pickle_becomes_a_file_that_says_where_it_comes_from() {
     assert_eq!(inspected["metadata"]["source_sha256"], line["written"]["source_sha256"]);
     let network: Value = serde_json::from_str(inspected["metadata"]["network"].as_str().unwrap()).unwrap();
     assert_eq!(network["fpn"]["channels"], 4);
-    // A converted file brings its configuration.
+    // A converted file contains its configuration.
     let again = folder.path().join("again.safetensors");
     assert_eq!(sdg_weights(&["convert", out, again.to_str().unwrap()]).status.code(), Some(0));
 }
@@ -78,7 +78,7 @@ fn what_does_not_fit_is_listed_and_nothing_is_written() {
     assert_eq!(sdg_weights(&named).status.code(), Some(0));
 }
 
-/// What Detectron2 and torchvision gave themselves.
+/// The outputs of Detectron2 and torchvision.
 fn golden(name: &str) -> String {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/golden");
     folder.join(name).to_str().unwrap().to_owned()

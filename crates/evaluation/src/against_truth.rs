@@ -1,6 +1,7 @@
-//! A grasp found in a picture against the simulator's truth: where it leads the hand, and the error of place and angle.
+//! A detected grasp compared with the simulator's ground truth: its pose for the hand, and the errors of position and
+//! angle.
 //!
-//! Rehearsals, tried pictures and evaluations all measure by this.
+//! Used by rehearsals, trials and evaluations.
 
 use nalgebra::Isometry3;
 use sdg_geometry::{PlanarGrasp, PosedCamera};
@@ -8,17 +9,17 @@ use sdg_grasp::{GraspError, GraspPlane, GraspPose};
 use sdg_report::DetectionError;
 use sdg_simulation::objects::{LARGEST_JAW_WIDTH_M, ObjectSpec};
 
-/// Where a grasp in a camera's picture leads the hand: through the camera onto the surface that it shows at the marks, whose
-/// height no photo tells.
+/// The hand's pose for a grasp in a camera's picture: the grasp is projected onto the surface at the marks, whose
+/// height is not visible in a photo.
 ///
 /// # Errors
-/// A ray that misses that height, or a part wider than the hand opens.
+/// The ray misses that height, or the part is wider than the hand opens.
 pub fn grasp_pose(object: &ObjectSpec, camera: &PosedCamera, grasp: &PlanarGrasp) -> Result<GraspPose, GraspError> {
     let plane = GraspPlane { mark_height_m: object.seen_height_m, grasp_height_m: object.grasp_height_m };
     GraspPose::from_planar(camera, grasp, &plane, LARGEST_JAW_WIDTH_M)
 }
 
-/// How far a grasp lies beside the true one, as reports give it; turns that the part's symmetry hides do not count.
+/// Error of a grasp against the true one; turns hidden by the part's symmetry are not counted.
 pub fn grasp_error(
     object: &ObjectSpec,
     base_from_object: &Isometry3<f64>,

@@ -1,4 +1,4 @@
-//! What all pages end with.
+//! The footer of all pages.
 
-/// The end of every page.
+/// The footer of every page.
 pub const FOOTER: &str = "Made by sdg. This page is one file: it fetches nothing and runs no script.";

@@ -1,4 +1,5 @@
-//! A finished model tried on samples that nothing was taught or calibrated on, counted as `sdg evaluate --pictures` counts.
+//! Test of a finished model on held-back samples, used neither for teaching nor for calibration, counted as by `sdg
+//! evaluate --pictures`.
 
 use std::ops::RangeInclusive;
 
@@ -15,23 +16,23 @@ use serde_json::{Value, json};
 use crate::labelled_pictures::{DEFAULT_MIN_SCORE, Instance, LabelledPicture, Tested, Totals, Truth, judge};
 use crate::statistics::{Share, wilson_interval};
 
-/// Where held-back samples begin: far beyond those that teaching validates and calibrates with.
+/// Index of the first held-back sample, far beyond those for validation and calibration.
 const FIRST: u64 = 1 << 40;
-/// Samples that a model is tried on: three quarters have the part. Chosen for time: one takes 0.15 s of a core.
+/// Number of samples: three quarters contain the part. Chosen for time: a sample takes 0.15 s of a core.
 const COUNT: u64 = 24;
-/// Larger samples take longer and show no more: the part has at least a few hundred pixels in them, too.
+/// Maximum size: larger samples take longer and show no more, because the part has a few hundred pixels in any case.
 const MAX_PIXELS: f64 = 640.0 * 480.0;
-/// How far the size of samples goes for a model that knows its part's size.
+/// Range of sample sizes for a model that knows its part's size.
 const KNOWN_SIZES: RangeInclusive<f64> = 0.97..=1.03;
 
-/// Samples of a teaching that it never saw.
+/// Held-back samples of a teaching.
 pub struct HeldBackSamples(Augmenter);
 
 impl HeldBackSamples {
-    /// Those of photos and a seed, with the part in sizes between these; no larger than a part is worth.
+    /// Samples of photos and a seed, with the part's size in this range, and limited to a useful picture size.
     ///
     /// # Errors
-    /// Photos of which no samples can be made.
+    /// No samples can be made from the photos.
     pub fn new(demonstrations: &[Demonstration], sizes: &RangeInclusive<f64>, seed: u64) -> Result<Self> {
         let mut style = SceneStyle::default();
         style.scale = [style.scale[0].max(*sizes.start() as f32), style.scale[1].min(*sizes.end() as f32)];
@@ -44,7 +45,7 @@ impl HeldBackSamples {
         Ok(Self(Augmenter::new(demonstrations, config, seed)?))
     }
 
-    /// The sample of a number.
+    /// The sample with this number.
     pub fn sample(&self, number: u64) -> Sample {
         self.0.held_out(FIRST + number)
     }
@@ -52,14 +53,14 @@ impl HeldBackSamples {
 
 /// The objects of a sample as labels.
 pub fn labels_of(sample: &Sample, label: &str) -> Vec<LabelledInstance> {
-    // A part whose grasp the border cuts off need not be found by whoever is tested on the samples.
+    // A part whose grasp is cut off by the border is optional.
     let annotations = sample.objects.iter().map(|object| object.annotation(label, &sample.image));
     annotations.map(|annotation| LabelledInstance::new(annotation.clone(), annotation.grasp.is_none())).collect()
 }
 
-/// The photos without what the model takes for further parts beside the marked one, and how many these are.
+/// The photos with unmarked parts, as detected by the model, removed, and the number of these parts.
 ///
-/// Such a photo is the samples' background, and parts in it would count as wrong. What is marked in a photo was taken out before.
+/// Such a photo is the samples' background, and parts in it would count as wrong. Marked parts were removed before.
 fn without_others(model: &GraspModel, demonstrations: &[Demonstration]) -> Result<(Vec<Demonstration>, usize)> {
     let mut num_others = 0;
     let mut alone = Vec::with_capacity(demonstrations.len());
@@ -77,23 +78,23 @@ fn without_others(model: &GraspModel, demonstrations: &[Demonstration]) -> Resul
     Ok((alone, num_others))
 }
 
-/// What a model made of its held-back samples.
+/// Results of a model on its held-back samples.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeldBackFigures {
     samples: u64,
-    /// In pixels of the samples, as an evaluation of them has it.
+    /// In pixels of the samples, as in an evaluation of them.
     totals: Totals,
-    /// Pixels of the photo for one of a sample's.
+    /// Pixels of the photo per pixel of a sample.
     photo_px: f64,
-    /// Parts that it finds in the photos beside those that are marked; they were taken out of the samples.
+    /// Number of unmarked parts detected in the photos; they were removed from the samples.
     others_in_photo: usize,
 }
 
 impl HeldBackFigures {
-    /// Tries a model, as its file has it, on samples of the photos that it was taught from.
+    /// Tests a model, as read from its file, on samples of the photos that it was taught from.
     ///
     /// # Errors
-    /// Samples that cannot be made, and errors of detection.
+    /// Samples cannot be made, or detection fails.
     pub fn of(model: &GraspModel, demonstrations: &[Demonstration], seed: u64) -> Result<Self> {
         // The samples show the part anywhere.
         let model = &model.clone().with_region(None)?;
@@ -111,7 +112,7 @@ impl HeldBackFigures {
                 Instance { bbox: annotation.bbox, grasp: annotation.grasp, optional, extent: None }
             };
             let instances: Vec<Instance> = labels_of(&sample, model.object()).into_iter().map(of_label).collect();
-            // Demonstrations of a model that knows lengths are plan views: their pixels are all as large.
+            // Demonstrations of a model that knows lengths are plan views with a uniform pixel size.
             let metres_per_pixel = facts.lengths.map(|lengths| photo_px / lengths.pixels_per_m);
             let truth = |instance: &Instance| {
                 let mut truth = Truth::new(instance, &detector);
@@ -135,8 +136,8 @@ impl HeldBackFigures {
         Ok(Self { samples: COUNT, totals: Totals::of(&judged), photo_px, others_in_photo })
     }
 
-    /// Why the model is of no use, in words: it finds fewer than half of the parts, or accepts something in more than half of the samples
-    /// without. `None` for a model that may be.
+    /// Why the model is unusable, in words: it finds fewer than half of the parts, or accepts something in more than
+    /// half of the samples without the part. `None` if it is usable.
     pub fn failure(&self) -> Option<String> {
         let Totals { found, false_alarms, .. } = &self.totals;
         let reason = if 2 * found.count < found.of {
@@ -149,38 +150,38 @@ impl HeldBackFigures {
         Some(format!("the model fails its own held-back samples: {reason}; are the marks where the part is?"))
     }
 
-    /// The share of parts that it found.
+    /// Share of detected parts.
     pub fn found(&self) -> Share {
         self.totals.found
     }
 
-    /// Detections beside the part, in samples that have one.
+    /// Number of detections beside the part, in samples with the part.
     pub fn wrong(&self) -> usize {
         self.totals.wrong
     }
 
-    /// Samples without the part in which it found one.
+    /// Samples without the part in which something was accepted.
     pub fn false_alarms(&self) -> Share {
         self.totals.false_alarms
     }
 
-    /// The median errors of what it found: in pixels of the photo, and in degrees.
+    /// Median errors of detected parts: in pixels of the photo, and in degrees.
     pub fn median_errors(&self) -> Option<[f64; 2]> {
         self.totals.errors.map(|errors| [self.photo_px * errors.median_px, errors.median_deg])
     }
 
-    /// The first of them with its unit: in millimetres where the model knows lengths.
+    /// The first of them with its unit: millimetres if the model knows lengths.
     pub fn median_distance(&self) -> Option<(f64, &'static str)> {
         let millimetres = self.totals.errors?.median_mm.map(|mm| (mm, "mm"));
         millimetres.or(self.median_errors().map(|[px, _]| (px, "px")))
     }
 
-    /// Parts that it finds in the photos beside those that are marked; they were taken out of the samples.
+    /// Number of unmarked parts detected in the photos; they were removed from the samples.
     pub fn others_in_photo(&self) -> usize {
         self.others_in_photo
     }
 
-    /// One line for people.
+    /// A summary on one line.
     pub fn in_words(&self) -> String {
         let interval = |share: Share| {
             let [low, high] = wilson_interval(share).map(|bound| 100.0 * bound);
@@ -190,7 +191,8 @@ impl HeldBackFigures {
         let errors = self.median_distance().zip(self.median_errors());
         let errors = errors.map(|((off, unit), [_, deg])| format!("; median {off:.1} {unit} and {deg:.1}°"));
         let others = self.others_in_photo;
-        let others = (others > 0).then(|| format!("; {others} more found in the photo were taken out of the samples"));
+        let others = (others > 0)
+            .then(|| format!("; {others} further instances found in the photo were removed from the samples"));
         format!(
             "on {} held-back samples it finds {found} parts ({}), {} wrong; false alarms in {false_alarms} without the part ({}){}{}",
             self.samples,
@@ -202,7 +204,7 @@ impl HeldBackFigures {
         )
     }
 
-    /// The same for programs: the fields of `sdg evaluate --pictures --json`, and the intervals.
+    /// As JSON: the fields of `sdg evaluate --pictures --json`, and the intervals.
     pub fn to_json(&self) -> Value {
         json!({
             "samples": self.samples,

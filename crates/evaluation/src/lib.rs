@@ -1,4 +1,5 @@
-//! How good a model is: on labelled pictures, in the simulator, on samples that it never saw; by tables, pages and JSON.
+//! Evaluation of models: on labelled pictures, in the simulator, on held-back samples; results as tables, pages and
+//! JSON.
 //!
 //! ```text
 //! LabelledFolder ─ Tested ─ judge ─ Totals                 the user's own pictures            labelled_pictures
@@ -10,8 +11,8 @@
 //! Evaluation, AxesEvaluation, CamerasEvaluation ─ units ─ Store ─ Summary ─ tables, page       simulated
 //! ```
 //!
-//! What is deliberately absent: arguments, terminals and exit codes. Progress goes to a [`Progress`]; errors that an option helps
-//! with are an [`EvaluationError`], whose caller knows the option.
+//! Deliberately absent: arguments, terminals and exit codes. Progress is reported to a [`Progress`]; errors that an
+//! option helps with are an [`EvaluationError`], whose caller knows the option.
 //!
 //! ```
 //! use sdg_evaluation::{Share, wilson_interval};

@@ -1,6 +1,6 @@
-//! The machine that a report's numbers come from.
+//! The machine on which a report's numbers were measured.
 
-/// Cores, architecture, operating system, and the processor's name where the system tells it.
+/// Cores, architecture, operating system, and the processor's name if available.
 pub fn machine() -> String {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let named = std::fs::read_to_string("/proc/cpuinfo").ok().and_then(|text| processor(&text));

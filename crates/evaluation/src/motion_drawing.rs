@@ -15,29 +15,30 @@ use sdg_simulation::{RenderConfig, Renderer, Workcell, WorkcellConfig};
 const DRY_RUN: MotionDrawing = MotionDrawing { name: "dry-run", width_px: 400, fps: 8.0, max_frames: 120.0 };
 const PLAN: MotionDrawing = MotionDrawing { name: "plan", width_px: 480, fps: 10.0, max_frames: 100.0 };
 
-/// How a motion is drawn, and the name of its files.
+/// The style of a drawn motion, and the name of its files.
 #[derive(Debug, Clone, Copy)]
 struct MotionDrawing {
-    /// Name of the files, without their endings.
+    /// Name of the files, without extensions.
     name: &'static str,
-    /// Width of the pictures, px; they are three quarters as high.
+    /// Width of the pictures, px; the height is three quarters of it.
     width_px: u32,
-    /// Pictures a second.
+    /// Frames per second.
     fps: f64,
-    /// Pictures of a motion at most: a slow one is shown faster.
+    /// Maximum number of pictures of a motion: a slow motion is shown faster.
     max_frames: f64,
 }
 
 impl MotionDrawing {
-    /// Time of the arm between two pictures of a motion, s.
+    /// Time between two pictures of a motion, s.
     fn period_secs(&self, duration_secs: f64) -> f64 {
         (duration_secs / self.max_frames).max(1.0 / self.fps)
     }
 
-    /// Draws the arm with each joint position (rad) and opening (m) in a workcell, as files of a folder; these files.
+    /// Draws the arm at each joint position (rad) and opening (m) in a workcell, and returns the files written to the
+    /// folder.
     ///
     /// # Errors
-    /// Files that cannot be written, and errors of the renderer.
+    /// Files cannot be written, or rendering fails.
     fn draw(&self, folder: &Path, config: &WorkcellConfig, positions: &[(JointVector, f64)]) -> Result<Vec<PathBuf>> {
         let mut cell = Workcell::new(config)?;
         let render = RenderConfig { width: self.width_px, height: self.width_px * 3 / 4, ..RenderConfig::default() };
@@ -61,11 +62,11 @@ impl MotionDrawing {
     }
 }
 
-/// Draws the motion and the part that was seen as an animation and its last picture into a folder; the files. The part stays on the
-/// table: it is drawn where the camera saw it.
+/// Draws the motion and the detected part as an animation and its last picture in a folder, and returns the files. The
+/// part stays on the table: it is drawn where the camera saw it.
 ///
 /// # Errors
-/// Files that cannot be written, and errors of the renderer.
+/// Files cannot be written, or rendering fails.
 pub fn draw_dry_run(
     plan: &DryRun,
     folder: &Path,
@@ -80,10 +81,10 @@ pub fn draw_dry_run(
     DRY_RUN.draw(folder, &config, &positions)
 }
 
-/// Draws motions, one after the other, among the obstacles of a workcell into a folder; the files.
+/// Draws consecutive motions among the obstacles of a workcell in a folder, and returns the files.
 ///
 /// # Errors
-/// Files that cannot be written, and errors of the renderer.
+/// Files cannot be written, or rendering fails.
 pub fn draw_motions(
     folder: &Path,
     workcell: &CellFile,
@@ -95,7 +96,7 @@ pub fn draw_motions(
     let period_secs = PLAN.period_secs(motions.iter().map(Trajectory::duration_secs).sum());
     let mut positions = Vec::new();
     for motion in motions {
-        // Both ends are drawn: the plan's configurations are where motions meet.
+        // Both ends are drawn: consecutive motions meet at the plan's configurations.
         let count = (motion.duration_secs() / period_secs).ceil().max(1.0) as usize;
         for index in 0..=count {
             let (q, ..) = motion.sample(motion.duration_secs() * index as f64 / count as f64);

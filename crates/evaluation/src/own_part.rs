@@ -1,4 +1,5 @@
-//! The part that a model was taught from, as a body for the simulator: its outline in the photo, drawn up to its height.
+//! The part that a model was taught from, as a body for the simulator: its outline in the photo, extruded to its
+//! height.
 
 use anyhow::{Context, Result};
 use sdg_geometry::RotationalSymmetry;
@@ -6,49 +7,50 @@ use sdg_grasp::{GraspModel, Lengths};
 use sdg_simulation::objects::{Extrusion, ObjectSpec};
 use thiserror::Error;
 
-/// Between plastic and aluminium, in kg/m³: the density of a part without a given mass.
+/// Density of a part without a given mass, in kg/m³: between plastic and aluminium.
 const ASSUMED_DENSITY: f64 = 1500.0;
-/// That of most shipped parts.
+/// Friction of a part without a given one: that of most shipped parts.
 const ASSUMED_FRICTION: f64 = 0.6;
-/// The wrist camera has about so many pixels for a metre of the table; a finer photo would be compared with blurred pictures.
+/// Approximate resolution of the wrist camera on the table, pixels per metre; a finer photo would be compared with
+/// blurred pictures.
 const MAX_PIXELS_PER_M: f64 = 1000.0;
-/// The heaviest body, in kilograms, that may be assumed: the arm's load.
+/// Maximum assumed mass of a body in kilograms: the arm's load.
 const MAX_ASSUMED_KG: f64 = 3.0;
 
-/// A part made of a model, and the model for the simulated camera.
+/// A part made from a model, and the model for the simulated camera.
 pub struct OwnPart {
     pub object: ObjectSpec,
     pub model: GraspModel,
-    /// What it is made from, given and assumed, for people.
+    /// Its given and assumed properties, for display.
     pub facts: String,
 }
 
-/// What the photo does not show of a part; `None` where it is not given.
+/// Properties of a part that the photo does not show; `None` if not given.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct OwnPartSizes {
-    /// Its height over the table.
+    /// Height over the table.
     pub height_mm: Option<f64>,
-    /// The longer side of its box.
+    /// Length of the longer side of its box.
     pub length_mm: Option<f64>,
     pub mass_g: Option<f64>,
     /// Coefficient of friction of its surface.
     pub friction: Option<f64>,
 }
 
-/// What was assumed of a part.
+/// An assumption about a part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Assumption {
-    /// The mass, of plastic's and aluminium's density.
+    /// The mass, with a density between plastic and aluminium.
     Mass,
     Friction,
     UprightWalls,
-    /// A photo from straight above.
+    /// A photo taken vertically from above.
     PhotoFromAbove,
-    /// The box as its outline, since none was marked.
+    /// The box as its outline, because no outline was marked.
     BoxAsOutline,
 }
 
-/// Sizes that do not go with a model.
+/// Sizes that are inconsistent with the model.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
@@ -59,16 +61,16 @@ pub enum OwnPartError {
     /// Neither given nor known.
     #[error("expected the part's height over the table, which a model taught without a camera does not know")]
     NeedsHeight,
-    /// Given and known.
+    /// Both given and known.
     #[error("expected a model taught without a camera, found one that knows that its part is {known_mm:.1} mm long")]
     LengthIsKnown { known_mm: f64 },
 }
 
 impl OwnPart {
-    /// Makes the part; `model_file` names the model in errors, and `in_words` says what was assumed.
+    /// Makes the part; `model_file` names the model in errors, and `in_words` describes the assumptions.
     ///
     /// # Errors
-    /// [`OwnPartError`]; a part that no simulated hand can take.
+    /// [`OwnPartError`]; the simulated hand cannot grasp the part.
     pub fn make(
         model: GraspModel,
         model_file: &str,

@@ -1,13 +1,13 @@
-//! What an evaluation tells while it goes on.
+//! Progress of an evaluation.
 
-/// Told what is to do and what was done, by all workers; the caller shows it.
+/// Receives progress from all workers; implemented by the caller, who shows it.
 pub trait Progress: Sync {
-    /// There are so many units more to do.
+    /// Announces further units.
     fn expect(&self, units: usize);
 
-    /// A unit ended, as the text tells.
+    /// A unit has ended; `what` describes its result.
     fn unit_done(&self, what: &str);
 
-    /// A line of its own.
+    /// Prints a separate line.
     fn print_line(&self, text: &str);
 }

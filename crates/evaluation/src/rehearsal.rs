@@ -1,8 +1,8 @@
-//! Grasp attempts with a model in the simulated workcell, and their outcomes.
+//! Grasp attempts with a model in the simulated workcell, and their results.
 //!
-//! The arm gets its grasps as a real one does ([`ModelFinder`]): from the picture, the camera's place on the flange, and the lengths that
-//! the model knows. Nothing is taken from the truth but what a cell's owner knows: the intrinsics, the hand-eye calibration, the table's
-//! height, and the heights of marks and grasp.
+//! The arm gets its grasps in the same way as a real one ([`ModelFinder`]): from the picture, the camera's pose on the
+//! flange, and the model's lengths. From the simulator it gets only what a cell's owner knows: the intrinsics, the
+//! hand-eye calibration, the table's height, and the heights of marks and grasp.
 
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -28,22 +28,22 @@ use serde::{Deserialize, Serialize};
 use crate::against_truth::grasp_error;
 use crate::simulated_pictures::SimulatedPictures;
 
-/// What to rehearse.
+/// The settings of a rehearsal.
 pub struct Rehearsal<'a> {
-    /// The model that looks.
+    /// The model.
     pub model: &'a GraspModel,
     /// The part on the table.
     pub object: &'a ObjectSpec,
     pub attempts: u32,
-    /// Decides part poses, robot starts, lights, table and distractors.
+    /// Seed of part poses, robot starts, lights, table and distractors.
     pub seed: u64,
     /// Whether detections are checked against the demonstration.
     pub verification: Verification,
-    /// What the robot is told wrong, or has wrong.
+    /// Errors of the robot's settings and of the workcell.
     pub errors: RehearsalErrors,
-    /// The wrist camera, where it is not the paper's.
+    /// The wrist camera, if it is not the paper's.
     pub camera: Option<PinholeCamera>,
-    /// Where parts are put down: the attempts take its cells in turn. The table is then empty but for the part.
+    /// Where parts are put down: the attempts use its cells in turn. The table is otherwise empty except for the part.
     pub place: Option<RehearsedPlace>,
 }
 
@@ -52,23 +52,23 @@ pub struct Rehearsal<'a> {
 pub struct RehearsedPlace {
     /// The place.
     pub place: Place,
-    /// One of its cells, where not all of them are taken in turn.
+    /// A single cell, if not all of them are used in turn.
     pub cell: Option<u32>,
     /// Obstacles of the workcell.
     pub obstacles: Vec<Obstacle>,
 }
 
 impl RehearsedPlace {
-    /// A place of a workcell, and one of its cells where the name has one.
+    /// A place of a workcell, with a cell if the name contains one.
     ///
     /// # Errors
-    /// A place or a cell that there is not.
+    /// Unknown place or cell.
     pub fn named(text: &str, workcell: WorkcellFile) -> sdg_robot::Result<Self> {
         let (name, cell) = text.split_once(':').map_or((text, None), |(name, cell)| (name, Some(cell)));
         let place = workcell.places.iter().find(|place| place.name == name).cloned();
         let takes_turns = cell.is_none() && place.as_ref().is_some_and(|place| place.num_cells() > 1);
         if !takes_turns {
-            // Says what is wrong with a name or a cell.
+            // Reports an invalid name or cell.
             workcell.place(text)?;
         }
         let cell = cell.and_then(|cell| cell.parse().ok());
@@ -77,29 +77,29 @@ impl RehearsedPlace {
     }
 }
 
-/// Errors of a rehearsal; by default there is none.
+/// Errors of a rehearsal; none by default.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct RehearsalErrors {
-    /// How far the height of the marks that the robot is told lies beside the true one, in metres: above it in attempts of
-    /// an odd number, below it in the others.
+    /// Error of the marks' height in the robot's settings, in metres: added in attempts with odd numbers, subtracted in
+    /// the others.
     pub mark_height_m: f64,
-    /// What is wrong in the workcell, by the attempt's seed.
+    /// Errors in the workcell, by the attempt's seed.
     pub of_workcell: Option<fn(u64) -> AttemptErrors>,
 }
 
-/// What became of a rehearsal.
+/// Results of a rehearsal.
 pub struct Rehearsed {
-    /// One each, in their order.
+    /// One result per attempt, in order.
     pub attempts: Vec<AttemptSummary>,
-    /// Pictures from outside of the first attempt that succeeded, or of the last one recorded.
+    /// External pictures of the first successful attempt, or of the last one recorded.
     pub film: Vec<RgbImage>,
-    /// What the wrist camera saw last before each attempt's approach, with the detection drawn.
+    /// The wrist camera's last picture before each attempt's approach, with the detection drawn.
     pub views: Vec<RgbImage>,
     /// Whether parts were to be put down.
     pub is_placing: bool,
 }
 
-/// A failed attempt, as `--json` lists it (docs/command-line.md).
+/// A failed attempt, as listed by `--json` (docs/command-line.md).
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Failure {
     attempt: usize,
@@ -108,12 +108,12 @@ pub struct Failure {
 }
 
 impl Rehearsed {
-    /// How many attempts held the part.
+    /// Number of attempts that held the part.
     pub fn successes(&self) -> usize {
         self.attempts.iter().filter(|attempt| attempt.success).count()
     }
 
-    /// The attempts that did not, and why.
+    /// The other attempts, and why they failed.
     pub fn failures(&self) -> Vec<Failure> {
         self.attempts
             .iter()
@@ -122,35 +122,35 @@ impl Rehearsed {
             .collect()
     }
 
-    /// Whether the part was not seen in any attempt.
+    /// Whether the part was not found in any attempt.
     pub fn found_nothing(&self) -> bool {
         !self.attempts.is_empty()
             && self.attempts.iter().all(|attempt| !attempt.success && attempt.step == GraspStep::Detect as usize)
     }
 }
 
-/// How often the camera looked in an attempt, until the part was found or there was no further place to look from.
+/// Number of looks in an attempt, until the part was found or no further pose for a look remained.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Looks {
     /// From the look-out pose and beside it.
     pub from_afar: usize,
-    /// From above what was found.
+    /// From above the detected part.
     pub from_above: usize,
 }
 
-/// One attempt, and what there is to see of it.
+/// An attempt with its pictures.
 pub struct RehearsedAttempt {
     pub attempt: AttemptSummary,
-    /// How often the camera looked.
+    /// Number of looks.
     pub looks: Looks,
-    /// Pictures from outside, if they were asked for.
+    /// External pictures, if requested.
     pub frames: Vec<RgbImage>,
-    /// What the wrist camera saw last, with the detection drawn.
+    /// The wrist camera's last picture, with the detection drawn.
     pub view: Option<RgbImage>,
 }
 
 impl Rehearsal<'_> {
-    /// Runs the attempts one after the other; `observe` is called after each and may end the rehearsal.
+    /// Runs the attempts in order; `observe` is called after each and may end the rehearsal.
     pub fn run(&self, observe: &mut dyn FnMut(&AttemptSummary) -> ControlFlow<()>) -> Result<Rehearsed> {
         let mut rehearsed =
             Rehearsed { attempts: Vec::new(), film: Vec::new(), views: Vec::new(), is_placing: self.place.is_some() };
@@ -172,10 +172,10 @@ impl Rehearsal<'_> {
         Ok(rehearsed)
     }
 
-    /// Refuses a place whose cells leave no room for the part or for the fingers that let it go.
+    /// Rejects a place whose cells have too little room for the part or for the opening fingers.
     ///
     /// # Errors
-    /// The first of such cells, with a pitch that would do.
+    /// The first such cell, with a sufficient pitch.
     pub fn check_room(&self) -> Result<()> {
         let part = part_shape(self.object)?;
         for number in 1..=self.attempts as usize {
@@ -186,12 +186,12 @@ impl Rehearsal<'_> {
         Ok(())
     }
 
-    /// Runs one attempt: the same number of the same rehearsal is always the same scene and start.
+    /// Runs one attempt: scene and start depend only on the rehearsal and the number.
     ///
-    /// A grasp that leads nowhere (wider than the hand, off the table) is a failed attempt.
+    /// An unreachable grasp (wider than the hand, off the table) is a failed attempt.
     ///
     /// # Errors
-    /// Errors of the simulation itself.
+    /// Errors of the simulation.
     pub fn attempt(&self, number: usize, record: Option<RecordConfig>) -> Result<RehearsedAttempt> {
         let seed = attempt_seed(self.seed, number);
         let mut variation = VariationConfig::default();
@@ -235,7 +235,7 @@ impl Rehearsal<'_> {
         Ok(RehearsedAttempt { attempt, looks, frames, view })
     }
 
-    /// Where an attempt puts the part down, and how.
+    /// Where and how an attempt puts the part down.
     fn placing(&self, number: usize) -> Result<Option<(PlaceGoal, PlacingConfig)>> {
         let Some(RehearsedPlace { place, cell, .. }) = &self.place else { return Ok(None) };
         let in_turn = (number as u32 - 1) % place.num_cells() + 1;
@@ -243,10 +243,10 @@ impl Rehearsal<'_> {
         Ok(Some((goal, PlacingConfig { symmetry: self.object.symmetry, ..PlacingConfig::default() })))
     }
 
-    /// The model as the robot is told its lengths in an attempt, with the error of the marks' height.
+    /// The model with the lengths that the robot uses in an attempt, including the error of the marks' height.
     ///
     /// # Errors
-    /// Lengths that no part has.
+    /// Invalid lengths.
     fn told_model(&self, number: usize) -> Result<GraspModel> {
         let sign = if number.is_multiple_of(2) { -1.0 } else { 1.0 };
         let known = self.model.facts().lengths;
@@ -258,8 +258,8 @@ impl Rehearsal<'_> {
         Ok(self.model.clone().with_lengths(Lengths { mark_height_m, ..lengths }, f64::INFINITY)?)
     }
 
-    /// The lengths of a model that was taught from a shipped demonstration in its pixels: of the camera that took it, which looked straight
-    /// down, so that a pixel covers as much of the marks' plane everywhere.
+    /// The lengths of a model that was taught from a shipped demonstration in its pixels: those of the camera that took
+    /// it, which looked straight down, so the pixel size is uniform in the marks' plane.
     fn lengths_of_demonstration(&self) -> Result<Lengths> {
         let camera = PosedCamera { intrinsics: PinholeCamera::WRIST, world_from_camera: base_from_look_camera() };
         let ObjectSpec { mark_height_m, grasp_height_m, .. } = *self.object;
@@ -275,7 +275,7 @@ impl Rehearsal<'_> {
             GraspOutcome::Held => (GraspStep::Hold, String::new()),
             GraspOutcome::Failed { step, why } => (*step, why.clone()),
         };
-        // The last look decides where the hand goes.
+        // The last look determines the hand's pose.
         let last_target = report.targets.iter().rev().flatten().next();
         let detection_error = report
             .base_from_object
@@ -291,7 +291,7 @@ impl Rehearsal<'_> {
         }
     }
 
-    /// What is known of an attempt before it begins: where the part lies.
+    /// The known facts of an attempt before it begins: the part's pose.
     fn begun(&self, number: usize, base_from_object: Option<Isometry3<f64>>) -> AttemptSummary {
         let grasp = base_from_object.map(|base_from_object| self.object.grasp_in_base(&base_from_object));
         let (object_mm, object_angle_deg) = match grasp {
@@ -311,7 +311,7 @@ impl Rehearsal<'_> {
     }
 }
 
-/// The name of the step at which an attempt ended.
+/// Name of the step at which an attempt ended.
 pub fn step_name(attempt: &AttemptSummary) -> &'static str {
     GraspStep::WITH_PLACING[attempt.step].name()
 }
@@ -321,7 +321,7 @@ fn looks_of(report: &AttemptReport) -> Looks {
     Looks { from_afar, from_above }
 }
 
-/// A seed of its own for every attempt of every rehearsal.
+/// A separate seed for every attempt of every rehearsal.
 fn attempt_seed(seed: u64, number: usize) -> u64 {
     seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(number as u64)
 }

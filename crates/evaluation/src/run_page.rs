@@ -1,4 +1,4 @@
-//! The page of a run: what was taught, how it went, what was found, what was grasped.
+//! The page of a run: teaching, training progress, detections and grasps.
 
 use anyhow::Result;
 use sdg_demonstration::Demonstration;
@@ -17,27 +17,27 @@ use crate::rehearsal::Rehearsed;
 use crate::teaching_page;
 use crate::trial::{RIGHT_DEGREES, RIGHT_MM, Trial};
 
-/// What every page is made from.
+/// The inputs of every page.
 pub struct RunPage<'a> {
     pub model: &'a GraspModel,
     pub object: &'a ObjectSpec,
     pub rehearsed: &'a Rehearsed,
-    /// The command that makes the same run again.
+    /// The command that repeats the run.
     pub command: &'a str,
 }
 
-/// What a run that also taught has beside it.
+/// Additional inputs of a run that also taught.
 pub struct TaughtHere<'a> {
     /// The photo and its marks.
     pub demonstration: &'a Demonstration,
-    /// Losses and validations of the detector; `None` for a model without.
+    /// Losses and validations of the detector; `None` for a model without one.
     pub history: Option<&'a History>,
     /// Pictures with and without the part.
     pub trials: &'a [Trial],
     pub seed: u64,
 }
 
-/// The film runs at twice the robot's speed.
+/// Playback speed of the film relative to the robot.
 const FILM_SPEED: f64 = 2.0;
 
 /// The page of `sdg rehearse`.
@@ -85,7 +85,7 @@ pub fn demo(page: &RunPage, taught: &TaughtHere) -> Result<Report> {
     Ok(report.section(detections(&with_part, &without)).section(attempts(page)).section(this_run(page)).footer(FOOTER))
 }
 
-/// What became of the attempts, as the end of a sentence: no more than the robot did.
+/// The results of the attempts, as the end of a sentence.
 fn lifted(page: &RunPage) -> String {
     match (page.rehearsed.successes(), page.rehearsed.attempts.len()) {
         (0, of) => format!("and lifted it in none of {of} attempts"),
@@ -174,14 +174,14 @@ fn last_looks(page: &RunPage) -> Section {
         .take(12)
         .map(|(view, attempt)| Figure::photo(view.clone()).caption(format!("Attempt {}", attempt.number)));
     Section::new("Last looks")
-        .lead("What the wrist camera saw before the hand went down.")
+        .lead("The wrist camera's pictures before the hand went down.")
         .gallery(GallerySize::Medium, figures.collect())
 }
 
 fn this_run(page: &RunPage) -> Section {
     let facts = page.model.facts();
     Section::new("This run")
-        .lead("Everything needed to see the same numbers again.")
+        .lead("Settings for reproducing the numbers.")
         .facts([
             ("object", page.object.name.clone()),
             ("part", page.object.description.clone()),

@@ -1,4 +1,4 @@
-//! The demonstrations under datasets/, compiled in, so that `sdg demo` runs from any folder.
+//! The demonstrations in datasets/, compiled in, so that `sdg demo` runs from any folder.
 
 use anyhow::{Context, Result, bail};
 use sdg_demonstration::Demonstration;

@@ -1,4 +1,4 @@
-//! The simulated workcell's camera, for the finder that real arms have.
+//! The simulated workcell's camera, for the finder used with real arms.
 
 use sdg_cell::{Pictures, TakenPicture};
 use sdg_simulation::Workcell;

@@ -2,19 +2,19 @@
 
 use serde::Serialize;
 
-/// Standard deviations on either side that hold 95 % of a normal distribution.
+/// Two-sided 95 % quantile of the normal distribution.
 const Z_95: f64 = 1.959_963_984_540_054;
 
-/// So many of so many.
+/// `count` of `of`.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct Share {
     pub count: usize,
-    /// Out of how many.
+    /// The total.
     pub of: usize,
 }
 
 impl Share {
-    /// Counts those for which it holds.
+    /// Counts the items for which `holds` returns true.
     pub fn of<T>(items: impl IntoIterator<Item = T>, holds: impl Fn(&T) -> bool) -> Self {
         items.into_iter().fold(Self::default(), |share, item| Self {
             count: share.count + usize::from(holds(&item)),
@@ -22,7 +22,7 @@ impl Share {
         })
     }
 
-    /// In percent; `None` of nothing.
+    /// In percent; `None` if the total is zero.
     pub fn percent(self) -> Option<f64> {
         (self.of > 0).then(|| 100.0 * self.count as f64 / self.of as f64)
     }
@@ -48,11 +48,11 @@ impl std::fmt::Display for Share {
     }
 }
 
-/// Between which probabilities the true one lies, with 95 % confidence; the whole of `[0, 1]` when nothing was tried.
+/// 95 % confidence interval of a probability; all of `[0, 1]` if nothing was tried.
 ///
 /// # Source
 /// E. B. Wilson, "Probable inference, the law of succession, and statistical inference", 1927, without continuity
-/// correction. Unlike the normal approximation it says something at 80 of 80.
+/// correction. Unlike the normal approximation it is meaningful for 80 of 80.
 pub fn wilson_interval(share: Share) -> [f64; 2] {
     if share.of == 0 {
         return [0.0, 1.0];
@@ -65,7 +65,7 @@ pub fn wilson_interval(share: Share) -> [f64; 2] {
     [(middle - half).max(0.0), (middle + half).min(1.0)]
 }
 
-/// Between which values the difference of two independent probabilities lies, the first less the second, with 95 % confidence.
+/// 95 % confidence interval of the difference of two independent probabilities, the first minus the second.
 ///
 /// # Source
 /// R. G. Newcombe, "Interval estimation for the difference between independent proportions", 1998, method 10, without
@@ -84,12 +84,13 @@ pub fn newcombe_interval(first: Share, second: Share) -> [f64; 2] {
 mod tests {
     use super::*;
 
-    /// Digits of the references.
+    /// Precision of the references.
     const TOLERANCE: f64 = 5e-5;
 
     #[test]
     fn wilson_agrees_with_known_values() {
-        // 8 of 10 (49.0 to 94.3 %) and 0 of 10 (to 27.8 %) stand in textbooks; the others were reckoned in another language.
+        // 8 of 10 (49.0 to 94.3 %) and 0 of 10 (to 27.8 %) are in textbooks; the others were computed in another
+        // language.
         for (count, of, low, high) in [
             (8, 10, 0.4902, 0.9433),
             (0, 10, 0.0, 0.2775),

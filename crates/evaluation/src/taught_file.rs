@@ -1,4 +1,5 @@
-//! A model taught, written and read again: the file, whose weights are rounded, is tried and used, not the network in memory.
+//! A model that was taught, serialised and read again: the file's model, whose weights are rounded, is tested and used,
+//! not the network in memory.
 
 use std::ops::ControlFlow;
 
@@ -8,18 +9,18 @@ use sdg_grasp::{GraspError, GraspModel, Taught, TeachOptions, TeachingEvent, tea
 
 use crate::held_back::HeldBackFigures;
 
-/// A teaching's result.
+/// Result of a teaching.
 pub struct TaughtFile {
-    /// As teaching left it, with its history.
+    /// The model in memory, with its history.
     pub taught: Taught,
     /// The model's file.
     pub bytes: Vec<u8>,
-    /// The model, read from these.
+    /// The model read from these bytes.
     pub model: GraspModel,
 }
 
 impl TaughtFile {
-    /// Teaches; `observe` may end it early.
+    /// Teaches; `observe` may end the teaching early.
     ///
     /// # Errors
     /// The errors of [`teach`].
@@ -34,10 +35,10 @@ impl TaughtFile {
         Ok(Self { taught, bytes, model })
     }
 
-    /// Tries it on samples of its photos that it never saw.
+    /// Tests it on held-back samples of its photos.
     ///
     /// # Errors
-    /// Samples that cannot be made, and errors of detection.
+    /// Samples cannot be made, or detection fails.
     pub fn figures(&self, demonstrations: &[Demonstration], seed: u64) -> Result<HeldBackFigures> {
         HeldBackFigures::of(&self.model, demonstrations, seed)
     }

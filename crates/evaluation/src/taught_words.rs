@@ -1,10 +1,10 @@
-//! What there is to say of a teaching, for people.
+//! Texts about a teaching.
 
 use sdg_demonstration::Demonstration;
 use sdg_grasp::{Ending, GraspModel, Taught};
 use sdg_kinematics::HAND_OPENING_MAX_M;
 
-/// Where the jaws would have to open farther than the hand can: then nothing that is found can be grasped.
+/// A warning if the jaws would have to open farther than the hand can: then no detection can be grasped.
 pub fn too_wide(model: &GraspModel) -> Option<String> {
     let pixels_per_m = model.facts().lengths?.pixels_per_m;
     let widest = model.demonstrations().iter().map(|taught| taught.marks.width_px / pixels_per_m).fold(0.0, f64::max);
@@ -17,7 +17,8 @@ pub fn too_wide(model: &GraspModel) -> Option<String> {
     })
 }
 
-/// Jaws that open as wide as the box, for want of an outline: more than the part needs, where it lies askew.
+/// Warnings about jaws that open as wide as the box, because there is no outline: more than the part needs in an
+/// oblique direction.
 pub fn openings_by_the_box(model: &GraspModel, demonstrations: &[Demonstration]) -> Vec<String> {
     let told = model.demonstrations().iter().zip(demonstrations).filter_map(|(taught, demonstration)| {
         let annotation = &demonstration.annotation;
@@ -32,7 +33,7 @@ pub fn openings_by_the_box(model: &GraspModel, demonstrations: &[Demonstration])
     told.collect()
 }
 
-/// How the network's teaching went, for people; nothing for a model without.
+/// How the network's training ended; empty for a model without a network.
 pub fn training(taught: &Taught) -> String {
     let facts = taught.model.facts();
     let Some(history) = &taught.history else { return String::new() };

@@ -1,4 +1,4 @@
-//! A teaching as a page: demonstrations, samples, losses and validation.
+//! The page of a teaching: demonstrations, samples, losses and validation.
 
 use anyhow::Result;
 use image::RgbImage;
@@ -17,33 +17,33 @@ use crate::footer::FOOTER;
 use crate::held_back::HeldBackFigures;
 use crate::machine::machine;
 
-/// Augmented samples shown.
+/// Number of augmented samples shown.
 const SHEET: u64 = 24;
-/// Samples that the finished model is tried on.
+/// Number of samples on which the finished model is shown.
 const TRIED: u64 = 6;
-/// Where those begin: far beyond the samples of any training.
+/// Index of the first of them, far beyond the samples of any training.
 const FIRST_TRIED: u64 = 1 << 40;
 
 /// The page of `sdg teach`.
 pub struct TeachingPage<'a> {
     /// The model, and how its network was trained.
     pub taught: &'a Taught,
-    /// What the finished model made of held-back samples.
+    /// Results of the finished model on held-back samples.
     pub figures: &'a HeldBackFigures,
     /// The photos and their marks.
     pub demonstrations: &'a [Demonstration],
     pub seed: u64,
-    /// What the user waited for: from the start of the program to the finished model and its figures.
+    /// The user's waiting time: from the start of the program to the finished model and its figures.
     pub seconds: f64,
     /// The command that makes the same model again.
     pub command: &'a str,
 }
 
 impl TeachingPage<'_> {
-    /// Photo and marks, samples, curves, and what the model says of samples that it has not seen.
+    /// Photo and marks, samples, curves, and detections in held-back samples.
     ///
     /// # Errors
-    /// Samples that cannot be made, and errors of detection.
+    /// Samples cannot be made, or detection fails.
     pub fn report(&self) -> Result<Report> {
         let model = &self.taught.model;
         let name = model.object().replace('_', " ");
@@ -54,7 +54,7 @@ impl TeachingPage<'_> {
         let mut report = Report::new(format!("{name}, taught from {photos}"))
             .kicker("Teaching")
             .lead(format!(
-                "Model {} was shown {photos} with the grasp marked. This is what it learnt from, and how well it then \
+                "Model {} was shown {photos} with the grasp marked. The page shows the training data, and how well the model then \
                  finds the part in samples that it had not seen.",
                 model.kind()
             ))
@@ -101,7 +101,7 @@ impl TeachingPage<'_> {
     fn tried(&self) -> Result<Section> {
         // The samples show the part anywhere.
         let model = self.taught.model.clone().with_region(None)?;
-        // Frames as large as the photo: the part then has a size at which the model looks for it.
+        // Frames of the photo's size: the part's size is then in the searched range.
         let augmenter = Augmenter::new(self.demonstrations, AugmentationConfig::default(), self.seed)?;
         let mut figures = Vec::new();
         for i in 0..TRIED {
@@ -113,7 +113,7 @@ impl TeachingPage<'_> {
             figures.push(figure.caption(format!("{there}; score {best:.2}")));
         }
         Ok(Section::new("Tried")
-            .lead("Samples that it was not taught on, with what the finished model says of them; at least 0.5 is accepted.")
+            .lead("Samples that it was not taught on, with the finished model's scores; at least 0.5 is accepted.")
             .gallery(GallerySize::Medium, figures))
     }
 
@@ -121,7 +121,7 @@ impl TeachingPage<'_> {
         let model = &self.taught.model;
         let facts = model.facts();
         Section::new("This run")
-            .lead("Everything needed to make the same model again.")
+            .lead("Settings for making the same model again.")
             .facts([
                 ("object", model.object().to_owned()),
                 ("grasp model", format!("{}, preset {}", model.kind(), model.preset())),
@@ -134,13 +134,11 @@ impl TeachingPage<'_> {
     }
 }
 
-/// The photos as they are and as they were marked, and samples made from them.
+/// The original and the marked photos, and samples made from them.
 pub fn demonstration(model: &GraspModel, demonstrations: &[Demonstration], seed: u64) -> Result<Section> {
     let as_seen = match model.facts().lengths {
         None => "As the camera saw it.",
-        Some(_) => {
-            "What the camera saw, as seen straight from above: turned so that x of the camera's frame points to the right."
-        }
+        Some(_) => "The camera's picture in the plan view: turned so that x of the camera's frame points to the right.",
     };
     let mut pictures = Vec::new();
     for (at, Demonstration { image, annotation }) in demonstrations.iter().enumerate() {
@@ -168,8 +166,8 @@ pub fn demonstration(model: &GraspModel, demonstrations: &[Demonstration], seed:
                 "Samples that the network learnt from, all made from that photo: other backgrounds, light, blur, noise, \
                  things in the way. Scenes without a box lack the part, so that the model learns to reject."
             } else {
-                "What a network would learn from, all made from that photo: other backgrounds, light, blur, noise, \
-                 things in the way. Model S has none; it looks for the photo's part itself."
+                "Samples that a network would learn from, all made from that photo: other backgrounds, light, blur, noise, \
+                 things in the way. Model S has no network; it searches for the photo's part itself."
             },
         ))
 }
@@ -197,7 +195,7 @@ fn sheet(demonstrations: &[Demonstration], seed: u64) -> Result<Vec<RgbImage>> {
         .collect())
 }
 
-/// Losses and validation, step by step.
+/// Losses and validation by step.
 pub fn teaching(history: &History) -> Section {
     let loss = |pick: fn(&sdg_grasp::LossValues) -> f64| -> Vec<(f64, f64)> {
         history.steps.iter().map(|record| (record.step as f64, pick(&record.losses))).collect()
@@ -214,7 +212,7 @@ pub fn teaching(history: &History) -> Section {
     let place = Chart::new("Held-back samples: place", Axis::new("step"), Axis::new("error").unit("px").from_zero())
         .series(Series::new("median", curve(|r| r.validation.median_error_px)).with_markers())
         .moment(kept, "kept")
-        .caption("The network alone, in pixels of the photo; before the demonstration is laid over.");
+        .caption("The network alone, in pixels of the photo; before the check against the demonstration.");
     let angle = Chart::new("Held-back samples: angle", Axis::new("step"), Axis::new("error").unit("°").from_zero())
         .series(Series::new("median", curve(|r| r.validation.median_error_degrees)).with_markers())
         .moment(kept, "kept");
@@ -230,7 +228,7 @@ pub fn teaching(history: &History) -> Section {
             )
             .with_markers(),
         )
-        .caption("The network alone: what is left of its false alarms, the demonstration refuses.");
+        .caption("The network alone: its remaining false alarms are refused by the check against the demonstration.");
     Section::new("Teaching")
         .lead(format!(
             "{} steps in {:.0} s; the network with the best validation was kept.",

@@ -1,4 +1,4 @@
-//! A model tried on pictures of the simulator that it has never seen, against the simulator's truth.
+//! Tests a model on unseen pictures of the simulator, against its ground truth.
 
 use anyhow::Result;
 use image::RgbImage;
@@ -10,44 +10,44 @@ use sdg_simulation::views::{TestView, test_views};
 
 use crate::against_truth::{grasp_error, grasp_pose};
 
-/// Largest distance at which a detection counts as right, in millimetres.
+/// Maximum position error of a right detection, in millimetres.
 pub const RIGHT_MM: f64 = 10.0;
-/// Largest turn at which a detection counts as right, in degrees.
+/// Maximum angle error of a right detection, in degrees.
 pub const RIGHT_DEGREES: f64 = 10.0;
 
-/// One picture and the model's detections in it.
+/// A picture and the model's detections in it.
 pub struct Trial {
     /// The picture with all detections drawn on it.
     pub drawn: RgbImage,
     /// Whether the part is in the picture.
     pub present: bool,
-    /// Score of the best detection, accepted or not; zero for none.
+    /// Score of the best detection, accepted or not; zero if there is none.
     pub best_score: f64,
-    /// Agreement of the best detection, where it was verified.
+    /// Agreement of the best detection, if it was checked.
     pub best_agreement: Option<f64>,
-    /// The network's score of the best detection; zero for none.
+    /// The network's score of the best detection; zero if there is none.
     pub network_score: f64,
-    /// Error of the accepted detection, where the part is there and was found.
+    /// Error of the accepted detection, if the part is there and was found.
     pub error: Option<DetectionError>,
     /// Error of the best detection even if it was refused.
     pub best_error: Option<DetectionError>,
-    /// Time of the detection.
+    /// Duration of the detection.
     pub seconds: f64,
 }
 
 impl Trial {
-    /// Whether the part was there and a grasp was found near enough to the truth.
+    /// Whether the part was in the picture and a grasp was found close enough to the ground truth.
     pub fn is_right(&self) -> bool {
         self.error.is_some_and(|e| e.distance_mm <= RIGHT_MM && e.angle_deg <= RIGHT_DEGREES)
     }
 
-    /// Whether the part was not there and something was accepted all the same.
+    /// Whether the part was not in the picture but something was accepted.
     pub fn is_false_alarm(&self) -> bool {
         !self.present && self.best_score >= 0.5
     }
 }
 
-/// Shows a model `count` pictures, seeds from `seed` on, with the part or without.
+/// Runs a model on `count` pictures with seeds from `seed` on, with or without the part.
 pub fn try_views(
     model: &GraspModel,
     object: &ObjectSpec,
@@ -59,7 +59,7 @@ pub fn try_views(
     test_views(object, present, count, seed).map(|seen| try_view(model, object, &seen?, verification)).collect()
 }
 
-/// Shows a model one picture; the part is in it if the picture knows the truth about it.
+/// Runs a model on one picture; the part is in it if the picture has a ground truth.
 pub fn try_view(model: &GraspModel, object: &ObjectSpec, seen: &TestView, verification: Verification) -> Result<Trial> {
     let start = std::time::Instant::now();
     let detections = model.detect(&seen.view.image, verification)?;

@@ -1,4 +1,4 @@
-//! Files that are written whole or not at all.
+//! Files that are written atomically.
 
 use std::fs::{self, File};
 use std::io::{self, Write};
@@ -9,21 +9,20 @@ use tempfile::NamedTempFile;
 use crate::error::{FileError, Result};
 use crate::folder::folder_of;
 
-/// Writes `bytes` to `path` so that a reader sees the old contents or the new ones, never a part.
+/// Writes `bytes` to `path` so that a reader sees either the old or the new contents, never a part.
 ///
 /// # Errors
-/// Those of [`AtomicFile`]. In each case whatever stood at `path` before is unchanged.
+/// Those of [`AtomicFile`]. In each case the file at `path` is unchanged.
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
     let mut file = AtomicFile::create(path)?;
     file.as_file().write_all(bytes).map_err(failed(path, "writing"))?;
     file.commit()
 }
 
-/// A file that takes its name when it is complete; dropped before, it leaves nothing behind.
+/// A file that gets its name when it is complete; if it is dropped before, nothing remains.
 ///
-/// The bytes go to a hidden temporary file in the same folder, are flushed to the disk, and take the
-/// name in one step. A symbolic link at the path is followed, so that the link survives. The
-/// folder must exist.
+/// The bytes are written to a hidden temporary file in the same folder, flushed to the disk, and the file is renamed in
+/// one step. A symbolic link at the path is followed, so the link is kept. The folder must exist.
 #[derive(Debug)]
 pub struct AtomicFile {
     path: PathBuf,
@@ -32,7 +31,7 @@ pub struct AtomicFile {
 }
 
 impl AtomicFile {
-    /// Begins a file of that path.
+    /// Begins a file at this path.
     ///
     /// # Errors
     /// [`FileError::NotAFile`] when `path` cannot name a file, [`FileError::Write`] when the folder is missing or read-only.
@@ -44,7 +43,7 @@ impl AtomicFile {
         if path.is_dir() {
             return Err(not_a_file("a folder"));
         }
-        // A link that leads nowhere cannot be resolved; it is replaced.
+        // A dangling link cannot be resolved; it is replaced.
         let is_link = path.is_symlink();
         let target = if is_link { fs::canonicalize(path).unwrap_or_else(|_| path.to_owned()) } else { path.to_owned() };
         if target.exists() && !target.is_file() {
@@ -82,13 +81,13 @@ fn temporary_beside(target: &Path) -> io::Result<NamedTempFile> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(".sdg-").suffix(".tmp");
     #[cfg(unix)]
-    // What other programs ask for; the umask takes the rest away.
+    // The permissions that other programs request; the umask removes the rest.
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     builder.tempfile_in(folder_of(target))
 }
 
-/// Makes the rename itself survive a power cut. The file is complete either way, so a file system
-/// that cannot sync a folder is no error.
+/// Makes the rename survive a power failure. The file is complete in any case, so a file system that cannot sync a
+/// folder is not an error.
 fn sync_folder_of(target: &Path) {
     if let Ok(folder) = File::open(folder_of(target)) {
         let _ = folder.sync_all();
@@ -164,8 +163,8 @@ mod tests {
         assert_eq!(fs::read(&real).unwrap(), b"new");
     }
 
-    /// Runs only as the child of [`a_write_cut_short_leaves_the_old_file_and_nothing_else`], where no
-    /// file may grow past a limit: the kernel cuts the write as it does on a full disk.
+    /// Runs only as the child process of [`a_write_cut_short_leaves_the_old_file_and_nothing_else`], with a limited
+    /// file size: the kernel cuts the write as on a full disk.
     #[cfg(unix)]
     #[test]
     #[ignore = "needs a limited file size; another test runs it in a child process"]

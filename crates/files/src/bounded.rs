@@ -1,4 +1,4 @@
-//! Files that are read with a bound.
+//! Reading files with a size limit.
 
 use std::io::Read;
 use std::path::Path;
@@ -9,7 +9,7 @@ use crate::inputs;
 /// Reads a whole file, unless it is larger than `max_bytes`.
 ///
 /// # Errors
-/// A file that cannot be read or is larger; a folder.
+/// The file cannot be read or is larger, or the path is a folder.
 pub fn read(path: &Path, max_bytes: u64) -> Result<Vec<u8>> {
     let (file, length) = inputs::open(path)?;
     if length > max_bytes {
@@ -18,10 +18,10 @@ pub fn read(path: &Path, max_bytes: u64) -> Result<Vec<u8>> {
     read_bounded(file, path, max_bytes)
 }
 
-/// Reads to the end, unless that is further than `max_bytes`; a pipe has no length to check beforehand. `name` stands in errors.
+/// Reads to the end, but at most `max_bytes`; a pipe has no length to check beforehand. `name` is used in errors.
 ///
 /// # Errors
-/// What cannot be read or is longer.
+/// The input cannot be read or is longer.
 pub fn read_bounded(input: impl Read, name: &Path, max_bytes: u64) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     input.take(max_bytes + 1).read_to_end(&mut bytes).map_err(FileError::at(name, "read"))?;

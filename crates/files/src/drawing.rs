@@ -1,4 +1,5 @@
-//! PNG files that say in their text that they are drawings of ours, so that one replaces another and never a photo.
+//! PNG files marked in their text as drawings of this program, so that a drawing may replace another one but never a
+//! photo.
 
 use std::fs::File;
 use std::io::Read;
@@ -12,10 +13,10 @@ use crate::inputs;
 
 const KEYWORD: &str = "Software";
 const TEXT: &str = "sdg drawing";
-/// The text stands before the pixels, behind 33 bytes of signature and size.
+/// The text precedes the pixels and follows 33 bytes of signature and size.
 const MAX_TEXT_END: u64 = 100;
 
-/// Writes a picture as PNG, whole or not at all, and never over an input or a file of another kind.
+/// Writes a picture as PNG, atomically, never over an input or a file of another kind.
 ///
 /// # Errors
 /// As [`crate::write`].
@@ -26,10 +27,10 @@ pub fn write_png(path: &Path, picture: &RgbImage) -> Result<()> {
     inputs::write(path, &bytes.into_inner())
 }
 
-/// Writes a drawing, whole or not at all.
+/// Writes a drawing atomically.
 ///
 /// # Errors
-/// An input, or another picture than a drawing of ours, in its place; the system's reason.
+/// The path is an input, or a picture that is not a drawing of this program; or the system refuses.
 pub fn write_drawing(path: &Path, drawing: &RgbImage) -> Result<()> {
     check_replaces_a_drawing(path)?;
     let bytes = encode(drawing).map_err(|source| FileError::Png { path: path.to_owned(), source })?;
@@ -48,7 +49,7 @@ fn encode(drawing: &RgbImage) -> Result<Vec<u8>, png::EncodingError> {
     Ok(bytes)
 }
 
-/// Makes sure that a drawing replaces an earlier one, an empty file or nothing.
+/// Checks that a drawing replaces only an earlier one, an empty file or nothing.
 ///
 /// # Errors
 /// Another file.

@@ -1,4 +1,4 @@
-//! What can go wrong with a file.
+//! Errors of files.
 
 use std::path::PathBuf;
 
@@ -12,11 +12,11 @@ pub type Result<T, E = FileError> = std::result::Result<T, E>;
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum FileError {
-    /// The system refused a step.
+    /// A system call failed.
     #[error("{}: cannot {step}", path.display())]
     System {
         path: PathBuf,
-        /// What was being done, such as `read` or `make this folder`.
+        /// The step, such as `read` or `make this folder`.
         step: &'static str,
         source: std::io::Error,
     },
@@ -25,29 +25,29 @@ pub enum FileError {
     TooLarge {
         path: PathBuf,
         max_bytes: u64,
-        /// Its length, where that is known.
+        /// Its length, if known.
         found: Option<u64>,
     },
-    /// A folder in the place of a file.
+    /// A folder in place of a file.
     #[error("{}: expected a {expected}, found a folder", path.display())]
     Folder {
         path: PathBuf,
-        /// What is done with it: `file`, or `file to write`.
+        /// The expected kind: `file`, or `file to write`.
         expected: &'static str,
     },
-    /// The output's path leads to an input.
+    /// The output path leads to an input.
     #[error("{}: expected a name of its own for what is written, found an input of this command", path.display())]
     Input { path: PathBuf },
     /// A file of another kind has the output's name.
     #[error("{}: expected a new name, or {written} to replace, found {found}", path.display())]
     OtherKind {
         path: PathBuf,
-        /// The kind of what was to be written.
+        /// The kind of the output.
         written: String,
-        /// The kind of the file that is there.
+        /// The kind of the existing file.
         found: String,
     },
-    /// Another picture than a drawing of ours has the drawing's name.
+    /// The path of a drawing is another picture.
     #[error("{}: expected a new name, or an earlier drawing to replace, found another file", path.display())]
     NoDrawing { path: PathBuf },
     /// A drawing that could not be encoded.
@@ -60,7 +60,7 @@ pub enum FileError {
     #[error("cannot write {}: {step} failed: {source}; nothing was changed", path.display())]
     Write {
         path: PathBuf,
-        /// What was being done: creating, writing, flushing or renaming.
+        /// The step: creating, writing, flushing or renaming.
         step: &'static str,
         source: std::io::Error,
     },
@@ -68,11 +68,11 @@ pub enum FileError {
     #[error("cannot write {}: expected the path of a file, found {found}", path.display())]
     NotAFile {
         path: PathBuf,
-        /// What the path is instead.
+        /// The kind of the path.
         found: &'static str,
     },
     /// Another process writes the file.
-    #[error("{}: expected a file that nobody else writes, found one of {holder}", path.display())]
+    #[error("{}: expected a file that no other process writes, found one of {holder}", path.display())]
     Held {
         path: PathBuf,
         /// The process, as it named itself.
@@ -81,7 +81,7 @@ pub enum FileError {
 }
 
 impl FileError {
-    /// For `map_err`: the system's reason at a step with a file.
+    /// For `map_err`: the system's error at a step with a file.
     pub(crate) fn at(path: &std::path::Path, step: &'static str) -> impl FnOnce(std::io::Error) -> Self {
         let path = path.to_owned();
         move |source| Self::System { path, step, source }

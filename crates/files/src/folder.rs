@@ -5,17 +5,17 @@ use std::path::{Path, PathBuf};
 
 use crate::error::{FileError, Result};
 
-/// Whether a file's name ends like one of these; case does not count.
+/// Whether a file's name has one of these extensions, ignoring case.
 pub fn has_extension(path: &Path, extensions: &[&str]) -> bool {
     path.extension()
         .and_then(|extension| extension.to_str())
         .is_some_and(|extension| extensions.iter().any(|known| extension.eq_ignore_ascii_case(known)))
 }
 
-/// The entries of a folder, sorted by name; hidden ones are left out.
+/// The entries of a folder, sorted by name, without hidden ones.
 ///
 /// # Errors
-/// A folder that cannot be read.
+/// The folder cannot be read.
 pub fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
     let failed = || FileError::at(folder, "read this folder");
     let mut paths = Vec::new();
@@ -29,7 +29,7 @@ pub fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(paths)
 }
 
-/// The folder that a file stands in.
+/// The folder that contains a file.
 pub(crate) fn folder_of(file: &Path) -> &Path {
     match file.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
@@ -37,17 +37,17 @@ pub(crate) fn folder_of(file: &Path) -> &Path {
     }
 }
 
-/// Makes sure that files can be written into an existing folder.
+/// Checks that files can be written to an existing folder.
 pub(crate) fn check_folder_writable(folder: &Path) -> Result<()> {
     let probe = folder.join(format!(".sdg-probe-{}.tmp", std::process::id()));
     File::create_new(&probe).map_err(FileError::at(folder, "write into this folder"))?;
     fs::remove_file(&probe).map_err(FileError::at(&probe, "remove a file of ours"))
 }
 
-/// Makes a folder (and those above it) if it is missing, and makes sure that files can be written into it.
+/// Creates a folder (and its parents) if missing, and checks that files can be written to it.
 ///
 /// # Errors
-/// A folder that cannot be made or written.
+/// The folder cannot be created or written.
 pub fn prepare_folder(folder: &Path) -> Result<()> {
     fs::create_dir_all(folder).map_err(FileError::at(folder, "make this folder"))?;
     check_folder_writable(folder)

@@ -1,4 +1,4 @@
-//! The files that this process has read, which what it writes replaces none of.
+//! The input files of this process, which its outputs must not replace.
 
 use std::collections::BTreeSet;
 use std::fs::{self, File};
@@ -10,7 +10,7 @@ use crate::error::{FileError, Result};
 use crate::folder::{check_folder_writable, folder_of};
 use crate::kind::check_replaces_its_kind;
 
-/// What this process has opened to read: [`write`] replaces none of it.
+/// Files opened for reading by this process: [`write`] does not replace them.
 static INPUTS: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
 /// The file and its length.
@@ -29,20 +29,20 @@ pub(crate) fn open(path: &Path) -> Result<(File, u64)> {
 /// Whether a file can be opened.
 ///
 /// # Errors
-/// Its name and what the system says; a folder.
+/// The file cannot be opened (its name and the system's error), or is a folder.
 pub fn check_readable(path: &Path) -> Result<()> {
     open(path).map(drop)
 }
 
-/// Whether two paths lead to one file that is there, whatever links they go through.
+/// Whether two paths lead to the same existing file, through any links.
 pub fn is_same_file(one: &Path, other: &Path) -> bool {
     one.canonicalize().is_ok_and(|one| other.canonicalize().is_ok_and(|other| one == other))
 }
 
-/// Makes sure that no input of this process would be replaced, but for `own`.
+/// Checks that the path is not an input of this process other than `own`.
 ///
 /// # Errors
-/// A path that leads to one.
+/// The path leads to an input.
 fn check_is_no_input(path: &Path, own: Option<&Path>) -> Result<()> {
     let is_input = |path: PathBuf| INPUTS.lock().unwrap_or_else(PoisonError::into_inner).contains(&path);
     if !own.is_some_and(|own| is_same_file(path, own)) && path.canonicalize().is_ok_and(is_input) {
@@ -51,30 +51,30 @@ fn check_is_no_input(path: &Path, own: Option<&Path>) -> Result<()> {
     Ok(())
 }
 
-/// Makes sure that no input of this process is replaced by what it will write, before it writes the first.
+/// Checks, before the first output is written, that no output of this process would replace an input.
 ///
 /// # Errors
-/// A path that leads to one.
+/// A path leads to an input.
 pub fn check_are_no_inputs(paths: impl IntoIterator<Item = PathBuf>) -> Result<()> {
     paths.into_iter().try_for_each(|path| check_is_no_input(&path, None))
 }
 
-/// Keeps [`write`] from replacing a file, or the files of a folder, that others than this crate read.
+/// Registers a file, or the files of a folder, read by code outside this crate, so that [`write`] does not replace it.
 pub fn keep(path: &Path) {
     let entries = fs::read_dir(path).into_iter().flatten().flatten().map(|entry| entry.path());
     let kept = entries.chain([path.to_owned()]).filter_map(|path| path.canonicalize().ok());
     INPUTS.lock().unwrap_or_else(PoisonError::into_inner).extend(kept);
 }
 
-/// Writes a file whole or not at all, and never over an input of this process, or over a file of another kind.
+/// Writes a file atomically, never over an input of this process or over a file of another kind.
 ///
 /// # Errors
-/// A path that leads to such a file; the system's reason.
+/// The path leads to such a file, or the system refuses.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     extend(path, None, bytes)
 }
 
-/// The same for a file that may be `own`, which this process read to keep what stands in it.
+/// The same for a file that may be `own`, which this process has read in order to keep its contents.
 ///
 /// # Errors
 /// As [`write`].
@@ -84,15 +84,15 @@ pub fn extend(path: &Path, own: Option<&Path>, bytes: &[u8]) -> Result<()> {
     write_atomically(path, bytes)
 }
 
-/// Makes sure, before minutes of work, that a file can be written at `path` later, and that it is no input.
+/// Checks, before minutes of work, that a file can be written at `path` later, and that it is not an input.
 ///
 /// # Errors
-/// A folder or an input at `path`; a folder that cannot be written.
+/// `path` is a folder or an input, or its folder cannot be written.
 pub fn check_writable(path: &Path) -> Result<()> {
     check_extendable(path, None)
 }
 
-/// The same of a file that may be `own`, as for [`extend`].
+/// The same for a file that may be `own`, as for [`extend`].
 ///
 /// # Errors
 /// As [`check_writable`].

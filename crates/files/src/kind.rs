@@ -1,4 +1,4 @@
-//! The kind of a file, by its first bytes.
+//! The kind of a file, recognised by its first bytes.
 
 use std::fs::File;
 use std::io::Read;
@@ -6,13 +6,13 @@ use std::path::Path;
 
 use crate::error::{FileError, Result};
 
-/// The bytes that tell a picture's format.
+/// Number of bytes that identify a picture's format.
 const MAX_SIGNATURE: u64 = 64;
 
-/// Makes sure that a file is replaced by one of its kind: no photo by a report, no marks by a camera.
+/// Checks that a file is replaced only by one of the same kind: no photo by a report, no marks by a camera.
 ///
 /// # Errors
-/// A file of another kind.
+/// The existing file is of another kind.
 pub(crate) fn check_replaces_its_kind(path: &Path, bytes: &[u8]) -> Result<()> {
     let mut start = Vec::new();
     let _ = File::open(path).and_then(|file| file.take(MAX_SIGNATURE).read_to_end(&mut start));
@@ -24,7 +24,7 @@ pub(crate) fn check_replaces_its_kind(path: &Path, bytes: &[u8]) -> Result<()> {
     Ok(())
 }
 
-/// The kind of a file by its first bytes, in words; `None` for an empty one.
+/// The kind of a file in words; `None` for an empty file.
 fn kind_of(start: &[u8]) -> Option<String> {
     let first = start.iter().find(|byte| !byte.is_ascii_whitespace())?;
     let kind = match (image::guess_format(start), first) {

@@ -1,13 +1,13 @@
-//! Files on disk: read with a bound, written whole or not at all, locked between processes.
+//! Files on disk: size-limited reading, atomic writing, locks between processes.
 //!
 //! ```text
-//! path ─ read (bounded, remembered as an input) ─ bytes
+//! path ─ read (size limit, registered as an input) ─ bytes
 //! bytes ─ write: no input, no file of another kind is replaced ─ write_atomically: temporary file, sync, rename ─ path
-//! path ─ Lock: alone or shared, until it is dropped; WriterLock: tells who writes a file
+//! path ─ Lock: exclusive or shared, until it is dropped; WriterLock: names the process that writes a file
 //! ```
 //!
-//! Errors name the path and the system's reason. What is deliberately absent: what the bytes mean, options, and words for a user of
-//! one command.
+//! Errors name the path and the system's reason. Deliberately absent: the meaning of the bytes, options, and texts for
+//! users of a single command.
 //!
 //! ```
 //! # fn main() -> Result<(), sdg_files::FileError> {

@@ -1,4 +1,4 @@
-//! Locks between processes. The system gives a lock back when its process ends, however it ends.
+//! Locks between processes. The system releases a lock when its process ends, in whatever way.
 
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{Read, Seek, Write};
@@ -6,32 +6,32 @@ use std::path::{Path, PathBuf};
 
 use crate::error::{FileError, Result};
 
-/// Who else may hold a lock.
+/// Access of a lock.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Access {
-    /// Nobody.
+    /// Exclusive.
     Alone,
-    /// All who ask for the same.
+    /// Shared with others that request shared access.
     Shared,
 }
 
-/// The lock of a file, held until it is dropped. A file system without locks gives it to everyone, so that it does not keep anyone
-/// from working alone.
+/// The lock of a file, held until it is dropped. A file system without locks grants it to every process, so that
+/// working alone is always possible.
 #[derive(Debug)]
 pub struct Lock(#[allow(dead_code, reason = "the system keeps the lock as long as the file is open")] File);
 
 impl Lock {
-    /// Takes the lock of the file at `path`, which is made if it is missing; `None` where another process holds it.
+    /// Takes the lock of the file at `path`, which is created if missing; `None` if another process holds it.
     ///
     /// # Errors
-    /// A file that cannot be written.
+    /// The file cannot be written.
     pub fn take(path: &Path, access: Access) -> Result<Option<Self>> {
         let file = OpenOptions::new().create(true).truncate(false).read(true).write(true).open(path);
         let (file, is_taken) = try_lock(file.map_err(FileError::at(path, "write"))?, access);
         Ok(is_taken.then_some(Self(file)))
     }
 
-    /// Whether nobody holds the lock of a file; not so where there is no such file, or no locks.
+    /// Whether no process holds the lock of a file; false if there is no such file, or no locks.
     pub fn is_free(path: &Path) -> bool {
         File::open(path).is_ok_and(|file| file.try_lock_shared().is_ok())
     }
@@ -46,8 +46,8 @@ fn try_lock(file: File, access: Access) -> (File, bool) {
     (file, !matches!(locked, Err(TryLockError::WouldBlock)))
 }
 
-/// The lock of who writes a file, in a hidden file beside it that says who that is. The hidden file is removed in the end; where it
-/// stays, the next holder takes it over.
+/// A lock on writing a file, in a hidden file beside it that names the holder. The hidden file is removed at the end;
+/// if it remains, the next holder takes it over.
 #[derive(Debug)]
 pub struct WriterLock {
     path: PathBuf,
@@ -55,10 +55,10 @@ pub struct WriterLock {
 }
 
 impl WriterLock {
-    /// Takes the lock for a file that will be written; `None` where nothing can be written.
+    /// Takes the lock for a file that will be written; `None` if the folder is not writable.
     ///
     /// # Errors
-    /// [`FileError::Held`] where another process holds it.
+    /// [`FileError::Held`] if another process holds it.
     pub fn take(written: &Path) -> Result<Option<Self>> {
         let name = written.file_name().unwrap_or_default().to_string_lossy();
         let path = written.with_file_name(format!(".{name}.lock"));
@@ -68,12 +68,12 @@ impl WriterLock {
             let (mut file, is_taken) = try_lock(file, Access::Alone);
             if !is_taken {
                 let mut holder = String::new();
-                // It may hold it since a moment ago alone, without its name.
+                // The other process may have taken the lock a moment ago, without having written its name.
                 let _ = file.read_to_string(&mut holder);
                 let holder = if holder.is_empty() { "process unknown" } else { holder.trim() }.to_owned();
                 return Err(FileError::Held { path: written.to_owned(), holder });
             }
-            // The holder before may have removed the file after it was opened here.
+            // The previous holder may have removed the file after it was opened here.
             if is_at(&file, &path) {
                 let named = file
                     .set_len(0)
@@ -88,7 +88,7 @@ impl WriterLock {
 
 impl Drop for WriterLock {
     fn drop(&mut self) {
-        // What stays is taken over.
+        // A remaining file is taken over.
         let _ = fs::remove_file(&self.path);
     }
 }
@@ -100,7 +100,7 @@ fn is_at(file: &File, path: &Path) -> bool {
     matches!((file.metadata(), fs::metadata(path)), (Ok(file), Ok(path)) if id(file.clone()) == id(path.clone()))
 }
 
-/// Elsewhere an open file is not removed.
+/// On other systems, an open file is not removed.
 #[cfg(not(unix))]
 fn is_at(_: &File, _: &Path) -> bool {
     true
@@ -140,7 +140,7 @@ mod tests {
         assert!(WriterLock::take(&folder.path().join("no/folder.json")).unwrap().is_none());
         drop(held);
         assert!(!file.exists());
-        // Of a process that ended without removing it.
+        // A file of a process that ended without removing it.
         fs::write(&file, "process 1\n").unwrap();
         let taken = WriterLock::take(&marks).unwrap();
         assert_eq!(fs::read_to_string(&file).unwrap(), format!("{process}\n"));

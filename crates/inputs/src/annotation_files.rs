@@ -8,18 +8,18 @@ use sdg_demonstration::{Annotation, AnnotationFormat, ImageFacts, WrittenAnnotat
 
 use crate::marks_check::MarkedPhoto;
 
-/// Larger annotations than any tool writes, embedded image included.
+/// Maximum size of an annotation file with an embedded image.
 pub const MAX_ANNOTATION_BYTES: u64 = 512 << 20;
-/// What a YOLO dataset calls the file of its labels.
+/// Name of the file with the labels of a YOLO dataset.
 pub const DATA_YAML: &str = "data.yaml";
-/// What else people call it; looked for after the former in each folder.
+/// Other common names; searched after the first in each folder.
 const OTHER_DATA_YAML: [&str; 3] = ["data.yml", "dataset.yaml", "dataset.yml"];
-/// How many folders above a label file its data.yaml may stand: labels/train/a.txt.
+/// Maximum number of folders between a label file and its data.yaml: labels/train/a.txt.
 const FOLDERS_UP: usize = 3;
 
-/// An annotation file that was read, with what stands beside it.
+/// An annotation file, with the files that belong to it.
 pub struct AnnotationFile {
-    /// The format by the content.
+    /// The format, recognised by the content.
     pub format: AnnotationFormat,
     path: PathBuf,
     bytes: Vec<u8>,
@@ -30,7 +30,7 @@ impl AnnotationFile {
     /// Reads a file of any format.
     ///
     /// # Errors
-    /// Files that cannot be read, and content of no known format.
+    /// A file cannot be read, or its format is unknown.
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = sdg_files::read(path, MAX_ANNOTATION_BYTES)?;
         let format = AnnotationFormat::of(&bytes).with_context(|| path.display().to_string())?;
@@ -44,10 +44,10 @@ impl AnnotationFile {
         Ok(Self { format, path: path.to_owned(), bytes, beside })
     }
 
-    /// What is marked on one image.
+    /// The marks on one image.
     ///
     /// # Errors
-    /// Whatever [`Annotation::read_with`] refuses.
+    /// Those of [`Annotation::read_with`].
     pub fn objects(&self, image: &ImageFacts) -> Result<Vec<Annotation>> {
         let beside = self.beside.as_ref().map(|(_, bytes)| bytes.as_slice());
         Annotation::read_with(&self.bytes, beside, image).with_context(|| match &self.beside {
@@ -56,7 +56,7 @@ impl AnnotationFile {
         })
     }
 
-    /// The marks on a photo, read upright and checked against its pixels, with a notice of marks of other things.
+    /// The marks on a photo, read upright and checked against its pixels. Marks of other objects are reported.
     ///
     /// # Errors
     /// Those of [`Self::objects`] and of [`MarkedPhoto::checked`].
@@ -65,29 +65,30 @@ impl AnnotationFile {
         let marked = MarkedPhoto { photo, image, marks: &self.path, bytes: &self.bytes, file_name: path.to_str() };
         let objects = marked.checked(|facts| self.objects(facts))?;
         objects.iter().try_for_each(Annotation::check).with_context(|| self.path.display().to_string())?;
-        // After all that may fail, which is told in one line.
+        // After all fallible steps, so that an error is printed alone.
         self.tell_passed_over();
         Ok(objects)
     }
 
-    /// Prints the file's entries that mark no part.
+    /// Prints the entries of the file that do not mark a part.
     pub fn tell_passed_over(&self) {
         for foreign in Annotation::passed_over(&self.bytes) {
-            eprintln!("{}: passed over {foreign}", self.path.display());
+            eprintln!("{}: skipped {foreign}", self.path.display());
         }
     }
 
-    /// The content of the file itself.
+    /// The contents of the file itself.
     pub fn bytes(&self) -> &[u8] {
         &self.bytes
     }
 }
 
-/// The marks that stand beside a photo: `photo.coco.json` (what `sdg annotate` writes where another tool's photo.json is to stay),
-/// `photo.json` (what it writes otherwise, or LabelMe), `photo.txt` (YOLO-pose), or the same below `labels` where a YOLO dataset keeps its pictures below `images`.
+/// The marks beside a photo: `photo.coco.json` (written by `sdg annotate` if another tool's photo.json must be kept),
+/// `photo.json` (written otherwise, or LabelMe), `photo.txt` (YOLO-pose), or the same below `labels` if a YOLO dataset
+/// keeps its pictures below `images`.
 ///
 /// # Errors
-/// None of them is there; the message says which were looked for, and what makes one.
+/// None of them exists; the message lists the searched names, and how to create one.
 pub fn beside_photo(photo: &Path) -> Result<PathBuf> {
     let in_labels = || {
         let folder = photo.parent()?;
@@ -116,7 +117,7 @@ pub fn beside_photo(photo: &Path) -> Result<PathBuf> {
     }
 }
 
-/// The file that belongs to `path`, if it is there.
+/// The file that belongs to `path`, if it exists.
 fn beside(path: &Path, format: AnnotationFormat) -> Option<PathBuf> {
     match format {
         AnnotationFormat::OpenDr => {
@@ -137,10 +138,10 @@ fn beside(path: &Path, format: AnnotationFormat) -> Option<PathBuf> {
     }
 }
 
-/// Writes the labels beside the output; their file. A data.yaml that is there already stays as it is.
+/// Writes the labels beside the output and returns their file. An existing data.yaml is kept.
 ///
 /// # Errors
-/// One that is there and says otherwise; files that cannot be read or written.
+/// An existing file contradicts the labels, or files cannot be read or written.
 pub fn write_data_yaml(
     output: &Path,
     written: &WrittenAnnotation,
@@ -185,7 +186,7 @@ mod tests {
         for looked_for in ["images/train/a.json", "images/train/a.txt", "labels/train/a.txt", "sdg annotate"] {
             assert!(none.contains(looked_for), "{none}");
         }
-        // From the least to the most preferred, so that each is found although the former ones are there.
+        // From the least to the most preferred, so that each is found although the others exist.
         for name in ["labels/train/a.txt", "images/train/a.txt", "images/train/a.json", "images/train/a.coco.json"] {
             fs::write(at(name), "").unwrap();
             assert_eq!(beside_photo(&at("images/train/a.jpg")).unwrap(), at(name));

@@ -1,4 +1,4 @@
-//! Base weights for teaching: our own, or a checkpoint of any format, fitted to the network that is taught.
+//! Base weights for teaching: this project's own, or a checkpoint of any format, loaded into the taught network.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -12,17 +12,17 @@ use sdg_weights_conversion::{Checkpoint, Conversion, Naming, Report, Source, nam
 
 use crate::detector_config::{architecture_of, kind_of, preset_for, preset_of_kind};
 
-/// How base weights of our own were made, by names such as `seed`.
+/// Facts on how this project's base weights were made, by names such as `seed`.
 pub type Origin = BTreeMap<String, String>;
 
-/// More than base weights of our own have.
+/// Maximum size of this project's base weights.
 const MAX_OWN_BYTES: u64 = 64 << 20;
 
-/// Reads base weights of our own for what `options` teach, all but the parts that are named in `reinitialized`, and how
-/// they were made; `None` where the file is another one.
+/// Reads this project's base weights for the network of `options`, without the parts named in `reinitialized`, and how
+/// they were made; `None` if the file is another one.
 ///
 /// # Errors
-/// A file that cannot be read, weights of another preset, a part that they have not.
+/// The file cannot be read, the weights are of another preset, or a named part does not exist.
 pub fn read_own(
     path: &Path,
     options: &TeachOptions,
@@ -54,7 +54,7 @@ pub fn read_own(
 /// Opens a checkpoint of any format.
 ///
 /// # Errors
-/// What cannot be read, named.
+/// The file cannot be read.
 pub fn open(path: &Path) -> Result<(Source, Checkpoint)> {
     let named = || path.display().to_string();
     let mut source = Source::open(path).with_context(named)?;
@@ -62,13 +62,13 @@ pub fn open(path: &Path) -> Result<(Source, Checkpoint)> {
     Ok((source, checkpoint))
 }
 
-/// Reads the weights in `path` for `network`, all but the parts that are named in `reinitialized`. Of a backbone alone
-/// the rest of the network starts from nothing without being named.
+/// Reads the weights in `path` for `network`, without the parts named in `reinitialized`. If the file contains only a
+/// backbone, the rest of the network is initialised randomly without being named.
 ///
-/// `tell` is called with the report before anything is refused.
+/// `tell` receives the report before any error.
 ///
 /// # Errors
-/// A file that cannot be read, weights for another network or for images given otherwise, a part that the network has not.
+/// The file cannot be read, the weights are for another network or another image input, or a named part does not exist.
 pub fn read(
     path: &Path,
     network: &RcnnConfig,
@@ -95,12 +95,12 @@ pub fn read(
     })
 }
 
-/// Weights know images by their channels' order and range: the same kernels on other numbers see nothing.
+/// Weights depend on the channel order and range of their input: on other numbers the same kernels are useless.
 fn check_input(checkpoint: &Checkpoint, network: &RcnnConfig) -> Result<()> {
     let naming = naming_of(checkpoint)?;
     let made_for = match (checkpoint.metadata.get("network"), naming) {
         (Some(network), Naming::Ours) => RcnnConfig::from_json(network).context("metadata \"network\"")?,
-        // A file of ours that does not say: there is nothing to compare.
+        // A file of this project without this information cannot be compared.
         (None, Naming::Ours) => return Ok(()),
         _ => preset_of_kind(preset_for(naming)?, kind_of(network))?,
     };

@@ -11,14 +11,14 @@ use sdg_geometry::PinholeCamera;
 use sdg_grasp::{CameraOverTable, GraspError, GraspModel, Lengths, pictures_from_above, seen_from_above};
 use sdg_robot::workcell::Workcell;
 
-/// Larger camera files than any tool writes.
+/// Maximum size of a camera file.
 const MAX_BYTES: u64 = 1 << 20;
 
-/// A camera's file, read.
+/// A camera's file.
 #[derive(Debug, Clone)]
 pub struct CameraFile {
     camera: CalibratedCamera,
-    /// Where the camera is.
+    /// The camera's pose.
     pub over_table: CameraOverTable,
 }
 
@@ -26,7 +26,7 @@ impl CameraFile {
     /// Reads the intrinsics of a file, with or without the camera's pose.
     ///
     /// # Errors
-    /// A file that cannot be read.
+    /// The file cannot be read.
     pub fn read_intrinsics(path: &Path) -> Result<PinholeCamera> {
         Ok(read(path)?.0.intrinsics)
     }
@@ -34,17 +34,17 @@ impl CameraFile {
     /// Reads a file that has the camera's pose.
     ///
     /// # Errors
-    /// A file that cannot be read or has no pose.
+    /// The file cannot be read or has no pose.
     pub fn read(path: &Path) -> Result<Self> {
         let (camera, _) = read(path)?;
         let (over_table, _) = camera_over_table(&camera).with_context(|| path.display().to_string())?;
         Ok(Self { over_table, camera })
     }
 
-    /// A model that looks through it.
+    /// The perception of a model with this camera.
     ///
     /// # Errors
-    /// A model that was taught without a camera; a camera that does not see the plane of the marks.
+    /// The model was taught without a camera, or the camera does not see the plane of the marks.
     pub fn perception(&self, model: GraspModel) -> Result<Perception> {
         Ok(Perception::calibrated(model, &self.camera)?)
     }
@@ -54,7 +54,7 @@ impl CameraFile {
         [self.camera.intrinsics.width, self.camera.intrinsics.height]
     }
 
-    /// Whether a picture can be this camera's.
+    /// Checks that a picture can be from this camera.
     ///
     /// # Errors
     /// A picture of another size.
@@ -62,7 +62,7 @@ impl CameraFile {
         self.check_size(picture.dimensions())
     }
 
-    /// The same by its width and height.
+    /// The same by width and height.
     ///
     /// # Errors
     /// Another size.
@@ -73,7 +73,7 @@ impl CameraFile {
     /// Photos of this camera and their marks in the plan view of the marks' plane; heights over the table in metres.
     ///
     /// # Errors
-    /// A photo of another size, and marks outside what the camera sees of the plane.
+    /// A photo has another size, or marks are outside the visible part of the plane.
     pub fn seen_from_above(
         &self,
         photos: &[Demonstration],
@@ -84,7 +84,7 @@ impl CameraFile {
         Ok(seen_from_above(photos, &self.over_table, mark_height_m, grasp_height_m)?)
     }
 
-    /// Pictures of this camera without the part in the same plan view.
+    /// Pictures of this camera without the part, in the same plan view.
     ///
     /// # Errors
     /// A picture of another size than the camera's.
@@ -94,34 +94,34 @@ impl CameraFile {
     }
 }
 
-/// Puts the model of a file behind the camera of a file, if one is given.
+/// The perception of a model's file with a camera's file, if one is given.
 ///
 /// # Errors
-/// A camera file that cannot be used, or that does not see the plane of the marks, with its name; a model that was taught without a
-/// camera, with its file's name.
+/// The camera file cannot be used, or the camera does not see the plane of the marks (with the camera file's name); or
+/// the model was taught without a camera (with the model file's name).
 pub fn perception(model: GraspModel, model_file: &Path, camera: Option<&Path>) -> Result<Perception> {
     let Some(path) = camera else { return Ok(Perception::of_any_camera(model)) };
     CameraFile::read(path)?.perception(model).map_err(|error| {
-        // A plane that is not seen is the camera's fault.
+        // A plane that is not visible is an error of the camera's file.
         let is_of_camera = matches!(error.downcast_ref(), Some(CellError::Grasp(GraspError::PlanView(_))));
         let file = if is_of_camera { path } else { model_file };
         error.context(file.display().to_string())
     })
 }
 
-/// The camera of a file where the workcell mounts it.
+/// The camera of a file, mounted as defined in a workcell.
 ///
 /// # Errors
-/// A file without the pose that the mounting needs.
+/// The file lacks the pose for this mounting.
 pub fn mounted(camera: &CalibratedCamera, workcell: &Workcell, path: &Path) -> Result<MountedCamera> {
     MountedCamera::new(camera, workcell.mount, workcell.table_height_m).with_context(|| path.display().to_string())
 }
 
-/// Reads a camera's file, with or without the camera's pose: the camera, and the text for whom writes it again.
+/// Reads a camera's file, with or without a pose: the camera, and the text for rewriting the file.
 pub fn read(path: &Path) -> Result<(CalibratedCamera, String)> {
     let bytes = sdg_files::read(path, MAX_BYTES)?;
     let Ok(text) = String::from_utf8(bytes) else {
-        bail!("{}: expected YAML, found bytes that are no text", path.display());
+        bail!("{}: expected YAML, found bytes that are not text", path.display());
     };
     let camera = CalibratedCamera::from_yaml(&text).with_context(|| path.display().to_string())?;
     Ok((camera, text))

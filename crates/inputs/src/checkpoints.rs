@@ -1,4 +1,4 @@
-//! Checkpoints as detectors: which one a file is for, and whether it gives what the original gave.
+//! Checkpoints as detectors: which detector a file is for, and whether its outputs equal the original's.
 
 use std::path::Path;
 
@@ -13,10 +13,10 @@ use sdg_weights_conversion::{Checkpoint, Conversion, Naming, naming_of};
 use crate::base_weights::open;
 use crate::detector_config::{architecture_of, preset, preset_for};
 
-/// The detector that a checkpoint is for: as configured, as the file itself says, or as its names say.
+/// The detector of a checkpoint: as configured, as stated in the file, or as derived from the names.
 ///
 /// # Errors
-/// Names of no program that is known, or that fit no preset; [`ConfigError`](crate::ConfigError) where a configuration would help.
+/// The names are unknown or fit no preset; [`ConfigError`](crate::ConfigError) if a configuration would help.
 pub fn config_of(checkpoint: &Checkpoint, config: Option<RcnnConfig>, preset_name: Option<&str>) -> Result<RcnnConfig> {
     if let Some(config) = config {
         return Ok(config);
@@ -30,10 +30,11 @@ pub fn config_of(checkpoint: &Checkpoint, config: Option<RcnnConfig>, preset_nam
     }
 }
 
-/// Builds the detector of a checkpoint, fills it, and compares it stage by stage with outputs of the original for an image.
+/// Builds the detector of a checkpoint, loads the weights, and compares it stage by stage with the original's outputs
+/// for an image.
 ///
 /// # Errors
-/// Files that cannot be read, a checkpoint that does not fill the detector, outputs of other shapes.
+/// Files cannot be read, the checkpoint is incomplete, or the outputs have other shapes.
 pub fn verify_checkpoint(
     file: &Path,
     config: Option<RcnnConfig>,
@@ -59,7 +60,7 @@ pub fn verify_checkpoint(
     golden::verify(&detector, image, &reference).with_context(|| against.display().to_string())
 }
 
-/// The original's outputs; gradients keep the names of the program that made them.
+/// The original's outputs; gradients keep the names of the original program.
 fn read_reference(path: &Path) -> Result<StateDict> {
     const GRADIENTS: &str = "gradients.";
     let (mut source, outputs) = open(path)?;

@@ -1,4 +1,4 @@
-//! A demonstration's two files: a photo, and the marks on it.
+//! The two files of a demonstration: a photo and its marks.
 
 use std::path::Path;
 
@@ -9,18 +9,18 @@ use crate::pictures::read_image;
 
 use crate::annotation_files::AnnotationFile;
 
-/// Reads a photo and the marks on it.
+/// Reads a photo and its marks.
 ///
 /// # Errors
-/// Files that cannot be read; other than one marked object.
+/// Files cannot be read, or the number of marked objects is not one.
 pub fn read_pair(image_path: &Path, annotation_path: &Path) -> Result<Demonstration> {
     let image = read_image(image_path)?;
     let file = AnnotationFile::read(annotation_path)?;
     let mut objects = file.objects_on(image_path, &image)?;
-    // Boxes of other things, which another tool or another person marked as well.
+    // Boxes of other objects, made by another tool or person.
     if objects.iter().filter(|object| object.grasp.is_some()).count() == 1 {
         for other in objects.extract_if(.., |object| object.grasp.is_none()) {
-            eprintln!("{}: passed over `{}`, which has no grasp", annotation_path.display(), other.label);
+            eprintln!("{}: skipped `{}`, which has no grasp", annotation_path.display(), other.label);
         }
     }
     if objects.len() != 1 {

@@ -1,7 +1,7 @@
-//! Which detector a checkpoint is for: a preset, a configuration file, or what its names say.
+//! The detector of a checkpoint: given by a preset, a configuration file, or the checkpoint's names.
 //!
-//! A configuration file is either an [`RcnnConfig`] as JSON, or the short form that stands beside reference outputs:
-//! kind, widths, sizes and thresholds that differ from the preset.
+//! A configuration file is either an [`RcnnConfig`] as JSON, or the short form used beside reference outputs: kind,
+//! widths, sizes and thresholds that differ from the preset.
 
 use std::path::Path;
 
@@ -14,7 +14,7 @@ use sdg_weights_conversion::{Architecture, Checkpoint, Naming, SecondStage, nami
 
 use crate::error::ConfigError;
 
-/// More than any configuration takes.
+/// Maximum size of a configuration file.
 const MAX_CONFIG_BYTES: u64 = 1 << 20;
 /// The presets that checkpoints are imported into.
 const PRESETS: [&str; 2] = ["r50-detectron2", "r50-torchvision"];
@@ -22,7 +22,7 @@ const PRESETS: [&str; 2] = ["r50-detectron2", "r50-torchvision"];
 /// Reads a configuration file of either form.
 ///
 /// # Errors
-/// A file that cannot be read, is no JSON of either form, or contradicts itself.
+/// The file cannot be read, is not JSON of either form, or contradicts itself.
 pub fn read_config(path: &Path) -> Result<RcnnConfig> {
     let named = || path.display().to_string();
     let bytes = sdg_files::read(path, MAX_CONFIG_BYTES)?;
@@ -30,10 +30,10 @@ pub fn read_config(path: &Path) -> Result<RcnnConfig> {
     RcnnConfig::from_json(text).with_context(named)
 }
 
-/// The detector of that name, with the checkpoint's number of classes and keypoints.
+/// The detector with this name, with the checkpoint's number of classes and keypoints.
 ///
 /// # Errors
-/// An unknown name; a checkpoint without class scores, or with a head that the preset cannot have.
+/// The name is unknown, or the checkpoint has no class scores or a head that the preset cannot have.
 pub fn preset(name: &str, checkpoint: &Checkpoint) -> Result<RcnnConfig> {
     let naming = naming_of(checkpoint)?;
     let SecondStage { num_classes, num_keypoints, has_masks } = SecondStage::of(checkpoint, naming)?;
@@ -57,7 +57,7 @@ pub fn kind_of(config: &RcnnConfig) -> RcnnKind {
     }
 }
 
-/// The detector of that name with another second stage.
+/// The detector with this name and another second stage.
 ///
 /// # Errors
 /// An unknown name.
@@ -69,10 +69,10 @@ pub fn preset_of_kind(name: &str, kind: RcnnKind) -> Result<RcnnConfig, ConfigEr
     }
 }
 
-/// The preset whose numerics a checkpoint was made for.
+/// The preset with the numerics of a checkpoint's program.
 ///
 /// # Errors
-/// Names of programs that have no preset here.
+/// There is no preset for this program.
 pub fn preset_for(naming: Naming) -> Result<&'static str, ConfigError> {
     match naming {
         Naming::Detectron2 | Naming::Detectron2Backbone | Naming::Caffe2Resnet => Ok("r50-detectron2"),
@@ -81,7 +81,7 @@ pub fn preset_for(naming: Naming) -> Result<&'static str, ConfigError> {
     }
 }
 
-/// Names and shapes of a detector's parameters, as far as the configuration decides them.
+/// Names and shapes of a detector's parameters, as determined by the configuration.
 pub fn architecture_of(config: &RcnnConfig) -> Architecture {
     let norm = |kind| match kind {
         NormKind::Identity => Norm::None,
@@ -135,7 +135,7 @@ mod tests {
     use sdg_grasp::Device;
     use sdg_layers::state_dict;
 
-    /// Names and shapes are listed without building the network; a built one says whether the list is right.
+    /// Names and shapes are listed without building the network; a built network verifies the list.
     #[test]
     fn the_listed_parameters_are_those_of_a_built_detector() {
         let mut narrow = presets::r50_detectron2(RcnnKind::Faster { num_classes: 3 });

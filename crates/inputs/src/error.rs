@@ -1,8 +1,8 @@
-//! Errors that a caller can help with: its own words follow, such as the option to give.
+//! Errors that the caller can complete, for example with the name of an option.
 
 use thiserror::Error;
 
-/// Why it is not known which detector a checkpoint is for.
+/// Why the detector of a checkpoint is unknown.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages say what the fields are")]

@@ -1,6 +1,6 @@
-//! An error of several causes as one line.
+//! An error and its causes as one line.
 
-/// The error and its causes on one line, each cause once: messages often quote the cause that they carry.
+/// The error and its causes on one line, each cause once: messages often already contain their cause.
 pub fn one_line(error: &anyhow::Error) -> String {
     let mut line = String::new();
     for cause in error.chain() {

@@ -1,4 +1,4 @@
-//! A user's files as values: photos with their marks, cameras, workcells, models, weights to start from.
+//! Reads a user's files: photos with their marks, cameras, workcells, models, initial weights.
 //!
 //! ```text
 //! photo, marks (COCO, LabelMe, YOLO-pose, OpenDR) ─ AnnotationFile ─ MarkedPhoto: are they this photo's? ─ Demonstration
@@ -6,7 +6,7 @@
 //! model.sdg ─ GraspModel          checkpoint of any format ─ BaseWeights
 //! ```
 //!
-//! Every error names the file. What is deliberately absent: arguments of commands, and what is written.
+//! Every error names the file. Deliberately absent: command arguments, and outputs.
 //!
 //! ```no_run
 //! use std::path::Path;

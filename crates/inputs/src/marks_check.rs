@@ -1,4 +1,4 @@
-//! Whether marks are those of the photo that they are read for: as it is shown, in its pixels, of no other picture.
+//! Checks that marks belong to their photo: to its upright pixels, and to no other picture.
 
 use std::path::{Path, PathBuf};
 
@@ -8,29 +8,29 @@ use sdg_demonstration::{Annotation, AnnotationFormat, ImageFacts, marks_fit, oth
 
 use crate::pictures;
 
-/// Marks that fit one of two pictures so much better were made on it. Chosen by hand.
+/// Minimum ratio of fits that shows that marks were made on one of two pictures. Chosen by hand.
 const MIN_GAIN: f64 = 1.25;
-/// Two files of one picture agree by more where the marks are, as the correlation of their grey values: one of them may be a strongly
-/// compressed JPEG, a copy without colours or a darker one. Chosen by hand.
+/// Minimum correlation of grey values around the marks for two files of the same picture: one of them may be a strongly
+/// compressed JPEG, a greyscale copy or a darker one. Chosen by hand.
 const MIN_CORRELATION: f64 = 0.9;
 
-/// A photo, upright, and the files that it and its marks stand in.
+/// An upright photo, and the files of photo and marks.
 pub struct MarkedPhoto<'a> {
     pub photo: &'a Path,
     pub image: &'a RgbImage,
     /// The marks' file.
     pub marks: &'a Path,
-    /// Its content.
+    /// Its contents.
     pub bytes: &'a [u8],
-    /// The photo's name in it.
+    /// The photo's name in the marks' file.
     pub file_name: Option<&'a str>,
 }
 
 impl MarkedPhoto<'_> {
-    /// The marks that `read` gives for the photo as viewers show it; several, or none where the part is not there.
+    /// The marks that `read` gives for the upright photo; several, or none if the part is not there.
     ///
     /// # Errors
-    /// Those of `read`; marks that fit the pixels as they are stored at least as well.
+    /// Those of `read`; the marks fit the stored pixels at least as well.
     pub fn upright<T>(
         &self,
         read: impl Fn(&ImageFacts) -> Result<Vec<T>>,
@@ -41,7 +41,7 @@ impl MarkedPhoto<'_> {
         Ok(marked)
     }
 
-    /// Says that an orientation was heeded, after all that may fail.
+    /// Reports an applied orientation, after all fallible steps.
     fn tell_if(&self, is_turned: bool) {
         if is_turned {
             eprintln!(
@@ -51,7 +51,7 @@ impl MarkedPhoto<'_> {
         }
     }
 
-    /// The marks, and whether an orientation turns the photo.
+    /// The marks, and whether the photo is rotated by its orientation.
     fn read_upright<T>(
         &self,
         read: impl Fn(&ImageFacts) -> Result<Vec<T>>,
@@ -69,7 +69,7 @@ impl MarkedPhoto<'_> {
             let as_shown = marked.as_ref().map_or(0.0, |marked| fit(self.image, marked));
             let as_stored = fit(&sensor, &of_sensor);
             let has_marks = !of_sensor.is_empty() || marked.as_ref().is_ok_and(|marked| !marked.is_empty());
-            // Marks that fit neither have another fault, which is told behind this.
+            // Marks that fit neither have another error, which is reported later.
             if as_stored > 0.0 && as_shown <= MIN_GAIN * as_stored {
                 let as_well = if as_stored > MIN_GAIN * as_shown { "" } else { " just as well" };
                 bail!(
@@ -85,17 +85,17 @@ impl MarkedPhoto<'_> {
         Ok((marked?, is_turned))
     }
 
-    /// The same of a demonstration, whose part is seen well.
+    /// The same for a demonstration, in which the part must be clearly visible.
     ///
     /// # Errors
-    /// Those of [`Self::upright`]; marks that fit in another reading, or that name another picture which is there.
+    /// Those of [`Self::upright`]; the marks fit in another reading, or name another existing picture.
     pub fn checked(&self, read: impl Fn(&ImageFacts) -> Result<Vec<Annotation>>) -> Result<Vec<Annotation>> {
         let (marked, is_turned) = self.read_upright(read, |annotation| annotation)?;
         let annotations: Vec<&Annotation> = marked.iter().collect();
         if let Some(other) = self.other_picture(&annotations) {
             bail!("{}: {other}", self.marks.display());
         }
-        // Marks without a grasp are not taught from, and the missing points are named.
+        // Marks without a grasp are not taught, and the missing points are reported.
         let grasps: Vec<&Annotation> = annotations.into_iter().filter(|one| one.grasp.is_some()).collect();
         if let Some(reading) = other_reading(self.image, &grasps) {
             bail!(
@@ -109,7 +109,7 @@ impl MarkedPhoto<'_> {
         Ok(marked)
     }
 
-    /// The error where the file names another picture that exists and that its marks fit as well.
+    /// The error if the file names another existing picture that the marks fit as well.
     fn other_picture(&self, marked: &[&Annotation]) -> Option<String> {
         let (field, name) = AnnotationFormat::named_picture(self.bytes)?;
         let base_name = name.rsplit(['/', '\\']).next().filter(|name| !name.is_empty())?;
@@ -149,7 +149,7 @@ impl MarkedPhoto<'_> {
             let means = [mean, other_mean];
             pairs.iter().map(|pair| (pair[a] - means[a]) * (pair[b] - means[b])).sum::<f64>()
         };
-        // Of one colour both are the same for these marks.
+        // In a uniform area, both are equal for these marks.
         product(0, 1) >= MIN_CORRELATION * (product(0, 0) * product(1, 1)).sqrt()
     }
 }

@@ -7,7 +7,7 @@ use anyhow::{Context, Result};
 use sdg_files::{read, read_bounded};
 use sdg_grasp::{Device, GraspModel, summarize};
 
-/// Larger grasp models than any preset gives.
+/// Maximum size of a grasp model's file.
 const MAX_MODEL_BYTES: u64 = 2 << 30;
 
 /// Reads a grasp model onto a device.
@@ -16,10 +16,10 @@ pub fn read_model(path: &Path, device: &Device) -> Result<GraspModel> {
     GraspModel::from_bytes(&bytes, device).with_context(|| path.display().to_string())
 }
 
-/// Makes sure that a model file to be written replaces a model file or nothing.
+/// Checks that a model's file replaces only an existing model.
 ///
 /// # Errors
-/// Another file of that name.
+/// Another file has that name.
 pub fn check_replaces_a_model(path: &Path) -> Result<()> {
     let bytes = match File::open(path) {
         Ok(file) => read_bounded(file, path, MAX_MODEL_BYTES)?,

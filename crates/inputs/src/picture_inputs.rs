@@ -1,4 +1,4 @@
-//! Pictures as arguments name them: files, those of folders, one from standard input.
+//! Pictures given as arguments: files, folders, standard input.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -11,7 +11,7 @@ use crate::pictures::{UNREADABLE_EXTENSIONS, read_image_in, read_standard_input_
 
 /// The name of standard input among files.
 pub const STANDARD_INPUT: &str = "-";
-/// How many names of skipped files are printed.
+/// Maximum number of skipped files named in a message.
 const MAX_NAMED: usize = 20;
 
 /// A picture before it is read.
@@ -22,7 +22,7 @@ pub enum PictureInput {
 }
 
 impl PictureInput {
-    /// As results call it: the path as given, `-` for standard input.
+    /// Name in results: the path as given, `-` for standard input.
     pub fn name(&self) -> String {
         match self {
             Self::File(path) => path.display().to_string(),
@@ -30,7 +30,7 @@ impl PictureInput {
         }
     }
 
-    /// Reads and decodes it.
+    /// Reads and decodes the picture.
     pub fn read(&self, frame: PixelFrame) -> Result<RgbImage> {
         match self {
             Self::File(path) => read_image_in(path, frame),
@@ -38,7 +38,7 @@ impl PictureInput {
         }
     }
 
-    /// A name for its drawn picture that none before it has: pictures of several folders may be called alike.
+    /// An unused name for its drawing: pictures of several folders may have equal names.
     pub fn drawn_name(&self, taken: &mut BTreeSet<String>) -> String {
         let stem = match self {
             Self::File(path) => path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
@@ -51,19 +51,19 @@ impl PictureInput {
     }
 }
 
-/// An argument's pictures, and what else stands in the folder that it names.
+/// The pictures of an argument, and other files in the folder that it names.
 #[derive(Debug)]
 pub struct PictureInputs {
     pub pictures: Vec<PictureInput>,
-    /// Names of what is no picture, in words; `None` where there is nothing.
+    /// The skipped files in words; `None` if there are none.
     pub skipped: Option<String>,
 }
 
-/// The pictures of an argument: of a folder all that end like pictures, those that are not read (HEIC) with the others, so that
-/// their error is printed; folders in it are left out.
+/// The pictures of an argument. Of a folder: all files with a picture's extension, also unsupported ones (HEIC), so
+/// that their error is printed; subfolders are left out.
 ///
 /// # Errors
-/// A folder that cannot be listed or has no pictures.
+/// The folder cannot be listed or has no pictures.
 pub fn pictures_of_argument(argument: &Path) -> Result<PictureInputs> {
     if argument.as_os_str() == STANDARD_INPUT {
         return Ok(PictureInputs { pictures: vec![PictureInput::StandardInput], skipped: None });
@@ -91,7 +91,7 @@ pub fn pictures_of_argument(argument: &Path) -> Result<PictureInputs> {
         if others.len() > MAX_NAMED {
             names.push(format!("{} more", others.len() - MAX_NAMED));
         }
-        format!("{}: skipped what is no picture: {}", argument.display(), names.join(", "))
+        format!("{}: skipped files that are not pictures: {}", argument.display(), names.join(", "))
     });
     Ok(PictureInputs { pictures: pictures.into_iter().map(PictureInput::File).collect(), skipped })
 }
@@ -112,7 +112,7 @@ mod tests {
         let names: Vec<String> = inputs.pictures.iter().map(|input| input.drawn_name(&mut BTreeSet::new())).collect();
         assert_eq!(names, ["a.png", "b.png", "c.png", "phone.png"]);
         let skipped = inputs.skipped.unwrap();
-        assert!(skipped.ends_with("skipped what is no picture: a.json, more"), "{skipped}");
+        assert!(skipped.ends_with("skipped files that are not pictures: a.json, more"), "{skipped}");
         let empty = pictures_of_argument(&folder.path().join("more")).unwrap_err().to_string();
         assert!(empty.contains("expected pictures") && empty.contains("found 0 other"), "{empty}");
     }

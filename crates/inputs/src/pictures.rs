@@ -1,4 +1,4 @@
-//! Pictures on disk and from standard input.
+//! Pictures from disk and from standard input.
 
 use std::path::Path;
 
@@ -7,46 +7,46 @@ use image::RgbImage;
 use sdg_demonstration::{ImageLimits, PixelFrame, decode_image_in, is_turned_by_exif};
 use sdg_files::{read, read_bounded};
 
-/// Larger photos than any camera makes.
+/// Maximum size of a picture's file.
 const MAX_IMAGE_BYTES: u64 = 256 << 20;
 
-/// Reads a picture of any format that [`decode_image_in`] knows, upright.
+/// Reads an upright picture of any format of [`decode_image_in`].
 pub fn read_image(path: &Path) -> Result<RgbImage> {
     read_image_in(path, PixelFrame::Upright)
 }
 
-/// The same with its pixels that way up: for a calibration, the sensor's.
+/// The same with the pixels' orientation given: for a calibration, the sensor's.
 pub fn read_image_in(path: &Path, frame: PixelFrame) -> Result<RgbImage> {
     let bytes = read(path, MAX_IMAGE_BYTES)?;
     decode_image_in(&bytes, &ImageLimits::default(), frame).with_context(|| path.display().to_string())
 }
 
-/// The pixels of a photo as they are stored, where an Exif orientation turns it.
+/// The stored pixels of a photo, if an Exif orientation rotates it.
 pub fn read_sensor_pixels_if_turned(photo: &Path) -> Result<Option<RgbImage>> {
     let is_turned = is_turned_by_exif(&read(photo, MAX_IMAGE_BYTES)?);
     is_turned.then(|| read_image_in(photo, PixelFrame::Sensor)).transpose()
 }
 
-/// Makes sure that no Exif orientation turns a photo whose marks are to be in the pixels of a calibrated camera: nothing says in which
-/// of the two frames they were made.
+/// Checks that no Exif orientation rotates a photo whose marks must be in the pixels of a calibrated camera: it is
+/// unknown in which of the two frames they were made.
 ///
 /// # Errors
-/// A photo that is turned.
+/// The photo is rotated.
 pub fn check_is_not_turned(photo: &Path) -> Result<()> {
     if is_turned_by_exif(&read(photo, MAX_IMAGE_BYTES)?) {
         bail!(
             "{}: expected a photo of the calibrated camera that no Exif orientation turns, found one: a calibration knows the \
-             sensor's pixels; take the tag out (exiftool -Orientation= FILE), look whether the marks still fit, and mark it anew if not",
+             sensor's pixels; remove the tag (exiftool -Orientation= FILE), check whether the marks still fit, and mark it again if not",
             photo.display()
         );
     }
     Ok(())
 }
 
-/// Pictures that are not read, and whose error says what to do instead.
+/// Formats that cannot be read, with an error that says what to do.
 pub const UNREADABLE_EXTENSIONS: [&str; 4] = ["heic", "heif", "avif", "gif"];
 
-/// Reads a picture from standard input, to its end.
+/// Reads a picture from standard input until its end.
 pub fn read_standard_input_image(frame: PixelFrame) -> Result<RgbImage> {
     let name = Path::new("standard input");
     let bytes = read_bounded(std::io::stdin().lock(), name, MAX_IMAGE_BYTES)?;

@@ -1,4 +1,4 @@
-//! The files that a model is taught from.
+//! The input files of a teaching.
 
 use std::path::{Path, PathBuf};
 
@@ -10,24 +10,24 @@ use crate::camera_files::CameraFile;
 use crate::demonstrations::read_pair;
 use crate::pictures::{check_is_not_turned, read_image_in};
 
-/// Photos with their marks, and what else there is.
+/// Photos with their marks, and optional further inputs.
 #[derive(Debug, Clone, Copy)]
 pub struct TeachingFiles<'a> {
     /// Photo and marks of each demonstration.
     pub demonstrations: &'a [(PathBuf, PathBuf)],
     /// Pictures without the part.
     pub negatives: &'a [PathBuf],
-    /// The calibrated camera that took them all, and the heights over the table of the marks and of the grasp, in metres.
+    /// The calibrated camera that took all of them, and the heights over the table of marks and grasp, in metres.
     pub camera: Option<(&'a Path, [f64; 2])>,
 }
 
 impl TeachingFiles<'_> {
-    /// The demonstrations, in the plan view of the marks' plane where there is a camera; pictures without the part and the lengths
-    /// go into the options. A region there becomes one of pictures as large as the first photo.
+    /// The demonstrations, with a camera in the plan view of the marks' plane. Pictures without the part and the
+    /// lengths are put into the options. A region in the options is set to apply to pictures of the first photo's size.
     ///
     /// # Errors
-    /// Files that cannot be read; with a camera, photos that an Exif orientation turns, that are of another size, or whose marks
-    /// the camera does not see; a region that does not lie in the first photo.
+    /// Files cannot be read; with a camera, a photo is rotated by an Exif orientation, has another size, or has marks
+    /// that the camera does not see; the region is not inside the first photo.
     pub fn read(&self, options: &mut TeachOptions) -> Result<Vec<Demonstration>> {
         let mut pixel_frame = PixelFrame::Upright;
         if self.camera.is_some() {

@@ -5,16 +5,16 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use sdg_robot::workcell::Workcell;
 
-/// Larger workcell files than any person writes.
+/// Maximum size of a workcell's file.
 const MAX_BYTES: u64 = 1 << 20;
 
-/// Reads a workcell's file; the camera's file is found beside it.
+/// Reads a workcell's file; the path of the camera's file is relative to its folder.
 ///
 /// # Errors
-/// A file that cannot be read, with the line.
+/// The file is invalid (with the line), or cannot be read.
 pub fn read_workcell(path: &Path) -> Result<(Workcell, Option<PathBuf>)> {
     let Ok(text) = String::from_utf8(sdg_files::read(path, MAX_BYTES)?) else {
-        bail!("{}: expected TOML, found bytes that are no text", path.display());
+        bail!("{}: expected TOML, found bytes that are not text", path.display());
     };
     let workcell = Workcell::from_toml(&text).with_context(|| path.display().to_string())?;
     let folder = path.parent().unwrap_or(Path::new(""));

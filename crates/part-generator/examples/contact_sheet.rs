@@ -1,4 +1,4 @@
-//! Draws contact sheets to look at: parts, scenes, look-alikes beside their part.
+//! Draws contact sheets for inspection: parts, scenes, look-alikes beside their part.
 //!
 //! `cargo run --release -p sdg-part-generator --example contact_sheet FOLDER [SEED [ZOOM]]`
 //!
@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use sdg_geometry::GraspLine;
 use sdg_part_generator::{DemonstrationPhoto, LookAlike, Part, PhotoConfig, SceneConfig, Scenes, demonstration};
 
-/// Pictures in a row, and rows on a sheet, at their own size.
+/// Number of full-size pictures in a row, and of rows on a sheet.
 const SHEET: [u32; 2] = [4, 5];
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -76,7 +76,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                     Some((kind, seed)) => part.look_alike(kind, seed),
                 };
                 if let Some(other) = other {
-                    // The same fill for all would hide the size: it is drawn in proportion.
+                    // An equal fill for all would hide the size: each is drawn in proportion.
                     let fill = 0.6 * other.diagonal_mm() / part.diagonal_mm();
                     let config = PhotoConfig { fill: [fill, fill], ..photo };
                     let taken = DemonstrationPhoto::take(&other, &config, seed);

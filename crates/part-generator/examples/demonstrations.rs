@@ -1,4 +1,5 @@
-//! Photos of generated parts with marks beside them, as `sdg teach --demos` reads them; the last two are of one part.
+//! Photos of generated parts with marks beside them, in the format for `sdg teach --demos`; the last two show the same
+//! part.
 //!
 //! ```sh
 //! cargo run --release -p sdg-part-generator --example demonstrations -- target/many-parts 100
@@ -12,7 +13,7 @@ use sdg_demonstration::CocoFile;
 use sdg_geometry::RotationalSymmetry;
 use sdg_part_generator::{Part, PhotoConfig, demonstration};
 
-/// Far from the parts that anything is fitted, taught or pretrained with.
+/// Far from the seeds of all parts used for fitting, teaching or pretraining.
 const FIRST_SEED: u64 = 1 << 53;
 const PHOTO: PhotoConfig = PhotoConfig { width: 320, height: 240, fill: [0.4, 0.6] };
 
@@ -26,7 +27,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut symmetries = String::new();
     for number in 0..count {
         let part = Part::generate(FIRST_SEED + number.min(count - 2));
-        // Another photo even of the same part.
+        // A different photo even for the same part.
         let made = demonstration(&part, &PHOTO, number);
         let name = format!("part-{number:03}");
         made.image.save(folder.join(format!("{name}.png")))?;

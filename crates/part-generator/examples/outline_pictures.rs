@@ -1,4 +1,4 @@
-//! Photos of generated parts with their true outlines, as crates/demonstration/tests/outlines has them.
+//! Photos of generated parts with their true outlines, in the format of crates/demonstration/tests/outlines.
 //!
 //! ```sh
 //! cargo run --release -p sdg-part-generator --example outline_pictures -- crates/demonstration/tests/outlines 15
@@ -11,7 +11,7 @@ use image::codecs::jpeg::JpegEncoder;
 use sdg_demonstration::CocoFile;
 use sdg_part_generator::{Part, PhotoConfig, demonstration};
 
-/// Far from the parts that anything is fitted, taught or pretrained with.
+/// Far from the seeds of all parts used for fitting, teaching or pretraining.
 const FIRST_SEED: u64 = 1 << 52;
 const PHOTO: PhotoConfig = PhotoConfig { width: 320, height: 240, fill: [0.4, 0.6] };
 const JPEG_QUALITY: u8 = 90;
@@ -23,7 +23,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let count: u64 = count.parse().map_err(|_| usage)?;
     for number in 0..count {
         let mut made = demonstration(&Part::generate(FIRST_SEED + number), &PHOTO, number);
-        // Outlines alone are compared; a grasp line may reach out of the picture.
+        // Only outlines are compared; a grasp line may extend beyond the picture.
         (made.annotation.grasp, made.annotation.jaw_width) = (None, None);
         let name = format!("generated-{number:02}.jpg");
         let mut bytes = Vec::new();

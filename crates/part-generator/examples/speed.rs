@@ -1,9 +1,9 @@
-//! Measures how fast samples are drawn: pictures a second, and processor time a picture.
+//! Measures the speed of drawing samples: pictures per second, and processor time per picture.
 //!
 //! `cargo run --release -p sdg-part-generator --example speed [SAMPLES [THREADS [NAME]]]`
 //!
-//! Prints a line for the default scenes and one for each condition alone, at 320x240, ten parts; with a name
-//! (`default`, `tilt`, …) that line only. Processor time is that of the process, so it says something on a busy machine
+//! Prints a line for the default scenes and one for each single condition, at 320x240, with ten parts; with a name
+//! (`default`, `tilt`, …) only that line. Processor time is that of the process, so it is meaningful on a busy machine
 //! too.
 
 use std::time::Instant;
@@ -47,7 +47,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
 /// Processor time of this process so far, in seconds.
 fn cpu_seconds() -> f64 {
-    // The fields of /proc/self/stat behind the program's name, which may hold blanks: 14 and 15 are user and system
+    // The fields of /proc/self/stat after the program's name, which may contain blanks: 14 and 15 are user and system
     // time in ticks of 10 ms.
     let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
     let fields: Vec<&str> = stat.rsplit(')').next().unwrap_or_default().split_whitespace().collect();

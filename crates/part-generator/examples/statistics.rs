@@ -2,11 +2,12 @@
 //!
 //! `cargo run --release -p sdg-part-generator --example statistics [FOLDER…]`
 //!
-//! A row is the generator's default scenes of 60 parts, or all pictures of a folder (PNG, JPEG; LabelMe marks in a `.json` beside a
-//! picture are read for the part's size and contrast). Pictures are first reduced to 320 pixels of width. Columns are
-//! means over pictures: brightness, its deviation within a picture, saturation, the 50th, 90th and 99th percentile of the
-//! gradient's magnitude (grey levels a pixel), the share of pixels above 40, noise (Immerkær's estimate), the part's
-//! diagonal over the picture's, and the distance in colour between the part's box and the frame around it.
+//! A row describes the generator's default scenes of 60 parts, or all pictures of a folder (PNG, JPEG; LabelMe marks in
+//! a `.json` beside a picture are read for the part's size and contrast). Pictures are first reduced to a width of 320
+//! pixels. Columns are means over pictures: brightness, its standard deviation within a picture, saturation, the 50th,
+//! 90th and 99th percentile of the gradient's magnitude (grey levels per pixel), the share of pixels above 40, noise
+//! (Immerkær's estimate), the part's diagonal divided by the picture's, and the colour distance between the part's box
+//! and the frame around it.
 
 use std::path::Path;
 
@@ -17,13 +18,13 @@ use sdg_demonstration::{Annotation, ImageFacts};
 use sdg_geometry::BoundingBox;
 use sdg_part_generator::{Part, SceneConfig, Scenes};
 
-/// Width that pictures are reduced to.
+/// Width to which pictures are reduced.
 const WIDTH: u32 = 320;
 
-/// Gradients above this are strong edges, in grey levels a pixel.
+/// Minimum gradient of strong edges, in grey levels per pixel.
 const STRONG_EDGE: f32 = 40.0;
 
-/// What is measured on a picture: the columns but for the last two, then what needs boxes.
+/// Measurements of a picture: all columns except the last two, followed by those that need boxes.
 struct Measured {
     values: [f64; 8],
     parts: Vec<[f64; 2]>,
@@ -59,7 +60,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// A picture of a folder, reduced, with the boxes that are marked.
+/// A picture of a folder, reduced, with its marked boxes.
 fn read(path: &Path) -> Option<Measured> {
     let image = image::open(path).ok()?.into_rgb8();
     let facts = ImageFacts { width: image.width(), height: image.height(), file_name: path.file_name()?.to_str() };
@@ -112,7 +113,7 @@ fn measure(image: &RgbImage, boxes: &[BoundingBox]) -> Measured {
     Measured { values, parts }
 }
 
-/// Distance between the mean colours of a box and of a frame around it of a fifth of its size.
+/// Distance between the mean colours of a box and of a surrounding frame with a fifth of its size.
 fn contrast(image: &RgbImage, bbox: &BoundingBox) -> f64 {
     let mut sums = [[0.0f64; 4]; 2];
     let (mx, my) = (0.2 * bbox.width(), 0.2 * bbox.height());

@@ -1,18 +1,18 @@
-//! Writes generated pictures with LabelMe marks, as `sdg evaluate --pictures` reads them.
+//! Writes generated pictures with LabelMe marks, in the format for `sdg evaluate --pictures`.
 //!
 //! `cargo run --release -p sdg-part-generator --example write_samples FOLDER [PART_SEED [COUNT [CONDITION [SEED]]]]`
 //!
-//! CONDITION is `default` or the name of one condition (`tilt`, `cover`, `dark` …). FOLDER then holds `demo.png` and
-//! `demo.json`, pictures `NNN.png` with `NNN.json` beside them: a rectangle, the points `grasp_start` and `grasp_end` and one `group_id`
-//! an instance. Instances of which less than [`MIN_VISIBLE_SHARE`] is visible carry the flag `optional`; pictures without the
-//! part have an empty list of shapes.
+//! CONDITION is `default` or the name of one condition (`tilt`, `cover`, `dark` …). FOLDER then contains `demo.png` and
+//! `demo.json`, and pictures `NNN.png` with `NNN.json` beside them: for each instance a rectangle and the points
+//! `grasp_start` and `grasp_end` with a common `group_id`. Instances with a visible share below [`MIN_VISIBLE_SHARE`]
+//! have the flag `optional`; pictures without the part have an empty list of shapes.
 
 use std::path::{Path, PathBuf};
 
 use sdg_demonstration::{Annotation, AnnotationFormat, ImageFacts};
 use sdg_part_generator::{Condition, Part, Sample, SceneConfig, Scenes};
 
-/// Instances less visible than this need not be found.
+/// Visible share below which an instance is optional.
 const MIN_VISIBLE_SHARE: f64 = 0.5;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -45,7 +45,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// The marks of every instance that reaches into the picture, and whether it is optional.
+/// The marks of every instance in the picture, and whether it is optional.
 fn labels(sample: &Sample) -> Vec<(Annotation, bool)> {
     let (width, height) = (f64::from(sample.image.width()), f64::from(sample.image.height()));
     let inside = |p: nalgebra::Point2<f64>| (0.0..=width).contains(&p.x) && (0.0..=height).contains(&p.y);
@@ -54,7 +54,7 @@ fn labels(sample: &Sample) -> Vec<(Annotation, bool)> {
         .iter()
         .filter_map(|instance| {
             let bbox = instance.bbox.clip(width, height);
-            // A mark outside the picture cannot be written; such an instance is cut off and left out.
+            // A mark outside the picture cannot be written; such an instance is left out.
             (inside(instance.grasp.start) && inside(instance.grasp.end) && bbox.width() > 1.0 && bbox.height() > 1.0)
                 .then(|| {
                     let marks = Annotation {

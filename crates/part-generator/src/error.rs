@@ -1,11 +1,11 @@
-//! What can go wrong when scenes are set up.
+//! Errors of setting up scenes.
 
 /// Why scenes could not be set up.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum GeneratorError {
-    /// No part to draw.
+    /// No part was given.
     #[error("expected at least one part, found none")]
     NoPart,
     /// A picture too small or too large.
@@ -21,5 +21,5 @@ pub enum GeneratorError {
     },
 }
 
-/// What the crate's functions return.
+/// Result of this crate's functions.
 pub type Result<T> = std::result::Result<T, GeneratorError>;

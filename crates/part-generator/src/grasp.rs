@@ -1,16 +1,16 @@
-//! Where a parallel gripper holds a part: two marks along it, jaws that close across.
+//! The grasp of a part by a parallel gripper: two marks along the part, with jaws that close across their line.
 
 use sdg_geometry::RotationalSymmetry;
 
 use crate::relief::Relief;
 
-/// The widest opening of the jaws that a grasp may need, in millimetres.
+/// Maximum opening of the jaws for a grasp, in millimetres.
 pub(crate) const MAX_JAW_WIDTH_MM: f32 = 76.0;
 
-/// Directions of the line that are tried, within half a turn.
+/// Number of line directions tried over half a turn.
 const NUM_DIRECTIONS: usize = 24;
 
-/// Half of the pads' width along the line, in millimetres, where the part is long enough.
+/// Half of the pads' width along the line, in millimetres, if the part is long enough.
 const HALF_PAD_MM: f32 = 8.0;
 
 /// A grasp in the part's frame, in millimetres.
@@ -26,7 +26,7 @@ pub struct PartGrasp {
     pub height_mm: f32,
 }
 
-/// The best grasp; none where the part is too wide everywhere, or at its centre if it looks the same after some turn.
+/// The best grasp; `None` if the part is too wide everywhere or, for a part with rotational symmetry, at its centre.
 pub(crate) fn find(relief: &Relief, center: [f32; 2], symmetry: RotationalSymmetry) -> Option<PartGrasp> {
     let level = &relief.levels[2];
     let mut points = Vec::new();
@@ -51,7 +51,7 @@ pub(crate) fn find(relief: &Relief, center: [f32; 2], symmetry: RotationalSymmet
     best.map(|(_, grasp)| grasp)
 }
 
-/// The diagonal of the box around points.
+/// The diagonal of the bounding box of points.
 fn diagonal(points: impl Iterator<Item = [f32; 2]>) -> Option<f32> {
     let b = points.fold([f32::MAX, f32::MAX, f32::MIN, f32::MIN], |b, p| {
         [b[0].min(p[0]), b[1].min(p[1]), b[2].max(p[0]), b[3].max(p[1])]
@@ -59,7 +59,7 @@ fn diagonal(points: impl Iterator<Item = [f32; 2]>) -> Option<f32> {
     (b[2] > b[0]).then(|| (b[2] - b[0]).hypot(b[3] - b[1]))
 }
 
-/// All grasps whose line has a direction, with their costs.
+/// All grasps with a line in this direction, with their costs.
 fn along(
     points: &[([f32; 2], f32)],
     cell: f32,
@@ -70,7 +70,7 @@ fn along(
 ) -> Vec<(f32, PartGrasp)> {
     let (sin, cos) = angle.sin_cos();
     let bin = cell * 1.5;
-    // Along and across the line, from the centre; extents across for each bin along.
+    // Coordinates along and across the line, from the centre; the extent across for each bin along.
     let turned: Vec<(f32, f32, f32)> = points
         .iter()
         .map(|&([x, y], top)| {
@@ -97,20 +97,20 @@ fn along(
         if !(1.0..=MAX_JAW_WIDTH_MM).contains(&width) {
             continue;
         }
-        // Flanks that are not parallel to the line are held badly.
+        // Flanks that are not parallel to the line give a bad grip.
         let uneven = band.iter().map(|e| (e[0] - lower) + (upper - e[1])).filter(|u| u.is_finite()).sum::<f32>()
             / (band.len() as f32 * width);
         let mut a = low + (middle as f32 + 0.5) * bin;
         let mut b = 0.5 * (lower + upper);
         let off_center = a.hypot(b) / diagonal;
         if symmetry != RotationalSymmetry::None {
-            // Only the centre is the same place after a turn.
+            // Only the centre is invariant under a turn.
             if off_center > 0.02 {
                 continue;
             }
             (a, b) = (0.0, 0.0);
         }
-        // Both marks lie beside the part, not beyond its ends.
+        // Both marks are on the part, not beyond its ends.
         let room = (high - a).min(a - low);
         let half = (0.3 * (high - low)).min(0.28 * diagonal).min(room).max((0.06 * diagonal).max(1.5));
         let place = |along: f32| [center[0] + cos * along - sin * b, center[1] + sin * along + cos * b];

@@ -1,4 +1,4 @@
-//! Random rigid parts, their look-alikes, and pictures of scenes with the truth: to measure and to pretrain with.
+//! Random rigid parts, their look-alikes, and pictures of scenes with ground truth, for evaluation and pretraining.
 //!
 //! ```text
 //! seed ─ Part (recipe ─ relief ─ grasp, symmetry, outline) ─┬─ look_alike ─┐
@@ -7,15 +7,15 @@
 //! ```
 //!
 //! A part is a height field with materials, built from a recipe of flat shapes that raise, cut and paint it: flat
-//! stampings, turned, bent, cast and moulded parts. Scenes are drawn by following lines of sight through a pinhole
-//! camera onto those height fields, with soft shadows, mirrored surroundings, and what lens and sensor do. Sample *i* of
-//! a seed is the same to the bit, in whatever order samples are made and on any number of threads.
+//! stampings, turned, bent, cast and moulded parts. Scenes are rendered by following lines of sight through a pinhole
+//! camera to these height fields, with soft shadows, mirrored surroundings, and the effects of lens and sensor. Sample
+//! *i* of a seed is identical to the bit, in any order of samples and with any number of threads.
 //!
-//! **Frames.** A part's: millimetres, x right, y down as seen from above, z up from the table. A picture's: pixels, the
-//! centre of the first pixel at (0.5, 0.5). Angles are radians from x to y, so clockwise as seen.
+//! **Frames.** Part: millimetres, x right, y down as seen from above, z up from the table. Picture: pixels, the centre
+//! of the first pixel at (0.5, 0.5). Angles are in radians from x to y, so clockwise as seen.
 //!
-//! What is deliberately absent: files, clocks, tensors (no burn), a simulator, and every part that the project ships:
-//! nothing here is modelled on one.
+//! Deliberately absent: files, clocks, tensors (no burn), a simulator, and every part that the project ships: nothing
+//! here is modelled on one.
 //!
 //! ```
 //! use sdg_part_generator::{Condition, LookAlike, Part, PhotoConfig, SceneConfig, Scenes, demonstration};

@@ -1,4 +1,4 @@
-//! Parts that resemble a part: its mirror image, one feature elsewhere, another size.
+//! Parts that resemble a part: its mirror image, a copy with a moved feature, another size.
 
 use std::sync::Arc;
 
@@ -11,16 +11,16 @@ use crate::part_pair::PartPair;
 use crate::random::{Draw, Stream, generator};
 use crate::recipe::{Operation, Recipe, Shape};
 
-/// How far a feature is moved, as shares of the part's diagonal.
+/// Range of a feature's displacement, as shares of the part's diagonal.
 const MOVE_SHARES: [f32; 2] = [0.05, 0.10];
 
-/// Share of the cells that a moved feature must change.
+/// Minimum share of the cells that a moved feature must change.
 const MIN_CHANGED_SHARE: f32 = 0.006;
 
-/// Moves that are tried before a part counts as one without a feature to move.
+/// Number of displacements tried before a part counts as having no movable feature.
 const MAX_MOVES: usize = 24;
 
-/// How a look-alike differs from its part.
+/// Difference between a look-alike and its part.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum LookAlike {
@@ -28,15 +28,15 @@ pub enum LookAlike {
     Mirrored,
     /// One feature moved by 5 to 10 % of the part's diagonal.
     FeatureMoved,
-    /// Another size: the factor, 0.8 to 1.25 by custom.
+    /// Another size: the factor, usually 0.8 to 1.25.
     Scaled(f64),
 }
 
 impl Part {
-    /// A part that resembles this one and is another.
+    /// A part that resembles this one but is different.
     ///
-    /// None where there is no such part: the mirror image looks like the part under some turn, no feature can be
-    /// moved visibly, the factor is not positive and finite or is 1, or the look-alike could not be grasped.
+    /// `None` if there is no such part: the mirror image equals the part in some turn, no feature can be moved visibly,
+    /// the factor is 1 or not positive and finite, or the look-alike cannot be grasped.
     pub fn look_alike(&self, kind: LookAlike, seed: u64) -> Option<Part> {
         match kind {
             LookAlike::Mirrored => self.mirrored(),
@@ -58,7 +58,7 @@ impl Part {
             let shift = diagonal * rng.uniform(MOVE_SHARES[0], MOVE_SHARES[1]);
             let recipe = moved(&self.recipe, shift, rng.angle(), rng.random_group(&self.recipe))?;
             let made = Part::from_recipe(self.kind, recipe)?;
-            // Held in place, a visible share must differ; under any other turn it must not look the same.
+            // In place, a visible share must differ; in no other turn may it look the same.
             let in_place = PartPair::new(&self.relief, self.center, &made.relief, self.center);
             let turned = PartPair::new(&self.relief, self.center, &made.relief, made.center);
             let differs = in_place.difference(0.0, MIN_CHANGED_SHARE) > MIN_CHANGED_SHARE;
@@ -85,7 +85,7 @@ impl Part {
     }
 }
 
-/// Draws a group that may move.
+/// Draws a group of features that may be moved.
 trait DrawGroup {
     fn random_group(&mut self, recipe: &Recipe) -> u16;
 }
@@ -93,12 +93,12 @@ trait DrawGroup {
 impl<R: Draw> DrawGroup for R {
     fn random_group(&mut self, recipe: &Recipe) -> u16 {
         let last = recipe.features.iter().map(|feature| feature.group).max().unwrap_or(0);
-        // 0 stands for the body, of which one corner or bend is moved.
+        // 0 is the body, of which one corner or bend is moved.
         self.whole(usize::from(last > 0), last as usize) as u16
     }
 }
 
-/// The recipe with one group moved by `shift` in a direction; of the body, one corner, bend or shoulder.
+/// The recipe with one group moved by `shift` in a direction; of the body, a corner, bend or shoulder is moved.
 fn moved(recipe: &Recipe, shift: f32, direction: f32, group: u16) -> Option<Recipe> {
     let mut made = recipe.clone();
     let (sin, cos) = direction.sin_cos();
@@ -107,7 +107,7 @@ fn moved(recipe: &Recipe, shift: f32, direction: f32, group: u16) -> Option<Reci
         for feature in made.features.iter_mut().filter(|feature| feature.group == group) {
             any = true;
             if let Operation::Turned { profile, ripples, .. } = &mut feature.operation {
-                // Along the axis only.
+                // Only along the axis.
                 let along = shift * cos.signum();
                 profile.iter_mut().for_each(|point| point[0] += along);
                 ripples.iter_mut().for_each(|ripple| {
@@ -121,7 +121,7 @@ fn moved(recipe: &Recipe, shift: f32, direction: f32, group: u16) -> Option<Reci
         }
         return any.then_some(made);
     }
-    // The direction also chooses which point moves.
+    // The direction also determines the moved point.
     let choose = |count: usize| (direction * 1000.0) as usize % count;
     let body = made.features.iter_mut().find(|feature| feature.group == 0)?;
     match (&mut body.shape, &mut body.operation) {
@@ -136,7 +136,7 @@ fn moved(recipe: &Recipe, shift: f32, direction: f32, group: u16) -> Option<Reci
             vertices[k] = [vertices[k][0] + shift * cos, vertices[k][1] + shift * sin];
         }
         (Shape::Path { points, .. }, _) => {
-            // Everything behind a bend moves.
+            // Everything after a bend moves.
             let k = 1 + choose(points.len() - 1);
             for point in &mut points[k..] {
                 point[0] += shift * cos;
@@ -153,7 +153,7 @@ fn moved(recipe: &Recipe, shift: f32, direction: f32, group: u16) -> Option<Reci
 mod tests {
     use super::*;
 
-    /// Turns that are compared, in a whole turn: twice as many as look-alikes are chosen with.
+    /// Number of compared turns in a full rotation: twice as many as in choosing look-alikes.
     const NUM_TURNS: usize = 720;
 
     fn is_same_at_some_turn(one: &Part, other: &Part) -> bool {
@@ -168,7 +168,7 @@ mod tests {
             let part = Part::generate(seed);
             if let Some(mirrored) = part.look_alike(LookAlike::Mirrored, 0) {
                 assert!(!is_same_at_some_turn(&part, &mirrored), "mirror image of part {seed}");
-                // A mirror image of the mirror image is the part: the comparison can find one.
+                // The mirror image of the mirror image is the part, which shows that the comparison can find equality.
                 let twice = Part::from_recipe(part.kind, mirrored.recipe.mirrored()).unwrap();
                 assert!(is_same_at_some_turn(&part, &twice), "part {seed} mirrored twice");
                 compared[0] += 1;

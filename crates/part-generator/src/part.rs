@@ -1,4 +1,4 @@
-//! A random part: its construction, its relief, its grasp and its symmetry.
+//! A random part: its construction, relief, grasp and symmetry.
 
 use std::sync::Arc;
 
@@ -12,13 +12,13 @@ use crate::random::{Draw, Stream, generator};
 use crate::recipe::{self, Recipe};
 use crate::relief::Relief;
 
-/// Recipes that are drawn before a usable part must have come up. About one in four is refused, so no seed ends here.
+/// Number of recipes that are tried. About one in four is rejected, so no seed reaches this limit.
 const MAX_TRIES: u64 = 400;
 
-/// Parts smaller than this, in millimetres of diagonal, are refused.
+/// Minimum diagonal of a part, in millimetres.
 const MIN_DIAGONAL_MM: f32 = 18.0;
 
-/// A rigid part, seen from above, in millimetres: x right, y down, z up from the table it lies on.
+/// A rigid part, seen from above, in millimetres: x right, y down, z up from the table.
 #[derive(Debug, Clone)]
 pub struct Part {
     pub(crate) kind: PartKind,
@@ -40,7 +40,7 @@ impl Part {
     /// The part of a kind and a seed.
     ///
     /// # Panics
-    /// Where none of [`MAX_TRIES`] recipes gives a part that can be grasped, which no seed is known for.
+    /// If none of [`MAX_TRIES`] recipes gives a part that can be grasped; no such seed is known.
     pub fn generate_of_kind(kind: PartKind, seed: u64) -> Self {
         (0..MAX_TRIES)
             .find_map(|attempt| {
@@ -50,18 +50,18 @@ impl Part {
             .expect("one of many recipes gives a part that can be grasped")
     }
 
-    /// Something that lies over parts: paper, a cable, a finger, a rag.
+    /// A covering object: paper, a cable, a finger, a rag.
     pub(crate) fn cover(size_mm: f32, seed: u64) -> Self {
         let recipe = recipe::cover(size_mm, &mut generator(seed, Stream::Others, 0));
         let relief = Arc::new(Relief::draw(&recipe));
         let center = centroid(&relief);
         let outline = outline(&relief).unwrap_or_else(|| Polygon { vertices: Vec::new() });
-        // Nobody grasps a cover: the marks are never read.
+        // The marks of a cover are never read.
         let grasp = PartGrasp { start: center, end: center, jaw_width_mm: 0.0, height_mm: 0.0 };
         Self { kind: PartKind::Stamping, recipe, relief, center, symmetry: RotationalSymmetry::None, grasp, outline }
     }
 
-    /// The part of a recipe; none where it falls apart, is too small, or cannot be grasped.
+    /// The part of a recipe; `None` if it falls apart, is too small, or cannot be grasped.
     pub(crate) fn from_recipe(kind: PartKind, recipe: Recipe) -> Option<Self> {
         let relief = Arc::new(Relief::draw(&recipe));
         if !is_one_piece(&relief) {
@@ -83,7 +83,7 @@ impl Part {
         self.kind
     }
 
-    /// Turns about the vertical after which it looks the same; measured on its heights and colours.
+    /// Turns about the vertical in which it looks the same, computed from its heights and colours.
     pub fn symmetry(&self) -> RotationalSymmetry {
         self.symmetry
     }
@@ -93,7 +93,7 @@ impl Part {
         self.grasp
     }
 
-    /// Its outer outline from straight above, in millimetres of its own frame.
+    /// Its outer outline in the vertical view, in millimetres in its own frame.
     pub fn outline(&self) -> &Polygon {
         &self.outline
     }
@@ -104,7 +104,7 @@ impl Part {
         [bounds.width(), bounds.height(), f64::from(self.relief.top_mm)]
     }
 
-    /// The diagonal of the box around its outline, in millimetres.
+    /// The diagonal of its outline's bounding box, in millimetres.
     pub fn diagonal_mm(&self) -> f64 {
         let bounds = self.outline.bounds();
         bounds.width().hypot(bounds.height())
@@ -129,7 +129,7 @@ fn outline(relief: &Relief) -> Option<Polygon> {
     Polygon::new(vertices).ok()
 }
 
-/// Whether everything hangs together, but for specks.
+/// Whether the part is connected, except for specks.
 fn is_one_piece(relief: &Relief) -> bool {
     let level = &relief.levels[1];
     let mut left: Vec<bool> = level.texels.iter().map(|texel| texel.top > 0).collect();

@@ -1,6 +1,6 @@
-//! The ways in which parts are made.
+//! Manufacturing processes of parts.
 
-/// How a part is made.
+/// The manufacturing process of a part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum PartKind {

@@ -1,24 +1,24 @@
-//! Whether two parts look alike under a turn: the measure behind symmetry and look-alikes.
+//! Whether two parts look the same under a turn: the measure for symmetry and look-alikes.
 
 use sdg_geometry::RotationalSymmetry;
 
 use crate::recipe::Material;
 use crate::relief::{Level, Relief};
 
-/// Share of the cells that may differ between two parts that look the same: what rounding to cells leaves.
+/// Maximum share of differing cells between two parts that look the same, due to rounding to cells.
 const MAX_SAME_SHARE: f32 = 0.0015;
 
-/// The most turns of a whole that are looked for.
+/// Maximum order of rotational symmetry that is detected.
 const MAX_FOLD: u32 = 40;
 
-/// Heights differ visibly beyond this, in millimetres, plus a share of the part's height.
+/// Minimum visible difference of heights, in millimetres, plus a share of the part's height.
 const HEIGHT_TOLERANCE_MM: f32 = 0.3;
 const HEIGHT_TOLERANCE_SHARE: f32 = 0.03;
 
-/// Colours differ visibly beyond this (sum over channels of square roots of linear values).
+/// Minimum visible difference of colours (sum over channels of square roots of linear values).
 const COLOR_TOLERANCE: f32 = 0.12;
 
-/// The middle of the area that a part covers, in its own frame.
+/// The centroid of a part's area, in its own frame.
 pub(crate) fn centroid(relief: &Relief) -> [f32; 2] {
     let level = &relief.levels[1];
     let (mut sum, mut count) = ([0.0f64; 2], 0usize);
@@ -34,7 +34,7 @@ pub(crate) fn centroid(relief: &Relief) -> [f32; 2] {
     sum.map(|s| (s / count.max(1) as f64) as f32)
 }
 
-/// Two parts, each with the place that the turn keeps.
+/// Two parts, each with the fixed point of the turn.
 pub(crate) struct PartPair<'a> {
     a: (&'a Relief, [f32; 2]),
     b: (&'a Relief, [f32; 2]),
@@ -43,7 +43,7 @@ pub(crate) struct PartPair<'a> {
 }
 
 impl<'a> PartPair<'a> {
-    /// Compares `a` with `b`, whose centres lie on each other.
+    /// Compares `a` with `b`, with their centres aligned.
     pub fn new(a: &'a Relief, center_a: [f32; 2], b: &'a Relief, center_b: [f32; 2]) -> Self {
         let same_material = a
             .materials
@@ -54,8 +54,8 @@ impl<'a> PartPair<'a> {
         Self { a: (a, center_a), b: (b, center_b), height_tolerance_mm, same_material }
     }
 
-    /// Share of the cells that have no counterpart within a cell when `a` is turned by `turn` radians; counting stops
-    /// once it is above `enough`.
+    /// Share of the cells without a counterpart within one cell when `a` is turned by `turn` radians; counting stops
+    /// above `enough`.
     pub fn difference(&self, turn: f32, enough: f32) -> f32 {
         let covered = self.a.0.levels[1].texels.iter().filter(|texel| texel.top > 0).count().max(1);
         let limit = (enough * covered as f32).ceil() as usize + 4;
@@ -66,7 +66,7 @@ impl<'a> PartPair<'a> {
         (there + self.unmatched(true, -turn, limit)) as f32 / covered as f32
     }
 
-    /// Whether the two look the same when `a` is turned.
+    /// Whether the two look the same when `a` is turned by `turn`.
     pub fn is_same(&self, turn: f32) -> bool {
         self.difference(turn, MAX_SAME_SHARE) <= MAX_SAME_SHARE
     }
@@ -81,7 +81,7 @@ impl<'a> PartPair<'a> {
         let (level, target) = (&from.levels[1], &to.levels[1]);
         let (sin, cos) = turn.sin_cos();
         let mut count = 0;
-        // Every third row first: a difference shows early.
+        // Every third row first: most differences are found early.
         for first in [1, 0, 2] {
             for y in (first..level.height).step_by(3) {
                 for x in 0..level.width {
@@ -120,7 +120,7 @@ impl<'a> PartPair<'a> {
     }
 }
 
-/// How differently two materials look under even light.
+/// The difference in appearance of two materials under even light.
 fn look_distance(one: &Material, other: &Material) -> f32 {
     (0..3)
         .map(|k| {
@@ -130,10 +130,10 @@ fn look_distance(one: &Material, other: &Material) -> f32 {
         .sum()
 }
 
-/// Which turns about its middle leave a part looking as it was.
+/// The turns about its centre in which a part looks the same.
 pub(crate) fn symmetry(relief: &Relief, center: [f32; 2]) -> RotationalSymmetry {
     let comparison = PartPair::new(relief, center, relief, center);
-    // Turns that no fold up to 40 has in common.
+    // An angle that is not a multiple of any turn up to order 40.
     if [7.0f32, 17.0, 31.0, 53.0, 101.0, 149.0].iter().all(|degrees| comparison.is_same(degrees.to_radians())) {
         return RotationalSymmetry::Full;
     }

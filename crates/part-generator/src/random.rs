@@ -1,11 +1,11 @@
-//! Random numbers by index: every part, photo and sample has a generator of its own.
+//! Random numbers by index: every part, photo and sample has its own generator.
 
 use rand::Rng;
 use rand_pcg::Pcg64Mcg;
 use sdg_demonstration::random::generator_at;
 pub(crate) use sdg_demonstration::random::scramble;
 
-/// What a generator is for; generators of different streams are independent.
+/// Purpose of a generator; generators of different streams are independent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Stream {
     /// The recipe of a part.
@@ -18,7 +18,7 @@ pub(crate) enum Stream {
     Sample = 5,
     /// The pool of other parts.
     Others = 6,
-    /// Tiles of noise that all pictures share.
+    /// Tiles of noise shared by all pictures.
     Tiles = 7,
     /// A sample of several parts.
     MixedSample = 8,
@@ -29,7 +29,7 @@ pub(crate) fn generator(seed: u64, stream: Stream, index: u64) -> Pcg64Mcg {
     generator_at(seed, stream as u64, index)
 }
 
-/// The draws that the generator needs, in single precision.
+/// Draws used by this crate, in single precision.
 pub(crate) trait Draw: Rng {
     /// Uniform in `[low, high)`.
     fn uniform(&mut self, low: f32, high: f32) -> f32 {
@@ -46,7 +46,7 @@ pub(crate) trait Draw: Rng {
         self.random::<f32>() < p
     }
 
-    /// A whole number from `low` to `high`, both included.
+    /// An integer from `low` to `high`, both included.
     fn whole(&mut self, low: usize, high: usize) -> usize {
         self.random_range(low as u32..=high as u32) as usize
     }

@@ -1,41 +1,41 @@
-//! A part as a grid of heights, normals and materials, drawn once from its recipe.
+//! A part as a grid of heights, normals and materials, computed once from its recipe.
 
 use crate::recipe::{Brushing, Material, Recipe, State};
 use crate::tiles::{Tiles, floor};
 
-/// Cells along the longer side of the finest grid.
+/// Number of cells along the longer side of the finest grid.
 const MAX_CELLS: f32 = 288.0;
 
-/// The finest cell, in millimetres.
+/// Size of the finest cell, in millimetres.
 const MIN_CELL_MM: f32 = 0.12;
 
-/// Number of grids: each next one has cells twice as wide.
+/// Number of grids; each has cells twice as wide as the one before.
 const NUM_LEVELS: usize = 4;
 
-/// Side of the blocks of cells whose highest points are known.
+/// Side of the blocks of cells for which the maximum height is stored.
 pub(crate) const BLOCK_CELLS: usize = 8;
 
-/// Heights are stored in so many steps a millimetre.
+/// Number of height steps per millimetre.
 const STEPS_PER_MM: f32 = 200.0;
 
-/// The steepest slope of a normal.
+/// Maximum slope of a normal.
 const MAX_SLOPE: f32 = 3.0;
 
-/// Steps higher than so many cells between neighbours are walls and left out of normals.
+/// Height difference between neighbours, in cells, above which a step is a wall, and is ignored in normals.
 const MIN_WALL_CELLS: f32 = 7.0;
 
-/// What stands above one cell.
+/// The part above one cell.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Texel {
-    /// Upper side in steps; 0 where nothing is.
+    /// Height of the upper side in steps; 0 if there is no material.
     pub top: u16,
-    /// Lower side in steps.
+    /// Height of the lower side in steps.
     pub bottom: u16,
     /// The normal's x and y times 127.
     pub normal: [i8; 2],
     /// Index of the material.
     pub material: u8,
-    /// Shade of the material: 128 leaves it as it is.
+    /// Shade of the material; 128 is neutral.
     pub tone: u8,
 }
 
@@ -44,10 +44,10 @@ pub(crate) struct Texel {
 pub(crate) struct Level {
     pub width: usize,
     pub height: usize,
-    /// Millimetres.
+    /// Cell size in millimetres.
     pub cell: f32,
     pub texels: Vec<Texel>,
-    /// The highest top within a block of cells and the blocks around it, block by block.
+    /// The maximum height within each block of cells and its neighbouring blocks.
     block_tops: Vec<u16>,
     blocks_across: usize,
 }
@@ -73,14 +73,15 @@ impl Level {
         Self { width, height, cell, texels, block_tops, blocks_across: across }
     }
 
-    /// At least the highest top of all cells within [`BLOCK_CELLS`] of a place in cells, which lies on the grid.
+    /// An upper bound of the height of all cells within [`BLOCK_CELLS`] of a position in cells, which must be on the
+    /// grid.
     #[inline(always)]
     pub fn top_around(&self, x: f32, y: f32) -> u16 {
         let (u, v) = (floor(x).max(0) as usize / BLOCK_CELLS, floor(y).max(0) as usize / BLOCK_CELLS);
         self.block_tops.get(v * self.blocks_across + u).copied().unwrap_or(0)
     }
 
-    /// The texel at whole coordinates; nothing outside.
+    /// The texel at integer coordinates; empty outside.
     #[inline(always)]
     pub fn get(&self, x: i32, y: i32) -> Texel {
         if (x as u32) < self.width as u32 && (y as u32) < self.height as u32 {
@@ -94,11 +95,11 @@ impl Level {
 /// Heights, normals and materials of a part, in its own frame.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Relief {
-    /// Place of the grids' first corner, in millimetres.
+    /// Position of the grids' first corner, in millimetres.
     pub min: [f32; 2],
     /// The grids, finest first.
     pub levels: Vec<Level>,
-    /// Millimetres of one step of height.
+    /// Height of one step in millimetres.
     pub step: f32,
     /// The highest point.
     pub top_mm: f32,
@@ -113,7 +114,7 @@ impl Relief {
         let cell = ((x1 - x0).max(y1 - y0) / MAX_CELLS).max(MIN_CELL_MM);
         let margin = 3.0 * cell;
         let min = [x0 - margin, y0 - margin];
-        // Whole cells at the coarsest level.
+        // An integer number of cells at the coarsest level.
         let whole = 1usize << (NUM_LEVELS - 1);
         let cells = |extent: f32| (((extent + 2.0 * margin) / cell).ceil() as usize).next_multiple_of(whole);
         let (width, height) = (cells(x1 - x0), cells(y1 - y0));
@@ -151,7 +152,7 @@ impl Relief {
                     let back = limit(tops[idx] - tops[before], tops[before]);
                     let ahead = limit(tops[after] - tops[idx], tops[after]);
                     match (back, ahead) {
-                        // At the foot or rim of a step, the level side counts.
+                        // At the lower or upper edge of a step, the level side determines the normal.
                         (Some(a), Some(b)) if (a - b).abs() > 1.0 => {
                             if a.abs() < b.abs() {
                                 a
@@ -182,7 +183,7 @@ impl Relief {
         Self { min, levels, step: 1.0 / STEPS_PER_MM, top_mm, materials: recipe.materials.clone() }
     }
 
-    /// The same at another size.
+    /// A copy scaled by `factor`.
     pub fn scaled(&self, factor: f32) -> Self {
         let mut made = self.clone();
         made.min = made.min.map(|v| v * factor);
@@ -192,18 +193,18 @@ impl Relief {
         made
     }
 
-    /// The coarsest grid whose cells are no wider than `cell_mm`, or the finest.
+    /// The coarsest grid whose cells are not wider than `cell_mm`, else the finest.
     pub fn level_for(&self, cell_mm: f32) -> &Level {
         self.levels.iter().rev().find(|level| level.cell <= cell_mm).unwrap_or(&self.levels[0])
     }
 
-    /// The middle of a cell, in millimetres.
+    /// The centre of a cell, in millimetres.
     pub fn place(&self, level: &Level, x: usize, y: usize) -> [f32; 2] {
         [self.min[0] + (x as f32 + 0.5) * level.cell, self.min[1] + (y as f32 + 0.5) * level.cell]
     }
 }
 
-/// Slopes and relative shade that a material's grain adds at a place.
+/// Slopes and relative shade that a material's grain adds at a position.
 fn grain(material: &Material, place: [f32; 2], shift: f32, tiles: &Tiles) -> (f32, f32, f32) {
     let [x, y] = place;
     let mm = material.grain_mm;
@@ -230,7 +231,7 @@ fn grain(material: &Material, place: [f32; 2], shift: f32, tiles: &Tiles) -> (f3
     (slopes[0], slopes[1], tone)
 }
 
-/// The grid of cells twice as wide.
+/// The grid with cells twice as wide.
 fn halved(level: &Level) -> Level {
     let (width, height) = (level.width / 2, level.height / 2);
     let mut texels = Vec::with_capacity(width * height);

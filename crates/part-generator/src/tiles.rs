@@ -1,4 +1,4 @@
-//! Tiles of noise that all pictures share, drawn once from a fixed seed and read at any place, turn and scale.
+//! Tiles of noise shared by all pictures, drawn once from a fixed seed and read at any position, rotation and scale.
 
 use std::sync::OnceLock;
 
@@ -9,33 +9,33 @@ use crate::random::{Draw, Stream, generator};
 /// Side of a tile; a power of two, so that wrapping is a mask.
 const SIDE: usize = 256;
 
-/// Length of the table of normal numbers.
+/// Number of normally distributed numbers in the table.
 const NORMALS: usize = 1 << 15;
 
-/// Values around 0, mostly in [-1, 1], that repeat every 256 texels without a seam.
+/// Values around 0, mostly in [-1, 1], with a seamless period of 256 texels.
 pub(crate) struct Tile {
-    /// An array, whose length the compiler knows: a masked place needs no check.
+    /// An array, whose length the compiler knows: a masked index needs no bounds check.
     values: Box<[f32; SIDE * SIDE]>,
 }
 
-/// The largest whole number that is not above `value`; for some whole values the one below. `value` is within four millions
-/// of 0. Neither a call nor a comparison, so that compilers compute several values at once.
+/// The largest integer not above `value`; for some integer values the one below. `value` must be within four million of
+/// 0. Without call and comparison, so that compilers vectorise it.
 #[inline(always)]
 pub(crate) fn floor(value: f32) -> i32 {
-    // 1.5 * 2^23: the bits of a sum with it end in the whole number.
+    // 1.5 * 2^23: the low bits of a sum with it are the integer.
     const WHOLE: f32 = 12_582_912.0;
     (value - 0.5 + WHOLE).to_bits() as i32 - WHOLE.to_bits() as i32
 }
 
-/// Everything that is drawn once.
+/// The shared tables.
 pub(crate) struct Tiles {
     /// Smooth clouds of several sizes.
     pub cloud: Tile,
-    /// A new value every texel, little smoothed.
+    /// A new value for every texel, slightly smoothed.
     pub grain: Tile,
     /// Streaks along x.
     pub streak: Tile,
-    /// Rings of wood, cut along the trunk: lines along x.
+    /// Growth rings of wood, cut along the trunk: lines along x.
     pub wood: Tile,
     /// Sparse spots: 0, or up to 1 within a spot.
     pub spots: Tile,
@@ -53,7 +53,7 @@ impl Tile {
         Self::new((0..SIDE * SIDE).map(|k| value(k % SIDE, k / SIDE)).collect())
     }
 
-    /// Sums octaves of smooth noise of so many cells a side, then brings the standard deviation to 0.5.
+    /// Sums octaves of smooth noise with this number of cells per side, and scales the standard deviation to 0.5.
     fn fractal(cells: [usize; 2], octaves: u32, fall: f32, rng: &mut Pcg64Mcg) -> Self {
         let mut values = vec![0.0f32; SIDE * SIDE];
         let mut strength = 1.0;
@@ -102,7 +102,7 @@ impl Tile {
     }
 }
 
-/// The cell of a lattice of `count` that texel `k` lies in, and how far along, eased.
+/// The lattice cell (of `count`) of texel `k`, and the eased position in it.
 fn split(k: usize, count: usize) -> (usize, f32) {
     let place = (k as f32 + 0.5) * count as f32 / SIDE as f32;
     let t = place.fract();
@@ -148,7 +148,8 @@ impl Tiles {
         Self { cloud, grain, streak, wood, spots: Tile::new(dots), normals }
     }
 
-    /// `len` normal numbers from a place of the table that `address` chooses; `len` is at most half of the table.
+    /// `len` normally distributed numbers from a position of the table selected by `address`; `len` is at most half of
+    /// the table.
     pub fn normals(&self, address: u64, len: usize) -> &[f32] {
         assert!(len <= NORMALS / 2, "rows of at most {} numbers", NORMALS / 2);
         let first = (address % (NORMALS - len) as u64) as usize;

@@ -1,4 +1,4 @@
-//! Samples depend on seed and index only, and their truth agrees with the picture.
+//! Samples depend only on seed and index, and their ground truth agrees with the picture.
 #![allow(clippy::unwrap_used)]
 
 use rayon::prelude::*;
@@ -27,7 +27,7 @@ fn random_access_on_many_threads_equals_one_after_the_other() {
     assert!(sequential[2].image != sequential[4].image);
 }
 
-/// A wrong place or turn is off by tens of pixels; walls of the tested parts show by less than this.
+/// A wrong position or turn deviates by tens of pixels; walls of the tested parts deviate by less than this.
 const MAX_MEAN_DISTANCE_PX: f64 = 4.0;
 
 #[test]
@@ -38,12 +38,12 @@ fn the_truth_lies_on_the_part() {
             let sample = scenes.sample(index);
             let taught = &scenes.photo(sample.part_idx).demonstration.annotation;
             let instance = &sample.instances[0];
-            // The marks are the demonstration's, moved with the part.
+            // The marks are the demonstration's, transformed with the part.
             let moved = instance.image_from_demonstration.apply(&taught.grasp.unwrap().center());
             assert!((moved - instance.grasp.center()).norm() < 1e-6);
             assert!((instance.scale * scenes.sample(index).conditions.distance - 1.0).abs() < 0.25);
-            // Without tilt, the demonstration's outline moved with the part is the outline found, but for what perspective
-            // does to heights: seen from another place, the walls of high parts show by some pixels.
+            // Without tilt, the demonstration's outline transformed with the part is the outline found, except for the
+            // perspective of heights: from another position, some pixels of the walls of tall parts are visible.
             if condition == Condition::Nominal {
                 let outline = taught.outline.as_ref().unwrap().transformed(&instance.image_from_demonstration);
                 let found = instance.outline().unwrap();
@@ -76,7 +76,7 @@ fn visibility_is_the_share_of_the_silhouette_that_the_picture_shows() {
             covered += usize::from(instance.visible_share < 0.93);
         }
     }
-    // Covers are laid where the share fits; some parts are too thin for any of them.
+    // Covers are placed where the share fits; some parts are too thin for any cover.
     assert!(covered >= 5, "{covered} of 10 covered");
 }
 

@@ -1,4 +1,4 @@
-//! Formats, limits and frames.
+//! Formats, limits and pixel frames.
 
 use std::borrow::Cow;
 use std::io::Cursor;
@@ -10,10 +10,10 @@ use crate::{jpeg, jpeg_gap, ppm, samples, tiff};
 
 type Result<T> = std::result::Result<T, PictureError>;
 
-/// What an image may at most be.
+/// Limits of an image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ImageLimits {
-    /// Width × height, by the file's header.
+    /// Maximum width × height, checked in the file's header.
     pub max_pixels: u64,
 }
 
@@ -24,20 +24,21 @@ impl Default for ImageLimits {
     }
 }
 
-/// Which way up the pixels are.
+/// Orientation of the pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum PixelFrame {
-    /// As a viewer shows them: turned as the Exif orientation says.
+    /// As shown by a viewer: rotated by the Exif orientation.
     #[default]
     Upright,
-    /// As the sensor delivered them, which is what a calibration knows; phones that look straight down set the orientation by chance.
+    /// As delivered by the sensor, which a calibration refers to; phones that look straight down set an arbitrary
+    /// orientation.
     Sensor,
 }
 
-/// How the names of picture files end, whose content [`decode_image`] may read.
+/// Extensions of picture files that [`decode_image`] may be able to read.
 pub const IMAGE_EXTENSIONS: [&str; 7] = ["png", "jpg", "jpeg", "webp", "bmp", "tif", "tiff"];
 
-/// The formats and their names; those of which the decoder was not compiled are refused by name.
+/// The formats and their names; formats whose decoder is not compiled in are rejected by name.
 const FORMATS: [(ImageFormat, &str); 5] = [
     (ImageFormat::Png, "PNG"),
     (ImageFormat::Jpeg, "JPEG"),
@@ -46,7 +47,7 @@ const FORMATS: [(ImageFormat, &str); 5] = [
     (ImageFormat::Tiff, "TIFF"),
 ];
 
-/// The formats that this build reads, as a message lists them.
+/// The formats of this build, for messages.
 fn readable_formats() -> String {
     let names: Vec<&str> =
         FORMATS.iter().filter(|(format, _)| format.reading_enabled()).map(|(_, name)| *name).collect();
@@ -60,7 +61,7 @@ fn not_an_image(found: impl Into<String>) -> PictureError {
     PictureError::NotAnImage { expected: readable_formats(), found: found.into() }
 }
 
-/// Decodes a picture into upright 8-bit RGB, as [`decode_image_in`].
+/// Decodes a picture to upright 8-bit RGB, as [`decode_image_in`].
 ///
 /// # Errors
 /// Those of [`decode_image_in`].
@@ -68,15 +69,16 @@ pub fn decode_image(bytes: &[u8], limits: &ImageLimits) -> Result<RgbImage> {
     decode_image_in(bytes, limits, PixelFrame::Upright)
 }
 
-/// Decodes a picture into 8-bit RGB.
+/// Decodes a picture to 8-bit RGB.
 ///
-/// The content says what it is: PNG, JPEG or PPM, and with the feature `more-formats` WebP, BMP or TIFF. Grey and deeper images are
-/// converted, those of 10 and 12 bits in 16 by their own range; transparent pixels are laid over white, unless all are fully
-/// transparent, which is how programs leave an alpha that they do not use. Floats of 0 to 255 are read like integers. Of a TIFF the page in full size is read.
+/// The format is recognised by the content: PNG, JPEG or PPM, and with the feature `more-formats` WebP, BMP or TIFF.
+/// Grey and deeper images are converted; 10 and 12 bits stored in 16 are scaled by their own range. Transparent pixels
+/// are composited over white, unless all are fully transparent, which is how programs leave an unused alpha channel.
+/// Floats of 0 to 255 are read like integers. Of a TIFF, the full-size page is read.
 ///
 /// # Errors
-/// Bytes of another kind (for HEIC photos with the phone's setting that avoids them), a truncated or damaged file, zero width
-/// or height, more than `limits.max_pixels`, a TIFF of several full pages, inks of which nothing says how they are stored.
+/// Another format (for HEIC photos with the phone's setting that avoids them), a truncated or damaged file, zero width
+/// or height, more than `limits.max_pixels`, a TIFF with several full-size pages, or inks with unknown storage.
 pub fn decode_image_in(bytes: &[u8], limits: &ImageLimits, frame: PixelFrame) -> Result<RgbImage> {
     if bytes.starts_with(b"P6") {
         let damaged = |found| PictureError::DamagedImage { format: "PPM", reason: format!("found {found}") };
@@ -84,14 +86,14 @@ pub fn decode_image_in(bytes: &[u8], limits: &ImageLimits, frame: PixelFrame) ->
     }
     let (format, name) = format_of(bytes)?;
     let damaged = |error: image::ImageError| PictureError::DamagedImage { format: name, reason: error.to_string() };
-    // Ahead of the decoder, which refuses an empty PNG with less to say.
+    // Before the decoder, whose error for an empty PNG says less.
     if let Some([width, height]) = png_header_size(bytes) {
         check_size(width, height, limits)?;
     }
     let mut palette = None;
     let bytes = match format {
         ImageFormat::Jpeg => {
-            // Ahead of the checks, which decode it.
+            // Before the checks, which decode it.
             let header = ImageReader::with_format(Cursor::new(bytes), format).into_dimensions();
             if let Ok((width, height)) = header {
                 check_size(width, height, limits)?;
@@ -111,10 +113,10 @@ pub fn decode_image_in(bytes: &[u8], limits: &ImageLimits, frame: PixelFrame) ->
     let (width, height) = decoder.dimensions();
     check_size(width, height, limits)?;
     let mut allocation = Limits::default();
-    // 16-bit RGBA is the widest pixel that photos have.
+    // 16-bit RGBA has the largest pixels of all photos.
     allocation.max_alloc = Some(limits.max_pixels.saturating_mul(8).saturating_add(1 << 20));
     decoder.set_limits(allocation).map_err(damaged)?;
-    // A damaged Exif block is no reason to refuse the picture.
+    // A damaged Exif block is ignored.
     let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
     let picture = DynamicImage::from_decoder(decoder).map_err(damaged)?;
     let mut picture = match palette {
@@ -127,7 +129,7 @@ pub fn decode_image_in(bytes: &[u8], limits: &ImageLimits, frame: PixelFrame) ->
     Ok(samples::to_rgb8(picture))
 }
 
-/// Whether the picture has an Exif orientation that turns or mirrors it; not for bytes that are no picture.
+/// Whether the picture has an Exif orientation that rotates or mirrors it; false for bytes that are not a picture.
 pub fn is_turned_by_exif(bytes: &[u8]) -> bool {
     let Ok((format, _)) = format_of(bytes) else { return false };
     if format == ImageFormat::Tiff && tiff::full_page(bytes).is_err() {
@@ -138,7 +140,7 @@ pub fn is_turned_by_exif(bytes: &[u8]) -> bool {
     orientation.is_some_and(|orientation| orientation != Orientation::NoTransforms)
 }
 
-/// The format by content, with its name.
+/// The format recognised by the content, with its name.
 fn format_of(bytes: &[u8]) -> Result<(ImageFormat, &'static str)> {
     if let Some(found) = iso_media(bytes) {
         return Err(not_an_image(found));
@@ -165,7 +167,7 @@ fn check_size(width: u32, height: u32, limits: &ImageLimits) -> Result<()> {
     Ok(())
 }
 
-/// What an ISO media file is, of which none is read: HEIC is under patents, and no small decoder in Rust reads AVIF.
+/// The kind of an ISO media file. None is supported: HEIC is patented, and there is no small AVIF decoder in Rust.
 fn iso_media(bytes: &[u8]) -> Option<&'static str> {
     let brand = bytes.get(8..12).filter(|_| bytes.get(4..8) == Some(b"ftyp"))?;
     match brand {
@@ -187,7 +189,7 @@ fn png_header_size(bytes: &[u8]) -> Option<[u32; 2]> {
     Some([number(16)?, number(20)?])
 }
 
-/// A word or two on bytes that are no image.
+/// A short description of bytes that are not an image.
 fn describe(bytes: &[u8]) -> String {
     if bytes.is_empty() {
         return "an empty file".into();
@@ -221,7 +223,7 @@ mod tests {
         decode_image(bytes, &ImageLimits::default())
     }
 
-    /// A chunk of a PNG with a right checksum is not needed: the size is refused before the checksum is read.
+    /// A PNG chunk; its checksum may be wrong, because the size is rejected before the checksum is read.
     fn png_header(width: u32, height: u32) -> Vec<u8> {
         let mut bytes = encode(&gradient(), ImageFormat::Png);
         bytes[16..20].copy_from_slice(&width.to_be_bytes());
@@ -275,7 +277,7 @@ mod tests {
 
     #[test]
     fn exif_orientation_is_applied() {
-        // Exif, big endian, one entry: tag 0x0112 (orientation), short, 6 = turn by 90° clockwise to show.
+        // Exif, big endian, one entry: tag 0x0112 (orientation), short, 6 = rotate by 90° clockwise for viewing.
         let tiff = b"MM\0\x2a\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0";
         let mut jpeg = encode(&gradient(), ImageFormat::Jpeg);
         let mut segment = vec![0xff, 0xe1];
@@ -285,7 +287,7 @@ mod tests {
         jpeg.splice(2..2, segment);
         let upright = decode(&jpeg).unwrap();
         assert_eq!(upright.dimensions(), (24, 40));
-        // What was red-poor on the left is now red-poor at the top; green grows leftwards.
+        // The side with little red was at the left and is now at the top; green increases to the left.
         assert!(upright.get_pixel(12, 2).0[0] < 60 && upright.get_pixel(12, 37).0[0] > 180);
         assert!(upright.get_pixel(2, 20).0[1] > upright.get_pixel(21, 20).0[1] + 100);
     }
@@ -297,7 +299,7 @@ mod tests {
         assert!(found.to_string().contains("60000×60000 = 3600 megapixels"), "{found}");
         let small = ImageLimits { max_pixels: 40 * 24 - 1 };
         assert!(decode_image(&encode(&gradient(), ImageFormat::Jpeg), &small).is_err());
-        // A JPEG without its end, of which the checks decode what there is.
+        // A truncated JPEG, of which the checks decode the available part.
         let mut jpeg = encode(&gradient(), ImageFormat::Jpeg);
         jpeg.truncate(jpeg.len() - 2);
         let frame = jpeg.windows(2).position(|marker| marker == [0xff, 0xc0]).unwrap();

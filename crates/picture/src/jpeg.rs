@@ -1,4 +1,4 @@
-//! Where a JPEG ends, and the Huffman tables that webcams leave out.
+//! Finds the end of a JPEG, and adds the Huffman tables that webcams omit.
 
 use std::borrow::Cow;
 
@@ -6,30 +6,31 @@ use image::ImageFormat;
 
 use crate::error::PictureError;
 
-/// What is known of a JPEG that grows at its end.
+/// State of a JPEG that is being received.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum JpegEnd {
-    /// It has so many bytes, its end marker included.
+    /// Complete, with this number of bytes, including the end marker.
     At(usize),
     /// More bytes are needed.
     NotYet,
-    /// No JPEG goes on like this; the bytes before this position can be thrown away.
+    /// Invalid; the bytes before this position can be discarded.
     Broken(usize),
 }
 
-/// Walks over the markers of a JPEG, without decoding it. It goes on where it stopped, so that a growing buffer is read once.
+/// Scans the markers of a JPEG without decoding it. Scanning continues at the last position, so that a growing buffer
+/// is read once.
 #[derive(Debug, Clone, Default)]
 pub struct JpegScanner {
     position: usize,
-    /// Within the entropy-coded data that follows a start of scan.
+    /// In the entropy-coded data after a start of scan.
     is_in_scan: bool,
     first_scan: Option<usize>,
     has_huffman_tables: bool,
     has_adobe_marker: bool,
-    /// By the frame's header.
+    /// From the frame header.
     num_components: Option<u8>,
     is_progressive: bool,
-    /// Of a progressive picture: bits of the coefficients (0 to 63) that have been sent to their last bit, by component's number.
+    /// For progressive pictures: by component id, a bit for each coefficient (0 to 63) that was sent completely.
     sent: Vec<(u8, u64)>,
 }
 
@@ -38,12 +39,12 @@ const END: u8 = 0xd9;
 const START_OF_SCAN: u8 = 0xda;
 const HUFFMAN_TABLES: u8 = 0xc4;
 const ADOBE: u8 = 0xee;
-/// Frames: baseline and its kin, without the tables (0xc4), the reserved (0xc8) and the arithmetic ones (0xcc).
+/// Frame markers: baseline and related, without the tables (0xc4), the reserved (0xc8) and the arithmetic ones (0xcc).
 const FRAMES: std::ops::RangeInclusive<u8> = 0xc0..=0xcf;
 const PROGRESSIVE: u8 = 0xc2;
 
 impl JpegScanner {
-    /// Walks on. `bytes` begin with the start marker, and with what they began with in the call before.
+    /// Continues scanning. `bytes` begin with the start marker, and with the bytes of the previous call.
     pub fn advance(&mut self, bytes: &[u8]) -> JpegEnd {
         if self.position == 0 {
             match bytes {
@@ -54,7 +55,7 @@ impl JpegScanner {
         }
         loop {
             if self.is_in_scan {
-                // Entropy-coded data has 0xff only before 0x00 and before the restart markers.
+                // In entropy-coded data, 0xff is always followed by 0x00 or a restart marker.
                 let rest = &bytes[self.position..];
                 match rest.windows(2).position(|pair| pair[0] == 0xff && !matches!(pair[1], 0x00 | 0xd0..=0xd7)) {
                     Some(marker) => self.position += marker,
@@ -75,7 +76,7 @@ impl JpegScanner {
             match marker {
                 0xff => self.position += 1,
                 END => return JpegEnd::At(self.position + 2),
-                // The next picture begins within this one: its rest was lost.
+                // The next picture begins within this one, whose rest was lost.
                 START => return JpegEnd::Broken(self.position),
                 0x01 | 0xd0..=0xd7 => self.position += 2,
                 _ => {
@@ -104,7 +105,7 @@ impl JpegScanner {
                         return JpegEnd::Broken(self.position + 2);
                     }
                     if bytes.len() < self.position + 2 + length {
-                        // Looked at again when there is more: the flags above are set once more.
+                        // Scanned again when there is more data: the flags above are set again.
                         self.is_in_scan = false;
                         return JpegEnd::NotYet;
                     }
@@ -116,7 +117,7 @@ impl JpegScanner {
 }
 
 impl JpegScanner {
-    /// Notes what a scan's header says that it sends.
+    /// Records what a scan's header announces.
     fn note_sent(&mut self, header: &[u8]) {
         let Some((&count, rest)) = header.split_first() else { return };
         let Some((components, [first, last, bits, ..])) = rest.split_at_checked(2 * usize::from(count)) else { return };
@@ -133,7 +134,7 @@ impl JpegScanner {
         }
     }
 
-    /// Whether the scans that have begun send the whole picture.
+    /// Whether the scans so far contain the whole picture.
     fn is_fully_sent(&self) -> bool {
         !self.is_progressive
             || self.num_components.is_some_and(|count| self.sent.len() == usize::from(count))
@@ -141,13 +142,14 @@ impl JpegScanner {
     }
 }
 
-/// The one JPEG that the bytes begin with, without what follows it, and with Huffman tables and an end.
+/// The JPEG at the beginning of the bytes, without following data, and with Huffman tables and an end marker.
 ///
-/// Motion JPEG (AVI1, USB video class) may leave out the tables of the JPEG standard's annex K, sections K.3.1 and K.3.2; they are
-/// put before the first scan then. Some cameras leave out the end marker: it is added where the data before it are complete.
+/// Motion JPEG (AVI1, USB video class) may omit the tables of the JPEG standard's annex K, sections K.3.1 and K.3.2;
+/// they are then inserted before the first scan. Some cameras omit the end marker: it is added if the data before it
+/// are complete.
 ///
 /// # Errors
-/// Data that break off; inks without Adobe's marker, of which nothing says whether they are inverted.
+/// Truncated data, or inks without Adobe's marker, for which it is unknown whether they are inverted.
 pub(crate) fn complete_jpeg(bytes: &[u8]) -> Result<Cow<'_, [u8]>, PictureError> {
     let damaged = |reason: String| PictureError::DamagedImage { format: "JPEG", reason };
     let mut scanner = JpegScanner::default();
@@ -184,14 +186,14 @@ pub(crate) fn complete_jpeg(bytes: &[u8]) -> Result<Cow<'_, [u8]>, PictureError>
     Ok(jpeg)
 }
 
-/// Without the 0xff that may stand before a marker.
+/// Removes the 0xff fill bytes that may precede a marker.
 fn without_fill_bytes(jpeg: &[u8]) -> &[u8] {
     let end = jpeg.iter().rposition(|byte| *byte != 0xff).map_or(0, |last| last + 1);
     &jpeg[..end]
 }
 
-/// Whether the data before the end marker hold every block: the decoder fills what is missing, and with what stands there. So it must
-/// give the same picture whatever stands behind complete data.
+/// Whether the data before the end marker contain every block. The decoder fills missing blocks depending on the bytes
+/// that follow, so complete data must give the same picture whatever follows them.
 fn is_complete(jpeg: &[u8]) -> bool {
     let decoded = |filler: &[u8]| {
         let (data, end) = jpeg.split_at(jpeg.len() - 2);
@@ -201,7 +203,7 @@ fn is_complete(jpeg: &[u8]) -> bool {
     found.is_some() && found == decoded(&[0x55; 64]) && found == decoded(&[0xaa; 64])
 }
 
-/// The segment with the four tables of annex K: luminance and chrominance DC, luminance and chrominance AC.
+/// A segment with the four tables of annex K: luminance and chrominance DC, luminance and chrominance AC.
 #[rustfmt::skip]
 const STANDARD_HUFFMAN_TABLES: [u8; 420] = [
     0xff, 0xc4, 0x01, 0xa2, 0x00, 0x00, 0x01, 0x05, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00,
@@ -252,7 +254,7 @@ mod tests {
         (found, &jpeg[at..])
     }
 
-    /// As webcams send it.
+    /// As sent by webcams.
     fn without_tables(jpeg: &[u8]) -> Vec<u8> {
         let (segments, rest) = segments(jpeg);
         let kept: Vec<u8> = segments.into_iter().filter(|s| s[1] != HUFFMAN_TABLES).flatten().copied().collect();
@@ -298,7 +300,7 @@ mod tests {
         }
         let decode = |bytes: &[u8]| image::load_from_memory(bytes).unwrap().to_rgb8();
         let whole = decode(&original);
-        // What is cut off the data is either not missed or told.
+        // Truncated data are either irrelevant or reported.
         for cut in 3..200 {
             if let Ok(read) = complete_jpeg(&original[..original.len() - cut]) {
                 assert!(decode(&read) == whole, "{cut} bytes");

@@ -1,33 +1,34 @@
-//! JPEG data of which a stretch is zeros, as an interrupted copy or a broken card leaves it.
+//! JPEG data with a run of zeros, as left by an interrupted copy or a damaged card.
 //!
-//! Zeros are valid codes, so that the decoder reads on and gives another picture without an error. They stand for another number of
-//! blocks than the data that were there: at the next marker, the data run out too early or are left over.
+//! Zeros are valid codes, so the decoder continues and gives another picture without an error. They decode to another
+//! number of blocks than the original data: at the next marker, data are missing or left over.
 
 use image::{DynamicImage, GenericImageView, ImageFormat};
 
 use crate::error::PictureError;
 
-/// Fewer zeros in a row do occur in whole pictures; more do where much of a picture has one colour, which the check then tells apart.
+/// Minimum number of zeros in a row. Fewer occur in intact pictures; more occur if much of a picture has one colour,
+/// which the check then distinguishes.
 const MIN_ZEROS: usize = 32;
-/// Bytes that are put behind the data to learn whether the decoder reads them.
+/// Number of bytes appended to the data to find out whether the decoder reads them.
 const ADDED_BYTES: usize = 64;
-/// Bytes that are exchanged at the end of the data, for the same.
+/// Number of bytes replaced at the end of the data, for the same purpose.
 const EXCHANGED_BYTES: usize = 8;
-/// Two fillers: the data's own bytes may happen to give what one of them gives.
+/// Two fill values: the original bytes may happen to give the same result as one of them.
 const PROBES: [u8; 2] = [0x55, 0xaa];
 
 /// Entropy-coded data up to the next marker.
 struct Stretch {
     start: usize,
     end: usize,
-    /// The number of the restart marker behind it, of 0 to 7.
+    /// The number of the restart marker after it, from 0 to 7.
     restart: Option<u8>,
 }
 
-/// Makes sure that zeros in the data are codes of the picture.
+/// Checks that zeros in the data are codes of the picture.
 ///
 /// # Errors
-/// A stretch of zeros after which the data and the blocks do not end together, or restart markers that do not follow each other.
+/// After a run of zeros, the data and the blocks do not end together, or restart markers are out of sequence.
 pub(crate) fn check_has_no_gap(jpeg: &[u8]) -> Result<(), PictureError> {
     let stretches = stretches(jpeg);
     let zeros_in = |stretch: &Stretch| {
@@ -53,12 +54,12 @@ pub(crate) fn check_has_no_gap(jpeg: &[u8]) -> Result<(), PictureError> {
     Ok(())
 }
 
-/// Whether the decoder reads the data to their end, and nothing behind it.
+/// Whether the decoder reads the data to their end, and nothing after it.
 fn ends_with_its_blocks(jpeg: &[u8], stretch: &Stretch) -> bool {
     let decoded =
         |bytes: &[u8]| -> Option<DynamicImage> { image::load_from_memory_with_format(bytes, ImageFormat::Jpeg).ok() };
     let Some(whole) = decoded(jpeg) else { return true };
-    // Such a picture may have codes of zeros alone, and the decoder fills what is missing with the same colour.
+    // Such a picture may consist of zero codes only, and the decoder fills missing blocks with the same colour.
     let first = whole.get_pixel(0, 0);
     if whole.pixels().all(|(.., pixel)| pixel == first) {
         return true;
@@ -72,7 +73,7 @@ fn ends_with_its_blocks(jpeg: &[u8], stretch: &Stretch) -> bool {
     !runs_out && !is_left_over
 }
 
-/// All entropy-coded data; what is no JPEG ends the list.
+/// All entropy-coded data; invalid data end the list.
 fn stretches(jpeg: &[u8]) -> Vec<Stretch> {
     const START_OF_SCAN: u8 = 0xda;
     let mut found = Vec::new();
@@ -131,8 +132,8 @@ mod tests {
 
     #[test]
     fn zeros_that_are_codes_are_read() {
-        // A block has the difference 0 and the block's end, a bit each; of 320 blocks the second and the last have the difference 1,
-        // which makes them four bits. Together 80 bytes and a half.
+        // A block has the difference 0 and the end of block, one bit each; of 320 blocks the second and the last have
+        // the difference 1, which needs four bits. Together 80.5 bytes.
         let table = |class: u8| [&[0xff, 0xc4, 0, 21, class, 1, 1][..], &[0; 14], &[0, 1]].concat();
         let quantization = [&[0xff, 0xdb, 0, 67, 0][..], &[8; 64]].concat();
         let frame = [0xff, 0xc0, 0, 11, 8, 0, 64, 1, 64, 1, 1, 0x11, 0];
@@ -145,7 +146,7 @@ mod tests {
         check_has_no_gap(&with_zeros(79)).unwrap();
         assert!(check_has_no_gap(&with_zeros(99)).is_err(), "20 bytes are left over");
         assert!(check_has_no_gap(&with_zeros(59)).is_err(), "20 bytes are missing");
-        // Codes of zeros alone: a picture of one colour.
+        // Zero codes only: a picture of one colour.
         check_has_no_gap(&of_data(&[0; 80])).unwrap();
     }
 }

@@ -1,31 +1,31 @@
-//! Binary PPM, as programs write it to a pipe.
+//! Binary PPM, as written by programs to pipes.
 
 use image::RgbImage;
 
-/// More than any camera's: 64 megapixels, 192 MiB.
+/// Maximum number of pixels: 64 megapixels, 192 MiB.
 const MAX_PIXELS: u64 = 1 << 26;
-/// Pixels in a row, or rows.
+/// Maximum width and height.
 const MAX_SIDE: u32 = 1 << 14;
 
-/// The head of a binary PPM.
+/// The header of a binary PPM.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PpmHead {
-    /// Pixels across.
+    /// Width in pixels.
     pub width: u32,
-    /// Pixels down.
+    /// Height in pixels.
     pub height: u32,
-    /// Where the pixels begin.
+    /// Position of the pixels.
     pub start: usize,
 }
 
 impl PpmHead {
-    /// A head is shorter than this; comments may stand in it.
+    /// Maximum length of a header, which may contain comments.
     const MAX_BYTES: usize = 1024;
 
-    /// Reads it; `None` while it has not all arrived.
+    /// Reads a header; `None` while it is incomplete.
     ///
     /// # Errors
-    /// In words, what is wrong with it.
+    /// Text that describes the error.
     pub fn read(bytes: &[u8]) -> Result<Option<Self>, String> {
         let mut numbers = [0_u32; 3];
         let mut at = 2;
@@ -65,16 +65,16 @@ impl PpmHead {
         Ok(Some(Self { width, height, start: at + 1 }))
     }
 
-    /// How many bytes head and pixels have together.
+    /// Length of header and pixels together.
     pub fn end(self) -> usize {
         self.start + self.width as usize * self.height as usize * 3
     }
 }
 
-/// The picture that the bytes begin with.
+/// Decodes the picture at the beginning of the bytes.
 ///
 /// # Errors
-/// In words, what was found instead of a whole picture.
+/// Text that describes the data found in place of a complete picture.
 pub(crate) fn decode_ppm(bytes: &[u8]) -> Result<RgbImage, String> {
     let short = || format!("a PPM that ends after {} bytes", bytes.len());
     let head = PpmHead::read(bytes)?.ok_or_else(short)?;

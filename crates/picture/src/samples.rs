@@ -1,22 +1,24 @@
-//! Samples of any depth and alpha to 8-bit RGB.
+//! Converts samples of any depth, with alpha, to 8-bit RGB.
 
 use image::{DynamicImage, ImageBuffer, Pixel, Rgb, RgbImage};
 
-/// Bits that cameras have, of the 16 that they are stored in.
+/// Common bit depths of cameras, stored in 16 bits.
 const CAMERA_BITS: [u32; 3] = [8, 10, 12];
-/// Floats are 1 at their brightest by custom. Up to this they are a little overexposed, above it integers that were stored as floats.
+/// By convention, floats are 1 at full brightness. Up to this maximum they are slightly overexposed; above it they are
+/// integers stored as floats.
 const MAX_OVEREXPOSED: f32 = 2.0;
-/// An alpha that nowhere reaches this would leave a white picture: it was a mask of 0 and 1, or a share that was cut to an integer.
+/// Minimum alpha value that must occur. An alpha that never reaches it would give a white picture: it was a mask of 0
+/// and 1, or a fraction truncated to an integer.
 const MIN_SEEN_ALPHA: u8 = 8;
 
-/// Converts the samples, and lays transparent pixels over white.
+/// Converts the samples, and composites transparent pixels over white.
 pub(crate) fn to_rgb8(picture: DynamicImage) -> RgbImage {
     let picture = in_full_range(picture);
     if picture.color().has_alpha() { over_white(&picture) } else { picture.into_rgb8() }
 }
 
-/// Industrial cameras store 10 and 12 bits in the lower ones of 16; read as 16 the picture is black. A dark picture that really has
-/// 16 bits becomes brighter, which nothing after it minds.
+/// Industrial cameras store 10 and 12 bits in the lower bits of 16; read as 16 bits, the picture is black. A dark
+/// picture that really has 16 bits becomes brighter, which does not affect later steps.
 fn in_full_range(mut picture: DynamicImage) -> DynamicImage {
     match &mut picture {
         DynamicImage::ImageLuma16(samples) => stretch(samples, 1),
@@ -30,11 +32,11 @@ fn in_full_range(mut picture: DynamicImage) -> DynamicImage {
     picture
 }
 
-/// Multiplies the first `num_colors` samples of each pixel so that the camera's largest number becomes 65535.
+/// Scales the first `num_colors` samples of each pixel so that the camera's maximum value becomes 65535.
 fn stretch<P: Pixel<Subpixel = u16>>(picture: &mut ImageBuffer<P, Vec<u16>>, num_colors: usize) {
     let largest = picture.pixels().flat_map(|pixel| &pixel.channels()[..num_colors]).copied().max().unwrap_or(0);
     let Some(bits) = CAMERA_BITS.into_iter().find(|bits| u32::from(largest) < 1 << bits) else { return };
-    // Eight bits that were spread over 16 are as bright as they were meant.
+    // Eight bits stretched to 16 already have the correct brightness.
     if picture.pixels().flat_map(|pixel| &pixel.channels()[..num_colors]).all(|value| value % 257 == 0) {
         return;
     }
@@ -46,7 +48,8 @@ fn stretch<P: Pixel<Subpixel = u16>>(picture: &mut ImageBuffer<P, Vec<u16>>, num
     }
 }
 
-/// Divides floats that are integers of 8, 10, 12 or 16 bits by the largest of that kind. An alpha was stored like the colours.
+/// Divides floats that are integers of 8, 10, 12 or 16 bits by the maximum of that depth. Alpha was stored like the
+/// colours.
 fn to_shares<P: Pixel<Subpixel = f32>>(picture: &mut ImageBuffer<P, Vec<f32>>) {
     let largest = picture.iter().copied().filter(|sample| sample.is_finite()).fold(0.0, f32::max);
     if largest <= MAX_OVEREXPOSED {
@@ -59,7 +62,7 @@ fn to_shares<P: Pixel<Subpixel = f32>>(picture: &mut ImageBuffer<P, Vec<f32>>) {
 
 fn over_white(picture: &DynamicImage) -> RgbImage {
     let rgba = picture.to_rgba8();
-    // Simulators, ROS and Windows leave an alpha of 0 that nobody set.
+    // Simulators, ROS and Windows leave an unset alpha of 0.
     if rgba.pixels().all(|pixel| pixel[3] < MIN_SEEN_ALPHA) {
         return picture.to_rgb8();
     }
@@ -96,7 +99,7 @@ mod tests {
             let read = to_rgb8(samples.into());
             assert!((0..256).all(|x| read.get_pixel(x, 0)[0].abs_diff(x as u8) <= 1), "to {largest}");
         }
-        // A highlight above white is cut off and darkens nothing.
+        // A highlight above white is clipped and does not darken the picture.
         let bright = ImageBuffer::<Rgb<f32>, _>::from_fn(2, 1, |x, _| Rgb([if x == 0 { 1.5 } else { 0.5 }; 3]));
         let read = to_rgb8(bright.into());
         assert_eq!([read.get_pixel(0, 0).0, read.get_pixel(1, 0).0], [[255; 3], [128; 3]]);

@@ -1,7 +1,8 @@
-//! Which page of a TIFF is the picture, and palettes.
+//! Selects the main page of a TIFF, and applies palettes.
 //!
-//! Pages are a chain of directories; a page in reduced size (a thumbnail, as DNG, NEF and microscopes put first) has a bit for it, and
-//! the full one may be a subdirectory. `image` decodes the first page alone, so that another one is made the first.
+//! Pages form a chain of directories. A reduced-size page (a thumbnail, which DNG, NEF and microscopes put first) is
+//! marked by a bit, and the full-size page may be a subdirectory. `image` decodes only the first page, so the main page
+//! is moved to the front.
 
 use std::borrow::Cow;
 
@@ -16,10 +17,10 @@ const PHOTOMETRIC: u16 = 262;
 const COLOR_MAP: u16 = 320;
 const SUB_DIRECTORIES: u16 = 330;
 
-/// Bits of `NEW_SUBFILE_TYPE`: in reduced size, a mask of transparency.
+/// Bits of `NEW_SUBFILE_TYPE`: reduced size, transparency mask.
 const REDUCED: u64 = 1;
 const MASK: u64 = 4;
-/// `SUBFILE_TYPE` of a page in reduced size.
+/// `SUBFILE_TYPE` of a reduced-size page.
 const OLD_REDUCED: u64 = 2;
 /// Values of `PHOTOMETRIC`.
 const BLACK_IS_ZERO: u16 = 1;
@@ -27,26 +28,26 @@ const PALETTE: u64 = 3;
 const COLOR_FILTER_ARRAY: u64 = 32803;
 const LINEAR_RAW: u64 = 34892;
 
-/// Tags from here on are private: the decoder reads none of them.
+/// First private tag: the decoder reads none of them.
 const FIRST_PRIVATE_TAG: u16 = 32768;
-/// More pages than a picture has.
+/// Maximum number of pages.
 const MAX_PAGES: usize = 256;
-/// More tags than a page has, values than a tag of these.
+/// Maximum number of tags of a page, and of values of these tags.
 const MAX_ENTRIES: u64 = 4096;
 const MAX_VALUES: u64 = 3 << 16;
 
-/// A TIFF whose first page is the picture.
+/// A TIFF whose first page is the main one.
 pub(crate) struct FullPage<'a> {
     pub(crate) bytes: Cow<'a, [u8]>,
-    /// What the samples stand for.
+    /// Colours of the samples, if they are indices.
     pub(crate) palette: Option<Palette>,
 }
 
-/// Colours by number.
+/// Colours by index.
 pub(crate) struct Palette(Vec<[u8; 3]>);
 
 impl Palette {
-    /// The picture whose samples are numbers of colours.
+    /// The picture whose samples are colour indices.
     pub(crate) fn applied(&self, numbers: &DynamicImage) -> RgbImage {
         let numbers = numbers.to_luma8();
         let color = |number: u8| self.0.get(usize::from(number)).copied().unwrap_or_default();
@@ -54,16 +55,17 @@ impl Palette {
     }
 }
 
-/// Whether the bytes begin like a BigTIFF, with offsets of 64 bits.
+/// Whether the bytes begin with a BigTIFF header, which has offsets of 64 bits.
 pub(crate) fn is_big_tiff(bytes: &[u8]) -> bool {
     bytes.starts_with(b"II\x2b\0\x08\0\0\0") || bytes.starts_with(b"MM\0\x2b\0\x08\0\0")
 }
 
-/// Finds the one page in full size.
+/// Finds the single full-size page.
 ///
 /// # Errors
-/// Several of them; a raw photo; a palette of other than 8 bits; a tag with more values than the file has bytes, for which the decoder
-/// would take memory before it reads them. What cannot be walked over is left to the decoder.
+/// There are several of them; the file is a raw photo; a palette does not have 8 bits; or a tag has more values than
+/// the file has bytes, for which the decoder would allocate memory before reading. Structures that cannot be parsed are
+/// left to the decoder.
 pub(crate) fn full_page(bytes: &[u8]) -> Result<FullPage<'_>, PictureError> {
     let whole = FullPage { bytes: Cow::Borrowed(bytes), palette: None };
     let Some(file) = File::new(bytes) else { return Ok(whole) };
@@ -76,7 +78,7 @@ pub(crate) fn full_page(bytes: &[u8]) -> Result<FullPage<'_>, PictureError> {
     let unsupported = |found: String, remedy| PictureError::UnsupportedKind { format: "TIFF", found, remedy };
     let mut full = pages.iter().filter(|page| page.is_full(&file));
     let (page, further) = (full.next(), full.count());
-    // Without a page in full size the first one is all there is.
+    // Without a full-size page, the first one is used.
     let Some(page) = page.or(pages.first()) else { return Ok(whole) };
     if further > 0 {
         let found = format!("{} pages in full size, of which nothing says which is the picture", further + 1);
@@ -102,7 +104,7 @@ pub(crate) fn full_page(bytes: &[u8]) -> Result<FullPage<'_>, PictureError> {
     Ok(FullPage { bytes: Cow::Owned(patched), palette: Some(palette) })
 }
 
-/// A file as its header says it is to be read.
+/// A file with its byte order and offset size.
 struct File<'a> {
     bytes: &'a [u8],
     is_little_endian: bool,
@@ -110,7 +112,7 @@ struct File<'a> {
 }
 
 struct Page {
-    /// Where its directory begins.
+    /// Position of its directory.
     at: u64,
     entries: Vec<Entry>,
     next: u64,
@@ -118,10 +120,10 @@ struct Page {
 
 struct Entry {
     tag: u16,
-    /// Bytes of a value.
+    /// Bytes per value.
     width: usize,
     count: u64,
-    /// Where the values stand.
+    /// Position of the values.
     value_at: u64,
 }
 
@@ -135,7 +137,7 @@ impl<'a> File<'a> {
         Some(Self { bytes, is_little_endian, is_big: is_big_tiff(bytes) })
     }
 
-    /// An unsigned number of so many bytes.
+    /// An unsigned number of `width` bytes.
     fn number(&self, at: u64, width: usize) -> Option<u64> {
         let at = usize::try_from(at).ok()?;
         let bytes = self.bytes.get(at..at.checked_add(width)?)?;
@@ -146,7 +148,7 @@ impl<'a> File<'a> {
         })
     }
 
-    /// Bytes of an offset, and where the header has that of the first page.
+    /// Size of an offset, and its position in the header.
     fn offset_width(&self) -> (usize, u64) {
         if self.is_big { (8, 8) } else { (4, 4) }
     }
@@ -156,7 +158,7 @@ impl<'a> File<'a> {
         self.number(at, width)
     }
 
-    /// All pages of the chain, each with its subdirectories behind it; `None` where the chain breaks off.
+    /// All pages of the chain, each followed by its subdirectories; `None` if the chain is broken.
     fn pages(&self) -> Option<Vec<Page>> {
         let mut pages: Vec<Page> = Vec::new();
         let mut at = self.first_page()?;
@@ -199,7 +201,7 @@ impl<'a> File<'a> {
         Some(Page { at, entries, next: self.number(first + count * entry_bytes, offset_width)? })
     }
 
-    /// The same file with another page as its first.
+    /// The same file with another first page.
     fn with_first_page(&self, at: u64) -> Vec<u8> {
         let mut bytes = self.bytes.to_vec();
         let (width, place) = self.offset_width();
@@ -237,7 +239,7 @@ impl Page {
     fn palette(&self, file: &File<'_>) -> Option<Palette> {
         let values = self.entry(COLOR_MAP)?.values(file);
         let count = values.len() / 3;
-        // Red, green and blue one after the other, of 16 bits each.
+        // All red values, followed by green and blue, of 16 bits each.
         let color = |idx: usize| [0, 1, 2].map(|channel| (values[channel * count + idx] >> 8) as u8);
         (count > 0).then(|| Palette((0..count).map(color).collect()))
     }
@@ -261,7 +263,7 @@ mod tests {
     use super::*;
     use crate::{ImageLimits, decode_image};
 
-    /// A page of a TIFF as the tests write it: size, bits and photometric interpretation, samples, further tags with values of 16 bits.
+    /// A page of a test TIFF: size, bits and photometric interpretation, samples, further tags with values of 16 bits.
     struct TestPage {
         size: [u16; 2],
         is_gray: bool,
@@ -356,7 +358,7 @@ mod tests {
             let [large, small] = [rgb([8, 6], [10, 20, 30], 0), rgb([4, 3], [9, 9, 9], 1)];
             assert_eq!(decoded(&file(&[large, small], is_big)).unwrap().dimensions(), (8, 6));
         }
-        // A thumbnail alone is all there is.
+        // A thumbnail alone is used.
         assert_eq!(decoded(&file(&[rgb([4, 3], [9, 9, 9], 1)], false)).unwrap().dimensions(), (4, 3));
     }
 

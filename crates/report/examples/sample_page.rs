@@ -1,4 +1,4 @@
-//! A page with every kind of block, filled with made-up numbers and pictures, to look at while changing its style.
+//! A page with every kind of block, filled with made-up numbers and pictures, for working on its style.
 //!
 //! `cargo run --release -p sdg-report --example sample_page -- DIR` writes `DIR/index.html`.
 
@@ -58,7 +58,7 @@ fn report() -> Result<Report, sdg_report::ReportError> {
         )
         .section(
             Section::new("This run")
-                .lead("Everything needed to see the same numbers again.")
+                .lead("Settings for reproducing the numbers.")
                 .facts([
                     ("object", "pendulum"),
                     ("grasp model", "C, 12 keypoints"),
@@ -95,7 +95,7 @@ fn demonstration() -> Section {
         Figure::photo(sample).alt(format!("augmented sample {idx}"))
     });
     Section::new("Demonstration")
-        .lead("What the person gave: a photograph, a box, an outline, and a line along which to grasp.")
+        .lead("Input from the person: a photograph, a box, an outline, and a line along which to grasp.")
         .gallery(
             GallerySize::Large,
             vec![
@@ -189,7 +189,7 @@ fn detections() -> Section {
         .notice(Tone::Warning, "One of six was refused: laid over the image, the demonstration did not agree with it.")
 }
 
-/// The steps of an attempt, as `sdg_robot::GraspStep` names them.
+/// The steps of an attempt, named as in `sdg_robot::GraspStep`.
 const STEPS: [&str; 6] = ["detect", "hover", "approach", "close", "lift", "hold"];
 
 fn attempts() -> Vec<AttemptSummary> {
@@ -218,7 +218,7 @@ fn attempts() -> Vec<AttemptSummary> {
         .collect()
 }
 
-/// Where the part lies in a picture.
+/// The part's pose in a picture.
 struct Pose {
     x: f64,
     y: f64,

@@ -5,8 +5,8 @@
 //!                                   └────── coarser, until it fits max_bytes ──────┘
 //! ```
 //!
-//! All frames share one palette, so that still ground does not flicker, and each frame holds only the rectangle
-//! that changed, transparent where it did not: a fixed camera costs what moves.
+//! All frames share one palette, so that a static background does not flicker. Each frame contains only the rectangle
+//! that changed, transparent elsewhere: with a fixed camera, only motion takes space.
 
 use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
@@ -18,21 +18,21 @@ use image::imageops::{self, FilterType};
 
 use crate::error::ReportError;
 
-/// Size and pace of an animation.
+/// Size and speed of an animation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AnimationOptions {
     /// Frames per second as recorded.
     pub source_fps: f64,
-    /// Frames per second as shown; frames beyond that are left out. At most 50, which is what browsers show.
+    /// Frames per second as shown; further frames are left out. At most 50, the maximum of browsers.
     pub fps: f64,
-    /// How much faster than recorded it plays.
+    /// Playback speed relative to the recording.
     pub speed: f64,
-    /// Columns at most; wider frames are scaled down.
+    /// Maximum width; wider frames are scaled down.
     pub max_width: u32,
-    /// The file's size at most. Colours, then frames, then pixels are given up for it; the last resort is the
-    /// smallest that was tried, which may be larger.
+    /// Maximum size of the file. To reach it, colours, then frames, then pixels are reduced; if nothing suffices, the
+    /// smallest result is used, which may be larger.
     pub max_bytes: usize,
-    /// How long the last frame stands before the animation starts over, in seconds.
+    /// Time in seconds for which the last frame is shown before the animation restarts.
     pub hold_last_secs: f64,
 }
 
@@ -42,7 +42,7 @@ impl Default for AnimationOptions {
     }
 }
 
-/// A finished animation: the GIF, and its last frame for readers who want no motion.
+/// A finished animation: the GIF, and its last frame for readers who prefer no motion.
 #[derive(Debug, Clone)]
 pub struct Animation {
     pub(crate) gif: Vec<u8>,
@@ -51,7 +51,7 @@ pub struct Animation {
 }
 
 impl Animation {
-    /// Encodes frames that are all at hand; see [`AnimationRecorder`] for frames that come one by one.
+    /// Encodes frames that are all available; see [`AnimationRecorder`] for frames that arrive one by one.
     ///
     /// # Errors
     /// As [`AnimationRecorder::push`] and [`AnimationRecorder::finish`].
@@ -75,21 +75,21 @@ impl Animation {
         &self.still
     }
 
-    /// Frames in the file.
+    /// Number of frames in the file.
     #[must_use]
     pub fn num_frames(&self) -> usize {
         self.num_frames
     }
 }
 
-/// Takes frames as they come and keeps only what the GIF will show.
+/// Receives frames one by one and keeps only those that the GIF will show.
 #[derive(Debug, Clone)]
 pub struct AnimationRecorder {
     options: AnimationOptions,
     source_size: Option<(u32, u32)>,
     num_pushed: usize,
     frames: Vec<RgbImage>,
-    /// The latest frame when thinning left it out: the end is what a viewer waits for.
+    /// The latest frame if it was left out: the end must be shown.
     left_out: Option<RgbImage>,
 }
 
@@ -97,7 +97,7 @@ impl AnimationRecorder {
     /// An empty recording.
     ///
     /// # Panics
-    /// When a rate, the speed or the width is not positive.
+    /// If a rate, the speed or the width is not positive.
     #[must_use]
     pub fn new(options: AnimationOptions) -> Self {
         let rates = [options.source_fps, options.fps, options.speed];
@@ -110,8 +110,7 @@ impl AnimationRecorder {
     /// Adds the next frame of the recording.
     ///
     /// # Errors
-    /// [`ReportError::FrameSize`] when it differs in size from the first, [`ReportError::PictureSize`] when it
-    /// has no pixels.
+    /// [`ReportError::FrameSize`] if its size differs from the first, [`ReportError::PictureSize`] if it has no pixels.
     pub fn push(&mut self, frame: &RgbImage) -> Result<(), ReportError> {
         let found = frame.dimensions();
         if found.0 == 0 || found.1 == 0 {
@@ -139,8 +138,8 @@ impl AnimationRecorder {
     /// Encodes the recording.
     ///
     /// # Errors
-    /// [`ReportError::NoFrames`] when nothing was pushed, [`ReportError::PictureSize`] when a side is beyond
-    /// GIF's 65535.
+    /// [`ReportError::NoFrames`] if nothing was pushed, [`ReportError::PictureSize`] if a side exceeds GIF's limit of
+    /// 65535.
     pub fn finish(mut self) -> Result<Animation, ReportError> {
         self.frames.extend(self.left_out.take());
         let Some(still) = self.frames.last().cloned() else {
@@ -162,16 +161,16 @@ impl AnimationRecorder {
     }
 }
 
-/// What is given up for a smaller file.
+/// Reductions for a smaller file.
 #[derive(Debug, Clone, Copy)]
 struct Economy {
-    /// Colours in the palette; one more entry stands for "unchanged".
+    /// Number of colours in the palette; one more entry means "unchanged".
     num_colors: usize,
     /// Largest difference of a channel that counts as unchanged.
     tolerance: u8,
-    /// Each how many frames one is kept.
+    /// Every `stride`-th frame is kept.
     stride: usize,
-    /// Factor on the sides.
+    /// Scale factor of the sides.
     scale: f64,
 }
 
@@ -248,11 +247,11 @@ fn encode_gif(
                 indices[start..start + usize::from(region_width)].iter().copied()
             })
             .collect::<Vec<u8>>();
-        // Hundredths of a second, rounded so that the whole keeps its pace.
+        // Delays in hundredths of a second, rounded so that the total duration is kept.
         let ticks = |frame: usize| (frame as f64 * 100.0 * economy.stride as f64 / fps).round();
         let pause = if order + 1 == kept.len() { 100.0 * hold_last_secs.max(0.0) } else { 0.0 };
         let frame = Frame {
-            // Browsers show a delay under 2 hundredths as 10.
+            // Browsers show a delay of less than 2 hundredths as 10.
             delay: (ticks(order + 1) - ticks(order) + pause).clamp(2.0, 65_535.0) as u16,
             dispose: DisposalMethod::Keep,
             transparent: Some(unchanged),
@@ -276,7 +275,7 @@ fn encode_gif(
     Ok((bytes, kept.len()))
 }
 
-/// Left, top, width and height of what changed; one pixel where nothing did, for a frame must not be empty.
+/// Left, top, width and height of the changed region; one pixel if nothing changed, because a frame must not be empty.
 fn changed_region(indices: &[u8], unchanged: u8, columns: u16, rows: u16) -> (u16, u16, u16, u16) {
     let (mut left, mut top, mut right, mut bottom) = (columns, rows, 0, 0);
     for (row, line) in (0..rows).zip(indices.chunks_exact(usize::from(columns))) {
@@ -292,18 +291,18 @@ fn changed_region(indices: &[u8], unchanged: u8, columns: u16, rows: u16) -> (u1
     if bottom == 0 { (0, 0, 1, 1) } else { (left, top, right - left, bottom - top) }
 }
 
-/// Colours that serve all frames.
+/// Colours for all frames.
 struct Palette {
     rgb: Vec<[u8; 3]>,
-    /// Nearest entry for each colour met so far.
+    /// Nearest entry for each colour looked up so far.
     nearest: HashMap<[u8; 3], u8>,
 }
 
-/// Pixels that the palette is learnt from, at most.
+/// Maximum number of pixels from which the palette is computed.
 const PALETTE_SAMPLES: usize = 300_000;
 
 impl Palette {
-    /// The very colours of the frames when they are few, a palette learnt from evenly drawn pixels when not.
+    /// The frames' own colours if they are few, otherwise a palette computed from evenly sampled pixels.
     fn of(frames: &[Cow<'_, RgbImage>], num_colors: usize) -> Self {
         let mut distinct = HashSet::new();
         let few = frames.iter().flat_map(|frame| frame.pixels()).all(|pixel| {
@@ -312,7 +311,7 @@ impl Palette {
         });
         let rgb = if few {
             let mut colors: Vec<[u8; 3]> = distinct.into_iter().collect();
-            // A hash set has no order of its own, and the same frames must give the same file.
+            // A hash set has no fixed order, and the same frames must give the same file.
             colors.sort_unstable();
             colors
         } else {
@@ -353,7 +352,7 @@ mod tests {
     use super::*;
     use image::Rgb;
 
-    /// A square that moves two pixels a frame over a coloured slope.
+    /// A square that moves two pixels per frame over a colour gradient.
     fn moving_square(num_frames: u32, width: u32, height: u32) -> Vec<RgbImage> {
         (0..num_frames)
             .map(|time| {
@@ -368,7 +367,7 @@ mod tests {
             .collect()
     }
 
-    /// Frames as a viewer shows them, each drawn over what was there.
+    /// The frames as shown by a viewer, each drawn over the previous one.
     fn decode(bytes: &[u8]) -> (Vec<RgbImage>, Vec<u16>) {
         let mut options = gif::DecodeOptions::new();
         options.set_color_output(gif::ColorOutput::RGBA);
@@ -399,7 +398,7 @@ mod tests {
             let mean = total as f64 / before.as_raw().len() as f64;
             assert!(mean < 4.0, "mean difference {mean} of 255");
         }
-        // 12 frames a second: 100 hundredths for all, and 150 more on the last.
+        // 12 frames per second: 100 hundredths in total, and 150 more for the last.
         assert_eq!(delays.iter().map(|&d| u32::from(d)).sum::<u32>(), 250);
     }
 
@@ -425,7 +424,7 @@ mod tests {
         let frames = moving_square(32, 80, 60);
         let options = AnimationOptions { source_fps: 30.0, fps: 10.0, hold_last_secs: 0.0, ..Default::default() };
         let animation = Animation::encode(&frames, &options).unwrap();
-        // 0, 3, …, 30, and 31 for it is the last.
+        // 0, 3, …, 30, and 31 because it is the last.
         assert_eq!(animation.num_frames(), 12);
         assert_eq!(animation.still(), &frames[31]);
     }

@@ -1,11 +1,11 @@
-//! Grasp attempts as a table and in numbers.
+//! Grasp attempts as a table and in figures.
 
 use sdg_geometry::median;
 
 use crate::chart::Matrix;
 use crate::table::{Cell, Column, Table, Tone};
 
-/// How far a detection was from the truth.
+/// Error of a detection against the ground truth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DetectionError {
     /// Distance of the centres on the table, in millimetres.
@@ -14,28 +14,28 @@ pub struct DetectionError {
     pub angle_deg: f64,
 }
 
-/// One attempt to grasp.
+/// A grasp attempt.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AttemptSummary {
     /// Its number, from 1.
     pub number: usize,
-    /// Where the part lay in the robot's base frame, x and y in millimetres.
+    /// Position of the part in the robot's base frame, x and y in millimetres.
     pub object_mm: [f64; 2],
-    /// How the part was turned, in degrees.
+    /// Angle of the part, in degrees.
     pub object_angle_deg: f64,
-    /// The detection's error, where there was a detection.
+    /// The detection's error, if there was a detection.
     pub detection_error: Option<DetectionError>,
-    /// The step at which it ended, counted from 0: the last one when all went well.
+    /// Index of the step at which it ended, from 0: the last one on success.
     pub step: usize,
     /// Whether the part was held at the end.
     pub success: bool,
     /// Why it failed; empty on success.
     pub why: String,
-    /// How long it took, in seconds.
+    /// Duration in seconds.
     pub duration_secs: f64,
 }
 
-/// The table of attempts, with medians below; `steps` names the steps of an attempt in their order.
+/// The table of attempts, with medians below; `steps` are the names of the steps in order.
 ///
 /// Outcome and step come before the numbers, so that a phone shows them without scrolling.
 #[must_use]
@@ -98,10 +98,10 @@ pub fn attempts_table(steps: &[&str], attempts: &[AttemptSummary]) -> Table {
     ])
 }
 
-/// What was seen against what came of it: rows say how far the last detection was from the truth, columns at which step
-/// (of `steps`) the attempt ended.
+/// Detections against outcomes: rows are classes of the last detection's error, columns the step (of `steps`) at which
+/// the attempt ended.
 ///
-/// `right_mm` and `right_deg` are the largest errors of a detection that counts as right.
+/// `right_mm` and `right_deg` are the maximum errors of a correct detection.
 #[must_use]
 pub fn outcome_matrix(steps: &[&str], attempts: &[AttemptSummary], right_mm: f64, right_deg: f64) -> Matrix {
     let seen = |attempt: &AttemptSummary| match attempt.detection_error {

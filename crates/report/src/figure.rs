@@ -1,4 +1,4 @@
-//! Pictures on the page: photographs as JPEG, animations as GIF, both inside the page itself.
+//! Pictures on the page: photographs as JPEG, animations as GIF, both embedded in the page.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -24,12 +24,12 @@ enum Picture {
     Animation(Animation),
 }
 
-/// How photographs are stored on the page.
+/// Encoding of photographs on the page.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PhotoQuality {
     /// JPEG quality, 1 to 100.
     pub(crate) jpeg: u8,
-    /// Columns at most.
+    /// Maximum width.
     pub(crate) max_width: u32,
 }
 
@@ -40,7 +40,7 @@ impl Figure {
         Self { picture: Picture::Photo(image), alt: None, caption: None }
     }
 
-    /// A moving picture; readers who prefer no motion get its last frame.
+    /// An animated picture; readers who prefer no motion get its last frame.
     #[must_use]
     pub fn animation(animation: Animation) -> Self {
         Self { picture: Picture::Animation(animation), alt: None, caption: None }
@@ -53,7 +53,7 @@ impl Figure {
         self
     }
 
-    /// What the picture shows, for those who do not see it; the caption stands in when this is not given.
+    /// A description for readers who cannot see the picture; default: the caption.
     #[must_use]
     pub fn alt(mut self, alt: impl Into<String>) -> Self {
         self.alt = Some(alt.into());
@@ -64,7 +64,7 @@ impl Figure {
         matches!(self.picture, Picture::Photo(_))
     }
 
-    /// The figure as HTML, photographs no wider than the quality allows.
+    /// The figure as HTML, with photographs reduced to the maximum width.
     pub(crate) fn to_html(&self, quality: PhotoQuality) -> Result<String, ReportError> {
         let alt = escape(self.alt.as_ref().or(self.caption.as_ref()).map_or("", String::as_str));
         let mut html = String::from("<figure class=\"picture\">");
@@ -93,7 +93,7 @@ fn data_address(format: &str, bytes: &[u8]) -> String {
     format!("data:image/{format};base64,{}", STANDARD.encode(bytes))
 }
 
-/// Width and height stand in the element, so that the page does not jump while it is laid out.
+/// The element has width and height, so that the page's layout does not shift.
 fn image_element(format: &str, bytes: &[u8], width: u32, height: u32, alt: &str) -> String {
     format!("<img src=\"{}\" width=\"{width}\" height=\"{height}\" alt=\"{alt}\">", data_address(format, bytes))
 }

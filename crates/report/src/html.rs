@@ -1,4 +1,4 @@
-//! Text and numbers as they stand on the page.
+//! Text and numbers in HTML.
 
 /// Escapes text for element content and for quoted attribute values.
 ///
@@ -21,7 +21,7 @@ pub fn escape(text: &str) -> String {
     escaped
 }
 
-/// Formats a number with fixed decimals, a true minus sign, and a dash where there is no number.
+/// Formats a number with fixed decimals, a true minus sign, and a dash if it is not finite.
 #[must_use]
 pub fn format_number(value: f64, decimals: usize) -> String {
     if !value.is_finite() {
@@ -29,7 +29,7 @@ pub fn format_number(value: f64, decimals: usize) -> String {
     }
     let formatted = format!("{value:.decimals$}");
     match formatted.strip_prefix('-') {
-        // Rounding may leave "-0.0", which says nothing that "0.0" does not.
+        // Rounding may give "-0.0", which means the same as "0.0".
         Some(digits) if digits.bytes().all(|b| matches!(b, b'0' | b'.')) => digits.to_owned(),
         Some(digits) => format!("\u{2212}{digits}"),
         None => formatted,

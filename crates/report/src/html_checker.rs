@@ -1,10 +1,10 @@
-//! Reads HTML strictly: for tests of what the other modules write.
+//! A strict HTML parser for tests of the other modules.
 
-/// Elements that have no end tag.
+/// Elements without an end tag.
 const VOID: [&str; 5] = ["meta", "link", "img", "br", "source"];
 
-/// Panics unless each tag is closed in order, each attribute quoted and given once, each `&` the start of an
-/// entity, and each `id` unique.
+/// Panics unless each tag is closed in order, each attribute is quoted and unique, each `&` starts an entity, and each
+/// `id` is unique.
 pub(crate) fn assert_well_formed(html: &str) {
     let mut open: Vec<String> = Vec::new();
     let mut ids = std::collections::HashSet::new();
@@ -33,7 +33,7 @@ pub(crate) fn assert_well_formed(html: &str) {
     assert!(open.is_empty(), "left open: {open:?}");
 }
 
-/// The tag up to the `>` that ends it, which is the first outside quotes.
+/// The tag up to its closing `>`, which is the first one outside quotes.
 fn split_tag(text: &str) -> (&str, &str) {
     let mut quoted = false;
     for (at, character) in text.char_indices() {

@@ -1,4 +1,4 @@
-//! Reports of runs: pictures with marks on them, curves, tables and animations on one self-contained page.
+//! Reports of runs: pictures with marks, curves, tables and animations on one self-contained page.
 //!
 //! ```text
 //! RgbImage ─ draw_demonstration, draw_detection ─ Figure ─┐
@@ -6,11 +6,11 @@
 //! numbers  ─ Chart, Matrix, ShareChart, Table, KeyFigure ─┼─ Section ─ Report ─ DIR/index.html
 //! ```
 //!
-//! The page is one file that fetches nothing and runs no script: pictures stand in it as base64, charts as inline
-//! SVG. It follows the reader's light or dark theme, folds to a phone's width, and prints.
+//! The page is one file that loads nothing and runs no script: pictures are embedded as base64, charts as inline SVG.
+//! It follows the reader's light or dark theme, adapts to a phone's width, and can be printed.
 //!
-//! What is deliberately absent: grasp models, simulation and burn. The types here are plain data, so that the
-//! crate compiles in seconds and any caller with numbers can report them.
+//! Deliberately absent: grasp models, simulation and burn. The types here are plain data, so that the crate compiles in
+//! seconds and can be used by any caller.
 //!
 //! ```
 //! use image::RgbImage;

@@ -1,4 +1,4 @@
-//! The page: title, key figures and sections, written as one file of a bounded size.
+//! The page: title, key figures and sections, written as one file of limited size.
 
 use std::path::{Path, PathBuf};
 
@@ -8,10 +8,10 @@ use crate::html::{escape, slug};
 use crate::section::Section;
 use crate::table::Tone;
 
-/// The page's size that photographs are made to fit, in bytes.
+/// Target size of the page in bytes; photographs are compressed to reach it.
 const PAGE_BYTES: usize = 4_000_000;
 
-/// Tried in turn until the page fits; the last is taken whatever comes of it.
+/// Tried in order until the page fits; the last one is used in any case.
 const QUALITIES: [PhotoQuality; 4] = [
     PhotoQuality { jpeg: 86, max_width: 1280 },
     PhotoQuality { jpeg: 76, max_width: 1280 },
@@ -19,7 +19,7 @@ const QUALITIES: [PhotoQuality; 4] = [
     PhotoQuality { jpeg: 52, max_width: 640 },
 ];
 
-/// A number that the reader should see first.
+/// A number shown prominently.
 #[derive(Debug, Clone, PartialEq)]
 pub struct KeyFigure {
     value: String,
@@ -29,7 +29,7 @@ pub struct KeyFigure {
 }
 
 impl KeyFigure {
-    /// A number, its unit (or `of 10`), and what it says: `142`, `s`, `to teach`.
+    /// A number, its unit (or `of 10`), and its meaning: `142`, `s`, `to teach`.
     #[must_use]
     pub fn new(value: impl Into<String>, unit: impl Into<String>, label: impl Into<String>) -> Self {
         Self { value: value.into(), unit: unit.into(), label: label.into(), tone: Tone::Plain }
@@ -80,21 +80,21 @@ impl Report {
         }
     }
 
-    /// A few words over the title: what kind of run this was.
+    /// A few words above the title: the kind of run.
     #[must_use]
     pub fn kicker(mut self, kicker: impl Into<String>) -> Self {
         self.kicker = Some(kicker.into());
         self
     }
 
-    /// A sentence or two under the title: what happened.
+    /// One or two sentences under the title: a summary.
     #[must_use]
     pub fn lead(mut self, lead: impl Into<String>) -> Self {
         self.lead = Some(lead.into());
         self
     }
 
-    /// Adds a number to see at a glance; three to five make a good row.
+    /// Adds a key figure; three to five fit in a row.
     #[must_use]
     pub fn key_figure(mut self, key_figure: KeyFigure) -> Self {
         self.key_figures.push(key_figure);
@@ -124,10 +124,10 @@ impl Report {
 
     /// The page as HTML. The same report gives the same bytes.
     ///
-    /// Photographs are stored at a quality that keeps the page under about 4 MB where that can be done.
+    /// Photographs are compressed so that the page is smaller than about 4 MB if possible.
     ///
     /// # Errors
-    /// [`ReportError::PictureSize`] and [`ReportError::Jpeg`] when a picture cannot be encoded.
+    /// [`ReportError::PictureSize`] and [`ReportError::Jpeg`] if a picture cannot be encoded.
     pub fn to_html(&self) -> Result<String, ReportError> {
         let has_photo =
             self.cover.as_ref().is_some_and(Figure::is_photo) || self.sections.iter().any(Section::has_photo);
@@ -143,11 +143,11 @@ impl Report {
 
     /// Writes the page to `folder/index.html` and returns that path; a missing folder is created.
     ///
-    /// A previous page stands until the new one is complete.
+    /// An existing page is kept until the new one is complete.
     ///
     /// # Errors
-    /// Those of [`Report::to_html`], and [`ReportError::Folder`] and
-    /// [`ReportError::File`] when the folder or the file cannot be made.
+    /// Those of [`Report::to_html`], and [`ReportError::Folder`] and [`ReportError::File`] if the folder or the file
+    /// cannot be created.
     pub fn write(&self, folder: &Path) -> Result<PathBuf, ReportError> {
         let html = self.to_html()?;
         std::fs::create_dir_all(folder).map_err(|source| ReportError::Folder { path: folder.to_owned(), source })?;
@@ -196,19 +196,19 @@ impl Report {
         Ok(html + "</body></html>\n")
     }
 
-    /// An anchor for each section, made of its title; the number in front keeps equal titles apart.
+    /// An anchor for each section, from its title; a leading number distinguishes equal titles.
     fn section_ids(&self) -> Vec<String> {
         self.sections.iter().zip(1..).map(|(section, number)| format!("s{number}-{}", slug(&section.title))).collect()
     }
 }
 
-/// The policy forbids the browser to fetch anything at all, whatever may slip into the page.
+/// The policy forbids the browser to load anything, whatever the page contains.
 const HEAD_START: &str = "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\">\
 <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\
 <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; style-src 'unsafe-inline'\">\
 <meta name=\"color-scheme\" content=\"light dark\"><link rel=\"icon\" href=\"data:,\">";
 
-/// Two jaws and what they hold.
+/// The icon: two jaws and a part.
 const GRIPPER: &str = "<svg class=\"gripper\" viewBox=\"0 0 24 24\" aria-hidden=\"true\">\
 <path d=\"M3 5h3v14H3zM18 5h3v14h-3z\"/><path class=\"part\" d=\"M9 12h6\"/></svg>";
 
@@ -265,7 +265,7 @@ mod tests {
     #[test]
     fn nothing_is_fetched_from_anywhere() {
         let html = full_report("text").to_html().unwrap();
-        // Base64 may hold anything that looks like an address; what is left of the page may not.
+        // Base64 may contain anything that looks like an address; the rest of the page may not.
         let mut parts = html.split("base64,");
         let mut text = parts.next().unwrap().to_owned();
         text.extend(parts.map(|part| part.split_once('"').unwrap().1));

@@ -1,4 +1,4 @@
-//! A section of the page: its blocks, and how each is written as HTML.
+//! A section of the page: its blocks, and their HTML.
 
 use crate::chart::{Chart, Matrix, ShareChart};
 use crate::error::ReportError;
@@ -6,14 +6,14 @@ use crate::figure::{Figure, PhotoQuality};
 use crate::html::escape;
 use crate::table::{Table, Tone};
 
-/// How wide the pictures of a gallery are.
+/// Width of a gallery's pictures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GallerySize {
-    /// Many to a row: samples to glance at.
+    /// Many per row: samples.
     Small,
-    /// Three or so to a row: detections to look at.
+    /// About three per row: detections.
     Medium,
-    /// Two to a row.
+    /// Two per row.
     Large,
 }
 
@@ -31,7 +31,7 @@ enum Block {
     Command(String),
 }
 
-/// A part of the page under a heading of its own.
+/// A part of the page with its own heading.
 #[derive(Debug, Clone)]
 pub struct Section {
     pub(crate) title: String,
@@ -46,7 +46,7 @@ impl Section {
         Self { title: title.into(), lead: None, blocks: Vec::new() }
     }
 
-    /// A sentence or two beside the heading: what is to be seen here.
+    /// One or two sentences beside the heading: the contents of the section.
     #[must_use]
     pub fn lead(mut self, lead: impl Into<String>) -> Self {
         self.lead = Some(lead.into());
@@ -59,19 +59,19 @@ impl Section {
         self.with(Block::Paragraph(text.into()))
     }
 
-    /// Adds a paragraph that stands out.
+    /// Adds a highlighted paragraph.
     #[must_use]
     pub fn notice(self, tone: Tone, text: impl Into<String>) -> Self {
         self.with(Block::Notice(tone, text.into()))
     }
 
-    /// Adds a picture over the whole width.
+    /// Adds a picture of full width.
     #[must_use]
     pub fn figure(self, figure: Figure) -> Self {
         self.with(Block::Figure(figure))
     }
 
-    /// Adds pictures side by side; they fold to the screen's width.
+    /// Adds pictures side by side; they wrap to the screen's width.
     #[must_use]
     pub fn gallery(self, size: GallerySize, figures: Vec<Figure>) -> Self {
         self.with(Block::Gallery(size, figures, None))
@@ -83,7 +83,7 @@ impl Section {
         self.with(Block::Gallery(size, figures, Some(caption.into())))
     }
 
-    /// Adds charts, two to a row where there is room.
+    /// Adds charts, two per row if there is room.
     #[must_use]
     pub fn charts(self, charts: Vec<Chart>) -> Self {
         self.with(Block::Charts(charts))
@@ -107,13 +107,13 @@ impl Section {
         self.with(Block::Table(table))
     }
 
-    /// Adds facts, each a name and a value: seed, preset, machine, versions.
+    /// Adds facts, pairs of a name and a value: seed, preset, machine, versions.
     #[must_use]
     pub fn facts<K: Into<String>, V: Into<String>>(self, facts: impl IntoIterator<Item = (K, V)>) -> Self {
         self.with(Block::Facts(facts.into_iter().map(|(name, value)| (name.into(), value.into())).collect()))
     }
 
-    /// Adds a command line, to be copied.
+    /// Adds a command line for copying.
     #[must_use]
     pub fn command(self, command: impl Into<String>) -> Self {
         self.with(Block::Command(command.into()))

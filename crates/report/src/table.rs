@@ -1,18 +1,18 @@
-//! Tables with aligned figures.
+//! Tables with aligned numbers.
 
 use crate::html::{escape, format_number};
 
-/// Whether something is well, wrong, or neither.
+/// The rating of a value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Tone {
-    /// Without a colour.
+    /// None: without colour.
     #[default]
     Plain,
-    /// As it should be.
+    /// Good.
     Good,
     /// Needs attention.
     Warning,
-    /// Not as it should be.
+    /// Bad.
     Bad,
 }
 
@@ -27,32 +27,32 @@ impl Tone {
     }
 }
 
-/// What one cell holds.
+/// The content of a cell.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Cell {
     /// Text, aligned left.
     Text(String),
-    /// A number with fixed decimals; a dash when it is not finite.
+    /// A number with fixed decimals; a dash if it is not finite.
     Number {
         /// The number.
         value: f64,
         /// Digits after the point.
         decimals: usize,
     },
-    /// A verdict in a word or two, with the reason under it.
+    /// A verdict in a word or two, with the reason below.
     Verdict {
-        /// How it is coloured.
+        /// Its colour.
         tone: Tone,
         /// The verdict.
         text: String,
-        /// The reason, if there is one to give.
+        /// The reason, if any.
         note: Option<String>,
     },
-    /// Progress through a number of steps.
+    /// Progress in a number of steps.
     Progress {
-        /// Steps done.
+        /// Number of finished steps.
         done: usize,
-        /// Steps in all.
+        /// Total number of steps.
         total: usize,
         /// The last step's name.
         label: String,
@@ -72,7 +72,7 @@ impl Cell {
         Self::Number { value, decimals }
     }
 
-    /// A dash: there is no such number.
+    /// A dash: no value.
     #[must_use]
     pub fn missing() -> Self {
         Self::Number { value: f64::NAN, decimals: 0 }
@@ -108,12 +108,12 @@ impl Cell {
     }
 }
 
-/// Text inside a table's cell: on one line, without bars that would end the cell.
+/// Text in a table cell: on one line, with escaped bars.
 fn escape_markdown(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ").replace('|', "\\|")
 }
 
-/// A column: its heading, its unit, and the heading it shares with its neighbours.
+/// A column: its heading, its unit, and its group heading.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Column {
     heading: String,
@@ -123,13 +123,13 @@ pub struct Column {
 }
 
 impl Column {
-    /// A column of words, set to the left.
+    /// A column of text, aligned left.
     #[must_use]
     pub fn text(heading: impl Into<String>) -> Self {
         Self { heading: heading.into(), unit: None, group: None, numeric: false }
     }
 
-    /// A column of numbers, set to the right.
+    /// A column of numbers, aligned right.
     #[must_use]
     pub fn number(heading: impl Into<String>) -> Self {
         Self { numeric: true, ..Self::text(heading) }
@@ -142,7 +142,7 @@ impl Column {
         self
     }
 
-    /// The same column under a common heading; neighbours with the same group share it.
+    /// The same column in a group; neighbours in the same group share its heading.
     #[must_use]
     pub fn group(mut self, group: impl Into<String>) -> Self {
         self.group = Some(group.into());
@@ -186,7 +186,7 @@ impl Table {
     /// Adds a row.
     ///
     /// # Panics
-    /// When the row has not one cell for each column.
+    /// If the number of cells differs from the number of columns.
     #[must_use]
     pub fn row(mut self, cells: Vec<Cell>) -> Self {
         self.check(&cells);
@@ -194,10 +194,10 @@ impl Table {
         self
     }
 
-    /// Sets the last row, apart from the others: medians, totals.
+    /// Sets the last row, separated from the others: medians, totals.
     ///
     /// # Panics
-    /// When the row has not one cell for each column.
+    /// If the number of cells differs from the number of columns.
     #[must_use]
     pub fn summary(mut self, cells: Vec<Cell>) -> Self {
         self.check(&cells);
@@ -210,7 +210,7 @@ impl Table {
     }
 
     pub(crate) fn to_html(&self) -> String {
-        // The box scrolls sideways on a small screen; tabindex lets a keyboard scroll it.
+        // The box scrolls horizontally on a small screen; tabindex makes it scrollable by keyboard.
         let mut html = String::from("<figure class=\"table\"><div class=\"scroll\" tabindex=\"0\"><table><thead>");
         if self.columns.iter().any(|column| column.group.is_some()) {
             html += "<tr class=\"groups\">";
@@ -251,7 +251,7 @@ impl Table {
         html + "</figure>"
     }
 
-    /// The table as Markdown, its caption below. A column under a common heading carries both.
+    /// The table as Markdown, with its caption below. The heading of a grouped column contains both headings.
     #[must_use]
     pub fn to_markdown(&self) -> String {
         let headings: Vec<String> = self.columns.iter().map(Column::to_markdown).collect();

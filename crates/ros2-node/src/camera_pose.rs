@@ -1,4 +1,4 @@
-//! Where the camera is: as its file says, or by tf at the picture's time.
+//! The camera's pose: from its file, or from tf at the picture's time.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -13,23 +13,23 @@ use sdg_ros2::{RosError, Transforms, camera_info};
 
 use crate::lines::Lines;
 
-/// How often a thread looks whether it is to end.
+/// Interval at which a thread checks whether it must end.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
 
-/// Where the camera's pose comes from.
+/// Source of the camera's pose.
 #[derive(Debug, Clone)]
 pub enum CameraPoseSource {
-    /// Nowhere: detections have no poses.
+    /// None: detections have no poses.
     Unknown,
     /// The camera's file.
     File(CameraOverTable),
-    /// tf; intrinsics of the camera's file, or else of camera_info.
+    /// tf; intrinsics from the camera's file, else from camera_info.
     Transforms {
         /// The frame of the robot's base.
         base_frame: String,
         /// z of the table in that frame.
         table_height_m: f64,
-        /// Those of the camera's file.
+        /// Intrinsics from the camera's file.
         intrinsics: Option<PinholeCamera>,
     },
 }
@@ -39,7 +39,7 @@ struct Known {
     sent: Option<Result<PinholeCamera, String>>,
 }
 
-/// Follows tf and camera_info in threads.
+/// Receives tf and camera_info on threads.
 pub(super) struct CameraPoseReader {
     source: CameraPoseSource,
     known: Arc<Mutex<Known>>,
@@ -96,14 +96,14 @@ impl CameraPoseReader {
         }));
     }
 
-    /// The camera over the table when a picture was taken; `None` where nothing says where it is.
+    /// The camera over the table at the time of a picture; `None` if no pose is known.
     pub(super) fn at(&self, header: &Header) -> Result<Option<CameraOverTable>, RosError> {
         let known = lock(&self.known);
         let refused = |expected: &str, found: String| RosError::CameraInfo { expected: expected.to_owned(), found };
         match &self.source {
             CameraPoseSource::Unknown => Ok(None),
             CameraPoseSource::File(over_table) => {
-                // A camera_info that cannot be read says nothing against the file.
+                // An unreadable camera_info does not affect the file.
                 if let Some(Ok(sent)) = &known.sent {
                     camera_info::check_same_camera(&over_table.camera.intrinsics, sent)?;
                 }

@@ -1,4 +1,4 @@
-//! `~/grasp`: the grasp sequence with an arm behind ROS 2, in a thread.
+//! `~/grasp`: the grasp sequence with an arm behind ROS 2, on a thread.
 
 use std::sync::Arc;
 use std::thread::JoinHandle;
@@ -19,25 +19,25 @@ use sdg_ros2::messages::{GraspRequest, GraspResponse, Header, PoseStamped, Time}
 use crate::pictures::Shared;
 use crate::settings::IsInterrupted;
 
-/// How long a picture that was taken after the arm stopped is waited for.
+/// Maximum wait for a picture taken after the arm stopped.
 const PATIENCE: Duration = Duration::from_secs(5);
 
-/// What a grasp needs besides an arm and a model.
+/// The inputs of a grasp besides the arm and the model.
 #[derive(Debug, Clone)]
 pub struct GraspSettings {
-    /// The cell, with the limits of motions in it.
+    /// The workcell, with the limits of motions.
     pub workcell: Workcell,
     /// The camera of the pictures.
     pub camera: MountedCamera,
-    /// The height that was told, which is measured otherwise.
+    /// The given height; without it, the height is measured.
     pub told: Option<ToldHeight>,
-    /// Share of the joints' velocity limits, unless a request says another.
+    /// Share of the joints' velocity limits, unless a request gives another.
     pub speed: f64,
-    /// The frame of poses in answers.
+    /// The frame of poses in responses.
     pub base_frame: String,
 }
 
-/// The newest picture of the topic, once the arm is at rest.
+/// The newest picture of the topic, after the arm has stopped.
 #[derive(Clone)]
 struct TopicPictures(Arc<Shared>);
 
@@ -52,7 +52,7 @@ impl<A: Arm> Pictures<A> for TopicPictures {
     }
 }
 
-/// Remembers the last step that was begun.
+/// Records the last step that was begun.
 struct LastStep(GraspStep);
 
 impl<A: Arm> StepObserver<A> for LastStep {
@@ -64,14 +64,14 @@ impl<A: Arm> StepObserver<A> for LastStep {
 
 type Ended = (TrajectoryArm, GraspResponse, Option<String>);
 
-/// The arm, and a grasp under way.
+/// The arm, and a running grasp.
 pub(super) struct Grasping {
     settings: Arc<GraspSettings>,
     pictures: TopicPictures,
     is_interrupted: IsInterrupted,
     arm: Option<TrajectoryArm>,
     running: Option<JoinHandle<Ended>>,
-    /// Why nothing moves any more.
+    /// Why motions are blocked.
     latched: Option<String>,
 }
 
@@ -95,7 +95,7 @@ impl Grasping {
     /// Begins a grasp.
     ///
     /// # Errors
-    /// A speed that is none, a model without lengths, and an arm that stopped before.
+    /// The speed is invalid, the model has no lengths, or the arm was stopped before.
     pub(super) fn begin(&mut self, request: &GraspRequest, model: &GraspModel) -> Result<()> {
         if let Some(why) = &self.latched {
             anyhow::bail!("nothing moves until a person has looked and starts the node again: {why}");
@@ -131,7 +131,7 @@ impl Grasping {
         Ok(())
     }
 
-    /// What became of the grasp; `None` while it goes on.
+    /// The result of the grasp; `None` while it is running.
     pub(super) fn finished(&mut self) -> Option<GraspResponse> {
         if !self.running.as_ref().is_some_and(JoinHandle::is_finished) {
             return None;
@@ -181,13 +181,13 @@ fn grasped(
     (answer, latched)
 }
 
-/// Stops the arm where the node is to end.
+/// A watch that stops the arm when the node must end.
 fn watch(is_interrupted: &IsInterrupted) -> Watch {
     let is_interrupted = Arc::clone(is_interrupted);
     Watch::new(Box::new(move || is_interrupted().then_some(StopReason::Interrupted)))
 }
 
-/// The same with an arm that moves nothing, from where the real one stands.
+/// Plans the same without moving, from the arm's current posture.
 fn planned(
     settings: &GraspSettings,
     config: &GraspConfig,

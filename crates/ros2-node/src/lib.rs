@@ -1,4 +1,4 @@
-//! A node of ROS 2 that detects, teaches and grasps.
+//! A ROS 2 node that detects, teaches and grasps.
 //!
 //! ```text
 //! image ─ PictureReader: a thread ─ queue ─┐                     ┌─ Topics: pose, detections, overlay, tf, diagnostics
@@ -6,10 +6,11 @@
 //!                                             run: this thread       Teaching, Grasping: a thread each, while they go on
 //! ```
 //!
-//! What is deliberately absent: arguments and the reading of files but of the model that was taught. Settings come in as [`Settings`]
-//! and [`GraspSettings`], teaching as a function of a [`TeachJob`], so that the node teaches as its caller does.
+//! Deliberately absent: arguments, and reading files other than the taught model. Settings are passed as [`Settings`]
+//! and [`GraspSettings`], teaching as a function of a [`TeachJob`], so that the node teaches in the same way as its
+//! caller.
 //!
-//! Without the feature `dds` the crate is empty: a build of the whole workspace compiles no RustDDS.
+//! Without the feature `dds` the crate is empty: a build of the whole workspace does not compile RustDDS.
 #![cfg(feature = "dds")]
 #![forbid(unsafe_code)]
 #![cfg_attr(test, allow(clippy::unwrap_used))]
@@ -44,13 +45,13 @@ use sdg_inputs::one_line;
 use searching::Searcher;
 use services::{Change, Services};
 
-/// Without a picture, requests are looked at so often.
+/// Interval of checks for requests while there is no picture.
 const LOOK_EVERY: Duration = Duration::from_millis(5);
 
-/// Works until `is_interrupted` says so.
+/// Runs until `is_interrupted` returns true.
 ///
 /// # Errors
-/// What cannot be opened on the network; nothing that arrives ends the node.
+/// A network resource cannot be opened; received data never end the node.
 pub fn run(
     mut node: Node,
     settings: Settings,

@@ -1,20 +1,20 @@
-//! Lines on standard error about what goes wrong again and again.
+//! Lines on standard error about repeated problems.
 
 use std::collections::HashMap;
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// The same complaint is printed again after this.
+/// Time after which the same message is printed again.
 const AGAIN_AFTER: Duration = Duration::from_secs(2);
-/// Different complaints that are remembered.
+/// Maximum number of different messages that are remembered.
 const MAX_REMEMBERED: usize = 200;
 
-/// Prints each complaint at once, and its repetitions every two seconds with their number.
+/// Prints each message at once, and its repetitions every two seconds with their number.
 #[derive(Debug, Default)]
 pub(super) struct Lines(Mutex<HashMap<String, (Instant, u64)>>);
 
 impl Lines {
-    /// Numbers in a complaint do not make it another.
+    /// Messages that differ only in numbers count as the same.
     pub(super) fn complain(&self, text: &str) {
         if let Some(line) = self.line(text, Instant::now()) {
             eprintln!("sdg ros2: {line}");

@@ -1,4 +1,4 @@
-//! Pictures from a topic: received and decoded in a thread, kept until they are searched.
+//! Pictures from a topic: received and decoded on a thread, queued until they are searched.
 
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -13,7 +13,7 @@ use sdg_ros2::{PictureError, RosError, encoding};
 
 use crate::lines::Lines;
 
-/// How often a thread looks whether it is to end.
+/// Interval at which a thread checks whether it must end.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
 
 /// A picture with its origin.
@@ -22,11 +22,11 @@ pub(super) struct Picture {
     pub(super) header: Header,
     pub(super) picture: Arc<RgbImage>,
     pub(super) arrived: Instant,
-    /// By the stamp, or by the arrival where the stamp is of another clock.
+    /// Time of the stamp, or of the arrival if the stamp is from another clock.
     pub(super) captured: SystemTime,
 }
 
-/// What was counted.
+/// Counters.
 #[derive(Debug, Default)]
 pub(super) struct Counts {
     pub(super) received: AtomicU64,
@@ -41,7 +41,7 @@ struct Kept {
     newest: Option<Picture>,
 }
 
-/// The pictures that wait, and the newest one.
+/// The queued pictures, and the newest one.
 pub(super) struct Shared {
     kept: Mutex<Kept>,
     changed: Condvar,
@@ -55,7 +55,7 @@ impl Shared {
         self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The next picture that waits.
+    /// The next queued picture.
     pub(super) fn next(&self, timeout: Duration) -> Option<Picture> {
         let kept = self.lock();
         let waited = self.changed.wait_timeout_while(kept, timeout, |kept| kept.waiting.is_empty());

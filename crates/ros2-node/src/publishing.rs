@@ -1,4 +1,4 @@
-//! What was found and how the node is, as topics.
+//! Publishes detections and the node's state as topics.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -18,9 +18,9 @@ use crate::lines::Lines;
 use crate::pictures::PictureReader;
 use crate::searching::Searched;
 
-/// Diagnostics are published this often.
+/// Interval of diagnostics.
 const DIAGNOSTICS_EVERY: Duration = Duration::from_secs(1);
-/// Without a picture for so long the camera is stale.
+/// Time without a picture after which the camera is stale.
 const STALE_AFTER: Duration = Duration::from_secs(2);
 /// The grasp's frame in tf.
 const GRASP_FRAME: &str = "sdg_grasp";
@@ -63,12 +63,13 @@ impl Topics {
         })
     }
 
-    /// The topics' absolute names, for who starts the node.
+    /// The topics' absolute names, for display at the start.
     pub(super) fn names(&self) -> String {
         [self.poses.topic(), self.detections.topic(), self.overlays.topic()].join(", ")
     }
 
-    /// Publishes what was found in a picture: the pose of the best part, all detections, the overlay where somebody looks at it.
+    /// Publishes the results of a picture: the pose of the best part, all detections, and the overlay if it has
+    /// subscribers.
     pub(super) fn publish(&mut self, node: &Node, searched: &Searched) {
         let header = &searched.header;
         if let Some((camera_from_tcp, _)) = searched.found.first().and_then(|part| part.grasp) {
@@ -106,7 +107,7 @@ impl Topics {
         }
     }
 
-    /// Publishes diagnostics, where it is time.
+    /// Publishes diagnostics if they are due.
     pub(super) fn diagnose(&mut self, reader: &PictureReader, has_model: bool) {
         if self.last_diagnostics.elapsed() < DIAGNOSTICS_EVERY {
             return;

@@ -1,4 +1,4 @@
-//! A picture searched: what was found, in pixels and over the table.
+//! Searches pictures: detections in pixels and over the table.
 
 use std::path::Path;
 use std::time::Instant;
@@ -13,9 +13,9 @@ use sdg_ros2::messages::Header;
 
 use crate::pictures::Picture;
 
-/// A grasp model, and the camera behind which it looks.
+/// A grasp model, and the camera that it uses.
 pub(super) struct Searcher {
-    /// As it was read, for the grasps of an arm.
+    /// The model as read, for the arm's grasps.
     model: Option<GraspModel>,
     perception: Option<Perception>,
     min_score: f64,
@@ -27,7 +27,7 @@ pub(super) struct Searched {
     pub(super) arrived: Instant,
     /// Best first.
     pub(super) found: Vec<FoundPart>,
-    /// The same as they are drawn.
+    /// The same detections in the form for drawing.
     pub(super) detections: Vec<GraspDetection>,
     pub(super) picture: std::sync::Arc<RgbImage>,
     pub(super) search_secs: f64,
@@ -42,7 +42,7 @@ impl Searcher {
     /// Uses another model from now on.
     ///
     /// # Errors
-    /// A file that is no model.
+    /// The file is not a model.
     pub(super) fn change_model(&mut self, path: &Path, device: &Device) -> Result<()> {
         *self = Self::new(Some(sdg_inputs::read_model(path, device)?), self.min_score);
         Ok(())
@@ -52,10 +52,11 @@ impl Searcher {
         self.model.as_ref()
     }
 
-    /// Searches a picture; `over_table` is where its camera was, which a node knows of each picture or of none.
+    /// Searches a picture; `over_table` is its camera's pose, which is known for all pictures of a node or for none.
     ///
     /// # Errors
-    /// No model, one without lengths behind a calibrated camera, a picture of another size than the camera's.
+    /// There is no model, the model has no lengths although the camera is calibrated, or the picture's size differs
+    /// from the camera's.
     pub(super) fn search(&mut self, picture: &Picture, over_table: Option<&CameraOverTable>) -> Result<Searched> {
         const NO_MODEL: &str = "no grasp model yet: start the node with one, or call the service teach";
         let perception = self.perception.as_mut().context(NO_MODEL)?;

@@ -1,4 +1,4 @@
-//! The services: each in full, and as std_srvs/Trigger for who has not built `sdg_interfaces`.
+//! The services: each with its full type, and as std_srvs/Trigger for clients without `sdg_interfaces`.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -19,9 +19,9 @@ use crate::lines::Lines;
 use crate::searching::Searched;
 use crate::teaching::{Teach, TeachJob, Teaching};
 
-/// How long a picture is waited for unless the request says.
+/// Default timeout for a picture.
 const DETECT_TIMEOUT: Duration = Duration::from_secs(5);
-/// Nobody waits longer.
+/// Maximum timeout.
 const MAX_DETECT_TIMEOUT_SECS: f64 = 60.0;
 
 const TRIGGER: ServiceType = ServiceType { package: "std_srvs", name: "Trigger" };
@@ -32,7 +32,7 @@ struct Pair<Q: Cdr + 'static, A: Cdr + 'static> {
     trigger: Server<TriggerRequest, TriggerResponse>,
 }
 
-/// Who asked.
+/// The client of a request.
 #[derive(Clone, Copy)]
 enum Asker {
     Full(RequestId),
@@ -48,7 +48,7 @@ impl<Q: Cdr + Clone + Default + 'static, A: Cdr + 'static> Pair<Q, A> {
         })
     }
 
-    /// The requests that wait; a Trigger is the request with nothing filled in.
+    /// The waiting requests; a Trigger is a request with default values.
     fn requests(&self, lines: &Lines) -> Vec<(Asker, Result<Q, RosError>)> {
         let mut requests = Vec::new();
         loop {
@@ -79,7 +79,7 @@ impl<Q: Cdr + Clone + Default + 'static, A: Cdr + 'static> Pair<Q, A> {
     }
 }
 
-/// A detection that waits for a picture.
+/// A detection request that waits for a picture.
 struct Detecting {
     asker: Asker,
     request: DetectRequest,
@@ -87,13 +87,13 @@ struct Detecting {
     deadline: Instant,
 }
 
-/// What a service changed in the node.
+/// A change of the node's state by a service.
 pub(super) enum Change {
-    /// The node is to detect with this model.
+    /// Detect with this model from now on.
     UseModel(PathBuf),
 }
 
-/// All of them.
+/// All services.
 pub(super) struct Services {
     detect: Pair<DetectRequest, DetectResponse>,
     detecting: Vec<Detecting>,
@@ -131,7 +131,7 @@ impl Services {
         })
     }
 
-    /// Takes requests and answers what is done.
+    /// Receives requests and sends finished responses.
     pub(super) fn work(&mut self, topic: &str, model: Option<&sdg_grasp::GraspModel>) -> Option<Change> {
         self.take_detections();
         self.give_up_detections(topic);
@@ -168,7 +168,7 @@ impl Services {
         }
     }
 
-    /// Answers who waits for a picture that was taken after the call.
+    /// Answers the requests that wait for a picture taken after the call.
     pub(super) fn searched(&mut self, searched: Result<&Searched, String>, arrived: Instant) {
         let (waiting, ready) = std::mem::take(&mut self.detecting).into_iter().partition(|one| one.asked > arrived);
         self.detecting = waiting;
@@ -181,7 +181,7 @@ impl Services {
     fn answer_detection(&self, asker: Asker, answer: Result<DetectResponse, String>) {
         let answer =
             answer.unwrap_or_else(|message| DetectResponse { success: false, message, ..DetectResponse::default() });
-        // Who gets a yes or no alone wants to know whether the part is there.
+        // A client that gets only yes or no asks whether the part is there.
         let found = answer.success && !answer.detections.detections.is_empty();
         let message = answer.message.clone();
         self.detect.answer(asker, answer, found, message, &self.lines);

@@ -1,4 +1,4 @@
-//! What the node works with, read and checked before it joins.
+//! The node's settings, read and checked before it joins ROS 2.
 
 use std::sync::Arc;
 
@@ -8,29 +8,29 @@ use sdg_ros2::dds::Qos;
 use crate::camera_pose::CameraPoseSource;
 use crate::teaching::{Teach, TeachJob};
 
-/// Whether the node is to end, and an arm to stop.
+/// Whether the node must end, and an arm must stop.
 pub type IsInterrupted = Arc<dyn Fn() -> bool + Send + Sync>;
 
 /// A node's settings.
 pub struct Settings {
-    /// What it detects with, until another is taught.
+    /// The model for detection, until another is taught.
     pub model: Option<GraspModel>,
-    /// Where models compute.
+    /// Device of the models.
     pub device: Device,
-    /// Where the camera's pose comes from.
+    /// Source of the camera's pose.
     pub camera_pose: CameraPoseSource,
-    /// How old a transform may be beside the picture's stamp.
+    /// Maximum difference between the stamps of transform and picture, in seconds.
     pub max_transform_age_secs: f64,
-    /// Detections with a lower score are not published.
+    /// Minimum score of published detections.
     pub min_score: f64,
-    /// Pictures that wait while one is searched.
+    /// Maximum number of queued pictures.
     pub queue: usize,
-    /// Whether pictures come as CompressedImage.
+    /// Whether pictures arrive as CompressedImage.
     pub is_compressed: bool,
-    /// How the network hands over pictures.
+    /// Quality of service of the picture subscription.
     pub picture_qos: Qos,
-    /// Teaches, in a thread of its own.
+    /// Teaches on a separate thread.
     pub teach: Arc<Teach>,
-    /// What a Trigger teaches.
+    /// The teaching of the Trigger service.
     pub trigger_teaching: Option<TeachJob>,
 }

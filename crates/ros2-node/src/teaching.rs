@@ -1,4 +1,4 @@
-//! `~/teach`: a teaching in a thread, so that pictures are searched meanwhile.
+//! `~/teach`: teaching on a thread, while pictures are still searched.
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -11,37 +11,37 @@ use sdg_inputs::one_line;
 use sdg_ros2::messages::TeachRequest;
 use tempfile::TempPath;
 
-/// What is to be taught.
+/// The inputs of a teaching.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TeachJob {
-    /// The photo, and after a colon its marks where they have a file of another place.
+    /// The photo, followed by a colon and its marks' file if that is elsewhere.
     pub photo: String,
-    /// The marks' file, where the request named or brought one.
+    /// The marks' file, if the request named or contained one.
     pub marks: Option<PathBuf>,
     /// The file to write.
     pub out: PathBuf,
     /// The grasp model, by letter or name.
     pub model: String,
-    /// Decides every random choice.
+    /// Seed of all random choices.
     pub seed: u64,
-    /// The most that the network's training may take.
+    /// Maximum time for training the network.
     pub time_budget: Option<Duration>,
-    /// Height of the marks over the table, where the camera's file is to be used.
+    /// Height of the marks over the table, if the camera's file is to be used.
     pub mark_height_mm: Option<f64>,
-    /// Whether the node is to detect with it.
+    /// Whether the node then detects with the model.
     pub is_used: bool,
 }
 
-/// Teaches as the caller's own command does, and writes the model.
+/// Teaches in the same way as the caller's own command, and writes the model.
 pub type Teach = dyn Fn(&TeachJob) -> Result<()> + Send + Sync;
 
 impl TeachJob {
-    /// What is taught where a request leaves it open.
+    /// Default model of a request.
     pub const DEFAULT_MODEL: &str = "C";
-    /// The seed where a request names none.
+    /// Default seed of a request.
     pub const DEFAULT_SEED: u64 = 1;
 
-    /// The job of a request, and the marks that came with it.
+    /// The job of a request, and the file of marks sent with it.
     fn read(request: &TeachRequest) -> Result<(Self, Option<TempPath>)> {
         if request.photo_path.is_empty() || request.out_path.is_empty() {
             bail!("expected photo_path and out_path, found \"{}\" and \"{}\"", request.photo_path, request.out_path);
@@ -49,7 +49,7 @@ impl TeachJob {
         let brought = match request.annotation.as_str() {
             "" => None,
             text => {
-                // A new file with a name that nobody can guess: others may write to the folder.
+                // A new file with an unpredictable name: others may be able to write to the folder.
                 let mut file = tempfile::Builder::new().prefix("sdg-marks-").suffix(".json").tempfile()?;
                 file.write_all(text.as_bytes()).with_context(|| file.path().display().to_string())?;
                 Some(file.into_temp_path())
@@ -73,21 +73,21 @@ impl TeachJob {
     }
 }
 
-/// A teaching under way.
+/// A running teaching.
 pub(super) struct Teaching {
     thread: Option<JoinHandle<Result<(), String>>>,
     out: PathBuf,
     started: Instant,
     pub(super) is_used: bool,
-    /// Has the marks that came with the request; removed with it.
+    /// The file of marks sent with the request; removed when dropped.
     _marks: Option<TempPath>,
 }
 
 impl Teaching {
-    /// Begins what a request asks for.
+    /// Begins the teaching of a request.
     ///
     /// # Errors
-    /// What is no request.
+    /// The request is invalid.
     pub(super) fn of_request(request: &TeachRequest, teach: &Arc<Teach>) -> Result<Self> {
         let (job, marks) = TeachJob::read(request)?;
         Ok(Self { _marks: marks, ..Self::begin(job, teach) })
@@ -99,7 +99,7 @@ impl Teaching {
         Self { thread: Some(thread), out, started: Instant::now(), is_used, _marks: None }
     }
 
-    /// The model's file and how long it took, or why there is none; `None` while it goes on.
+    /// The model's file and the duration, or why there is no model; `None` while the teaching is running.
     pub(super) fn finished(&mut self) -> Option<Result<(PathBuf, f64), String>> {
         if !self.thread.as_ref().is_some_and(JoinHandle::is_finished) {
             return None;

@@ -1,4 +1,4 @@
-// The camera: frames as fast as the model looks at them, never more than one on its way.
+// The camera: frames as fast as the model searches them, one at a time.
 
 export class Camera {
   #stream = null;
@@ -8,10 +8,10 @@ export class Camera {
     return this.#stream !== null;
   }
 
-  /** Asks for the camera, the one on the back where there is a choice, and calls `onFrame` with bitmap after bitmap. */
+  /** Opens the camera, preferably the one on the back, and calls `onFrame` with each bitmap. */
   async start(onFrame) {
     if (!navigator.mediaDevices?.getUserMedia) {
-      throw new Error("browsers give a camera only to pages served by https or from this very machine (localhost)");
+      throw new Error("browsers provide a camera only to pages served by https or from this machine (localhost)");
     }
     const wanted = { facingMode: "environment", width: { ideal: 1280 }, height: { ideal: 720 } };
     this.#stream = await navigator.mediaDevices.getUserMedia({ video: wanted, audio: false }).catch((error) => {
@@ -44,7 +44,7 @@ export class Camera {
 function cameraRefused(error) {
   switch (error.name) {
     case "NotAllowedError":
-      return "the camera was not allowed: the browser's address bar has the setting";
+      return "access to the camera was denied: change this in the browser's address bar";
     case "NotFoundError":
       return "no camera was found on this device";
     case "NotReadableError":

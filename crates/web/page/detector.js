@@ -1,4 +1,4 @@
-// The worker seen from the page: a promise for each request, and a new worker where one stopped.
+// The page's interface to the worker: a promise for each request, and a new worker if one stopped.
 
 export class Detector {
   #device;
@@ -7,25 +7,25 @@ export class Detector {
   #waiting = new Map();
   #nextId = 1;
 
-  /** On the processor, or on the graphics card that the browser lends. */
+  /** On the processor, or on the graphics card provided by the browser. */
   constructor(device = "processor") {
     this.#device = device;
     this.#start();
   }
 
-  /** Ends the worker; what was asked of it is answered with an error. */
+  /** Ends the worker; pending requests get an error. */
   close() {
     this.#fail("the model was closed");
   }
 
-  /** Opens a grasp model; what its file says of itself. The bytes stay in the page. */
+  /** Opens a grasp model and returns its metadata. The bytes stay in the page. */
   async open(bytes) {
     const { summary } = await this.#ask({ open: bytes });
     this.#model = bytes;
     return summary;
   }
 
-  /** Detects in a file, or in an `ImageBitmap`, which is given away: `{record, milliseconds, decoded}`. */
+  /** Detects in a file, or in an `ImageBitmap`, whose ownership is transferred: `{record, milliseconds, decoded}`. */
   look(image, verify) {
     return this.#ask({ look: image, verify }, image instanceof ImageBitmap ? [image] : []);
   }
@@ -56,7 +56,7 @@ export class Detector {
       waiting?.resolve(result);
     }
     if (stopped) {
-      this.#startAgain("the model had to be started again");
+      this.#startAgain("the model had to be restarted");
     }
   }
 

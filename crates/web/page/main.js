@@ -1,4 +1,4 @@
-// The page: what is dropped or chosen goes to the worker, what comes back is drawn and listed.
+// The page: dropped or chosen files go to the worker, its results are drawn and listed.
 
 import { Camera } from "./camera.js";
 import { Detector } from "./detector.js";
@@ -7,7 +7,7 @@ import { missingSupport } from "./wasm_support.js";
 
 const element = (id) => document.getElementById(id);
 const ACCEPTED = 0.5;
-/** Thumbnails and the stage need no more; the model sees every pixel all the same. */
+/** Size limit of thumbnails and the stage; the model gets every pixel. */
 const WIDEST_SHOWN = 2048;
 
 const camera = new Camera();
@@ -39,10 +39,10 @@ function wire() {
   element("refused").onchange = showCurrent;
   element("download").onclick = download;
   element("webgpu").onchange = changeDevice;
-  element("webgpu-choice").hidden = !navigator.gpu; // To pages served by https or from this very machine only.
+  element("webgpu-choice").hidden = !navigator.gpu; // Only for pages served by https or from this machine.
   watchWidth(element("stage"), showCurrent);
 
-  // Dropped anywhere: a model is told from a picture by its name.
+  // Dropped anywhere: models and pictures are distinguished by name.
   let depth = 0;
   const dropping = (change) => element("stage").classList.toggle("dropping", (depth += change) > 0);
   addEventListener("dragenter", () => dropping(1));
@@ -61,7 +61,7 @@ function wire() {
   });
 }
 
-/** Redraws when the width changes; the height follows the picture and must not start over. */
+/** Redraws when the width changes; the height follows the picture and must not trigger a redraw. */
 function watchWidth(watched, redraw) {
   let width = watched.clientWidth;
   addEventListener("resize", () => {
@@ -72,15 +72,15 @@ function watchWidth(watched, redraw) {
   });
 }
 
-/** Looks with the same model on the other device; where that fails, goes back. */
+/** Uses the same model on the other device; if that fails, switches back. */
 async function changeDevice() {
   stopCamera();
   if (element("webgpu").checked && !(await navigator.gpu.requestAdapter().catch(() => null))) {
     element("webgpu").checked = false;
-    complain("This browser lends the page no graphics card; the processor goes on.");
+    complain("This browser provides no graphics card to the page; the processor is used.");
     return;
   }
-  generation += 1; // What the old worker still has to say is of no use.
+  generation += 1; // Results of the old worker are ignored.
   pictures.forEach(({ small }) => (small.textContent = "waiting"));
   const opened = modelOpen ? modelFile : null;
   modelOpen = false;
@@ -94,7 +94,7 @@ async function changeDevice() {
   }
 }
 
-/** Opens a model and looks at every picture with it; whether it could be opened. */
+/** Opens a model and searches every picture with it; returns whether it could be opened. */
 async function openModel(file) {
   if (!file) {
     return false;
@@ -197,7 +197,7 @@ async function detectInPicture(picture, mine) {
       picture.small.textContent = error.message;
     }
   }
-  // After the look, which refuses what is no picture or is too large to be shown at all.
+  // After the search, which rejects files that are not pictures or are too large to be shown.
   if (!picture.bitmap && !picture.error) {
     picture.bitmap = await shownBitmap(picture.file).catch(() => null);
     if (picture.bitmap) {
@@ -209,7 +209,7 @@ async function detectInPicture(picture, mine) {
   }
 }
 
-/** The picture as shown, upright as a viewer would and as the model sees it. */
+/** The picture as shown: upright, as in a viewer and for the model. */
 async function shownBitmap(file) {
   const whole = await createImageBitmap(file);
   if (whole.width <= WIDEST_SHOWN) {
@@ -246,7 +246,7 @@ async function toggleCamera() {
   }
   complain(null);
   if (!modelOpen) {
-    complain("Open a grasp model first: the camera's frames are looked at as they come.");
+    complain("Open a grasp model first: the camera's frames are then searched.");
     return;
   }
   try {
@@ -294,12 +294,12 @@ function showCurrent() {
     return;
   }
   const record = result?.record ?? { width: bitmap.width, detections: [] };
-  // Shown smaller than it is: places are in pixels of the image as given.
+  // Shown smaller than its size: positions are in pixels of the original image.
   const shrink = bitmap.width / record.width;
   show(canvas, bitmap, shrink === 1 ? record.detections : record.detections.map(shrunk(shrink)), {
     refused: element("refused").checked,
   });
-  canvas.setAttribute("aria-label", result ? inAWord(result) : "Not looked at yet");
+  canvas.setAttribute("aria-label", result ? inAWord(result) : "Not searched yet");
   if (result) {
     const frames = (1000 / result.milliseconds).toFixed(1);
     say(`${inAWord(result)} · ${result.milliseconds.toFixed(0)} ms a frame (${frames} a second)`);
@@ -350,7 +350,7 @@ function inAWord({ record }) {
   return count === 0 ? "Nothing to grasp" : count === 1 ? "One grasp" : `${count} grasps`;
 }
 
-/** A line for each picture, as `sdg detect --json` prints them. */
+/** One line per picture, as printed by `sdg detect --json`. */
 function download() {
   const lines = pictures
     .filter(({ result }) => result)

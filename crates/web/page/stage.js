@@ -1,7 +1,7 @@
-// The picture with what was found on it, drawn at the resolution of the screen.
+// The picture with its detections, drawn at the resolution of the screen.
 
 const ACCEPTED = 0.5;
-/** Share of the window's height that a picture takes at most. */
+/** Maximum height of a picture as a share of the window's height. */
 const HIGHEST = 0.8;
 
 const COLORS = {
@@ -14,9 +14,9 @@ const COLORS = {
   keypoint: "#ffffff",
 };
 
-/** Draws `bitmap` into `canvas` with its detections; refused ones only where asked for. */
+/** Draws `bitmap` into `canvas` with its detections; refused ones only on request. */
 export function show(canvas, bitmap, detections, { refused }) {
-  // As wide as there is room, and no higher than the window shows at once.
+  // As wide as the space allows, and not higher than the window.
   const room = canvas.parentElement.clientWidth;
   const width = Math.min(room, (HIGHEST * window.innerHeight * bitmap.width) / bitmap.height);
   canvas.style.width = `${width}px`;
@@ -26,7 +26,7 @@ export function show(canvas, bitmap, detections, { refused }) {
   canvas.height = Math.max(1, Math.round(bitmap.height * scale));
   const context = canvas.getContext("2d");
   context.drawImage(bitmap, 0, 0, canvas.width, canvas.height);
-  // Places are pixels of the image; strokes are pixels of the screen.
+  // Positions are in pixels of the image, strokes in pixels of the screen.
   const brush = { context, scale, unit: 2 * density * Math.min(1, Math.max(0.5, width / 720)) };
   const shown = detections.filter((detection) => refused || detection.score >= ACCEPTED);
   for (const detection of shown.reverse()) {
@@ -54,7 +54,7 @@ function drawDetection(brush, detection) {
   drawLabel(brush, detection, color);
 }
 
-/** Two jaws, as long as a gripper's are wide, that close on the part across the taught line. */
+/** Two jaws, as long as a gripper's are wide, which close on the part across the taught line. */
 function drawJaws(brush, { x, y, angle_deg: degrees, width_px: width }) {
   const angle = (degrees * Math.PI) / 180;
   const along = [Math.cos(angle), Math.sin(angle)];
@@ -90,7 +90,7 @@ function stroke({ context, scale }, points, color, width) {
   context.beginPath();
   points.forEach(([x, y], i) => (i ? context.lineTo(x * scale, y * scale) : context.moveTo(x * scale, y * scale)));
   context.lineJoin = context.lineCap = "round";
-  // A dark halo keeps a line visible on every picture.
+  // A dark halo makes a line visible on every picture.
   for (const [style, line] of [[COLORS.halo, 1.8 * width], [color, width]]) {
     context.strokeStyle = style;
     context.lineWidth = line;

@@ -1,6 +1,6 @@
-// Whether this browser can run the module at all, told before half a megabyte is fetched.
+// Whether this browser can run the module, checked before half a megabyte is loaded.
 
-// The smallest module that uses a vector: a function of no arguments that makes one, takes a lane and drops it.
+// The smallest module with a vector: a function without arguments that creates one, reads a lane and drops it.
 const VECTOR_MODULE = new Uint8Array([
   0, 0x61, 0x73, 0x6d, 1, 0, 0, 0, // magic, version
   1, 4, 1, 0x60, 0, 0, // type: [] → []
@@ -13,16 +13,16 @@ const VECTOR_MODULE = new Uint8Array([
   0x0b, // end
 ]);
 
-/** What the browser lacks, as a sentence for people; null where nothing is missing. */
+/** The missing feature as a sentence; null if nothing is missing. */
 export function missingSupport() {
   if (typeof WebAssembly !== "object") {
-    return "This browser has no WebAssembly, which the grasp model runs on. Any current Chrome, Edge, Firefox or Safari has it.";
+    return "This browser has no WebAssembly, which the grasp model needs. Any current Chrome, Edge, Firefox or Safari has it.";
   }
   if (!WebAssembly.validate(VECTOR_MODULE)) {
-    return "This browser has WebAssembly, but not its SIMD instructions, which the grasp model is computed with. Chrome and Edge have them from version 91, Firefox from 89, Safari from 16.4; a locked-down or very old device may lack them.";
+    return "This browser has WebAssembly, but not its SIMD instructions, which the grasp model needs. Chrome and Edge have them from version 91, Firefox from 89, Safari from 16.4; a locked-down or very old device may lack them.";
   }
   if (typeof OffscreenCanvas !== "function" || typeof Worker !== "function") {
-    return "This browser cannot draw outside the page (OffscreenCanvas), which keeps the page fluid while the model looks. Safari has it from version 16.4.";
+    return "This browser cannot draw outside the page (OffscreenCanvas), which keeps the page fluid during the search. Safari has it from version 16.4.";
   }
   return null;
 }

@@ -1,16 +1,16 @@
-// The thread that the model looks in, so that the page stays fluid. One request at a time, answered in order.
+// The thread of the model, which keeps the page fluid. One request at a time, answered in order.
 //
 //   {id, open: ArrayBuffer}                    a model file      → {id, summary}
 //   {id, look: Blob, verify}                   an image file     → {id, record, milliseconds, decoded}
 //   {id, look: ImageBitmap, verify}            a camera's frame  → {id, record, milliseconds, decoded}
-//   whatever goes wrong                                          → {id, error}
+//   any error                                                    → {id, error}
 //
-// `milliseconds` is the time of the look itself; `decoded` that of getting at the pixels. After a panic the module's
-// memory cannot be trusted: the answer says `stopped`, and the page starts another worker.
+// `milliseconds` is the duration of the search; `decoded` that of decoding. After a panic the module's memory is not
+// valid: the answer has `stopped`, and the page starts another worker.
 //
-// The address says where to compute: `worker.js?device=webgpu` on the graphics card, which is another module.
+// The address selects the device: `worker.js?device=webgpu` uses the graphics card, with another module.
 
-/** The limit of the command line: larger files than any camera makes. */
+/** Maximum size of an image file, as on the command line. */
 const MAX_IMAGE_BYTES = 256 * 2 ** 20;
 
 const onCard = new URL(import.meta.url).searchParams.get("device") === "webgpu";
@@ -20,7 +20,7 @@ let model = null;
 
 async function load(name) {
   const module = await import(`${name}.js`);
-  // Compiled while it arrives where the host names the type; some static hosts do not.
+  // Compiled while it is loaded if the host sends the correct type; some static hosts do not.
   const response = await fetch(new URL(`${name}_bg.wasm`, import.meta.url));
   if (!response.ok) {
     throw new Error(`the module ${name}_bg.wasm is missing on this host (status ${response.status})`);
@@ -48,7 +48,7 @@ async function answer(request) {
   return { record, decoded, milliseconds: performance.now() - begun - decoded };
 }
 
-/** The look, ready to be taken: files that our own decoder reads go in whole, so that a page sees what `sdg` sees. */
+/** The search, not yet started: files that our decoder supports are passed unchanged, so that a page sees the same pixels as `sdg`. */
 async function prepared(image, verify) {
   if (image instanceof ImageBitmap) {
     return detectInBitmap(image, verify);
@@ -68,7 +68,7 @@ async function prepared(image, verify) {
 function detectInBitmap(bitmap, verify) {
   const { width, height } = bitmap;
   const context = new OffscreenCanvas(width, height).getContext("2d", { willReadFrequently: true });
-  context.fillStyle = "white"; // As the command line lays what is transparent over white.
+  context.fillStyle = "white"; // Transparent pixels are composited over white, as on the command line.
   context.fillRect(0, 0, width, height);
   context.drawImage(bitmap, 0, 0);
   bitmap.close();
@@ -83,7 +83,7 @@ onmessage = ({ data: request }) => {
       postMessage({ id: request.id, ...(await answer(request)) });
     } catch (error) {
       const stopped = error instanceof WebAssembly.RuntimeError;
-      const message = stopped ? "the model ran out of memory or met a fault of its own, and was started again" : error.message;
+      const message = stopped ? "the model ran out of memory or failed internally, and was restarted" : error.message;
       postMessage({ id: request.id, error: message, stopped });
     }
   });

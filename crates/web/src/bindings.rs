@@ -1,4 +1,4 @@
-//! The interface of JavaScript: the class `Model`. Errors arrive there as `Error`, with the message of the Rust error.
+//! The JavaScript interface: the class `Model`. Errors are thrown as `Error` with the message of the Rust error.
 
 use sdg_grasp::{Device, Verification};
 use wasm_bindgen::prelude::*;
@@ -11,7 +11,7 @@ extern "C" {
     fn error(message: &str);
 }
 
-/// Has a panic, which stops the module for good, say where it was.
+/// Makes a panic, which stops the module permanently, print its position.
 #[wasm_bindgen(start)]
 fn start() {
     std::panic::set_hook(Box::new(|panic| error(&panic.to_string())));
@@ -27,7 +27,7 @@ impl Model {
     /// Opens a model from its file's bytes.
     ///
     /// # Errors
-    /// No grasp model, one of another version, or a damaged one; a browser without a graphics card that it lends.
+    /// Not a grasp model, another version, or damaged; a browser that does not provide a graphics card.
     pub async fn open(bytes: Vec<u8>) -> Result<Model, JsError> {
         Ok(Self(Detector::open(&bytes, &device().await?)?))
     }
@@ -40,7 +40,7 @@ impl Model {
     /// Detects in a PNG or JPEG file; see [`Detector::detect_in_file`].
     ///
     /// # Errors
-    /// No image, a damaged or an enormous one.
+    /// Not an image, damaged, or too large.
     #[wasm_bindgen(js_name = detectInFile)]
     pub async fn detect_in_file(&self, bytes: &[u8], verify: bool) -> Result<String, JsError> {
         Ok(self.0.detect_in_file(bytes, verification(verify)).await?)
@@ -49,7 +49,7 @@ impl Model {
     /// Detects in the pixels of a canvas; see [`Detector::detect_in_pixels`].
     ///
     /// # Errors
-    /// Bytes that do not fit the size, or an enormous image.
+    /// The number of bytes does not match the size, or the image is too large.
     #[wasm_bindgen(js_name = detectInPixels)]
     pub async fn detect_in_pixels(
         &self,
@@ -66,7 +66,7 @@ fn verification(verify: bool) -> Verification {
     if verify { Verification::ByShape } else { Verification::Off }
 }
 
-/// Where this module computes.
+/// The device of this module.
 async fn device() -> Result<Device, JsError> {
     #[cfg(not(feature = "webgpu"))]
     return Ok(Device::flex());

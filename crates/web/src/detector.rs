@@ -8,7 +8,8 @@ use serde::Serialize;
 
 use crate::error::WebError;
 
-/// Memory of WebAssembly ends at 4 GiB; a photo of 200 megapixels takes 5.8 GB to search, one of 64 a third.
+/// WebAssembly's memory is limited to 4 GiB; searching a photo of 200 megapixels takes 5.8 GB, one of 64 a third of
+/// that.
 const LIMITS: ImageLimits = ImageLimits { max_pixels: 64_000_000 };
 
 /// An opened grasp model.
@@ -18,7 +19,7 @@ pub struct Detector {
     summary: ModelSummary,
 }
 
-/// What was found in one image; the names are those of `sdg detect --json`.
+/// The detections in one image, with the field names of `sdg detect --json`.
 #[derive(Serialize)]
 struct ImageRecord {
     width: u32,
@@ -31,7 +32,7 @@ impl Detector {
     /// Opens a model from its file's bytes, on a device.
     ///
     /// # Errors
-    /// No grasp model, one of another version, or a damaged one.
+    /// Not a grasp model, another version, or damaged.
     pub fn open(bytes: &[u8], device: &Device) -> Result<Self, WebError> {
         let summary = summarize(bytes)?;
         Ok(Self { model: GraspModel::from_bytes(bytes, device)?, summary })
@@ -45,15 +46,15 @@ impl Detector {
     /// Detects in a PNG or JPEG file: `{"width", "height", "detections"}` as JSON, refused detections included.
     ///
     /// # Errors
-    /// A file that is no image, is damaged, or has more than 64 megapixels.
+    /// The file is not an image, is damaged, or has more than 64 megapixels.
     pub async fn detect_in_file(&self, bytes: &[u8], verification: Verification) -> Result<String, WebError> {
         self.detect_in(&decode_image(bytes, &LIMITS)?, verification).await
     }
 
-    /// Detects in opaque pixels as a canvas gives them: rows of red, green, blue and an alpha that is passed over.
+    /// Detects in opaque pixels of a canvas: rows of red, green, blue and an ignored alpha.
     ///
     /// # Errors
-    /// Bytes that do not fit the size, or more than 64 megapixels.
+    /// The number of bytes does not match the size, or the image has more than 64 megapixels.
     pub async fn detect_in_pixels(
         &self,
         rgba: &[u8],
@@ -82,6 +83,6 @@ impl Detector {
 }
 
 fn to_json<T: Serialize>(value: &T) -> String {
-    // Plain data of our own; serialisation to a string cannot fail.
+    // Plain data; serialisation to a string cannot fail.
     serde_json::to_string(value).unwrap_or_default()
 }

@@ -1,17 +1,17 @@
-//! Errors in the inputs that a page hands over.
+//! Errors of inputs from the page.
 
-/// Why a model could not be opened or an image not be looked at.
+/// Why a model could not be opened or an image could not be searched.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum WebError {
-    /// The model file, or the look itself.
+    /// An error of the model file, or of the search.
     #[error(transparent)]
     Grasp(#[from] sdg_grasp::GraspError),
-    /// An image file that is none, is damaged, or is enormous.
+    /// A file that is not an image, is damaged, or is too large.
     #[error(transparent)]
     Image(#[from] sdg_demonstration::PictureError),
-    /// Pixels of another number than the size says.
+    /// The number of bytes does not match the size.
     #[error("expected {width} × {height} pixels of four bytes, found {found} bytes")]
     Pixels { width: u32, height: u32, found: usize },
 }

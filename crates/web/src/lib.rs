@@ -5,16 +5,16 @@
 //!  canvas, camera  a thread        wasm-bindgen  bindings  plain Rust   the crates of the command line
 //! ```
 //!
-//! Bytes of a model file and of an image go in, [`sdg_grasp::DetectionRecord`]s come out as JSON, under the names of
-//! `sdg detect --json`. Image files are decoded by the very decoder that the command line uses, so that both see the
-//! same pixels; frames of a camera come as RGBA.
+//! The inputs are the bytes of a model file and of an image; the outputs are [`sdg_grasp::DetectionRecord`]s as JSON,
+//! with the field names of `sdg detect --json`. Image files are decoded by the same decoder as on the command line, so
+//! that both see the same pixels; camera frames are passed as RGBA.
 //!
-//! The module is built twice: once for the processor, and once (feature `webgpu`, several times as large, and fetched
-//! only when asked for) for the graphics card that a browser lends. A browser hands over results of its
-//! card to asynchronous code only, so detection is asynchronous.
+//! The module is built twice: for the processor, and (feature `webgpu`, several times as large, and loaded only on
+//! request) for the graphics card provided by the browser. Browsers return results of the graphics card only to
+//! asynchronous code, so detection is asynchronous.
 //!
-//! Left out on purpose: teaching, threads (a page may use them only where its host sends special headers), and any
-//! request to anywhere: what is dropped on the page stays in it. `make web` builds modules and page into target/web.
+//! Deliberately absent: teaching, threads (allowed only if the page's host sends special headers), and any network
+//! request: files dropped on the page stay in it. `make web` builds modules and page into target/web.
 //!
 //! ```no_run
 //! use sdg_grasp::{Device, Verification};
@@ -26,7 +26,7 @@
 //! # Ok(())
 //! # }
 //! ```
-// What wasm-bindgen writes for `bindings` has to be unsafe.
+// The code that wasm-bindgen generates for `bindings` must be unsafe.
 #![cfg_attr(not(target_arch = "wasm32"), forbid(unsafe_code))]
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 

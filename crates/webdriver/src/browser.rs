@@ -1,4 +1,4 @@
-//! A browser, its page, and what a person does in it.
+//! A browser with its page, and user input.
 
 use std::io;
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
@@ -14,9 +14,9 @@ use crate::error::{Result, WebDriverError};
 use crate::http;
 
 const DRIVER: &str = "chromedriver";
-/// The specification's key for a reference to an element.
+/// The specification's key of a reference to an element.
 const ELEMENT: &str = "element-6066-11e4-a52e-4f735466cecf";
-/// Flags that keep Chromium from asking anybody for anything, and that let it run as root in a container.
+/// Flags that prevent Chromium from prompting, and allow it to run as root in a container.
 const QUIET: [&str; 9] = [
     "--headless=new",
     "--no-sandbox",
@@ -29,14 +29,14 @@ const QUIET: [&str; 9] = [
     "--no-first-run",
 ];
 
-/// How a browser is started.
+/// Options for starting a browser.
 #[derive(Debug, Clone)]
 pub struct BrowserOptions {
     /// Width and height of the window, in CSS pixels.
     pub window_px: [u32; 2],
-    /// Further flags of Chromium.
+    /// Additional flags of Chromium.
     pub flags: Vec<String>,
-    /// How long [`Browser::wait_for`] waits.
+    /// Timeout of [`Browser::wait_for`].
     pub patience: Duration,
 }
 
@@ -46,7 +46,7 @@ impl Default for BrowserOptions {
     }
 }
 
-/// A headless Chromium of its own; it ends when dropped.
+/// A headless Chromium with its own profile; it is closed when dropped.
 #[derive(Debug)]
 pub struct Browser {
     driver: Child,
@@ -67,7 +67,7 @@ impl Browser {
     /// Starts ChromeDriver and a browser with an empty profile.
     ///
     /// # Errors
-    /// Either program is missing or does not start.
+    /// One of the programs is missing or does not start.
     pub fn start(options: &BrowserOptions) -> Result<Self> {
         let address = free_address().map_err(WebDriverError::io("a free port"))?;
         let profile = tempfile::tempdir().map_err(WebDriverError::io("a folder for the browser's profile"))?;
@@ -120,7 +120,7 @@ impl Browser {
         self.post("/url", &json!({"url": url})).map(drop)
     }
 
-    /// Runs a script in the page: the body of a function, which sees `arguments` and may return a promise.
+    /// Runs a script in the page: the body of a function with `arguments`, which may return a promise.
     ///
     /// # Errors
     /// The script threw.
@@ -128,10 +128,10 @@ impl Browser {
         self.post("/execute/sync", &json!({"script": script, "args": arguments}))
     }
 
-    /// Asks a script again and again until what it returns is true in JavaScript's sense, and returns it.
+    /// Repeats a script until its result is truthy, and returns the result.
     ///
     /// # Errors
-    /// It did not in time; the error quotes the page's text.
+    /// The timeout passed; the error quotes the page's text.
     pub fn wait_for(&self, what: &str, script: &str) -> Result<Value> {
         let begun = Instant::now();
         while begun.elapsed() < self.patience {
@@ -146,27 +146,28 @@ impl Browser {
         Err(WebDriverError::Timeout { what: what.to_owned(), seconds: self.patience.as_secs_f32(), page })
     }
 
-    /// The first element that a CSS selector names.
+    /// The first element that matches a CSS selector.
     ///
     /// # Errors
-    /// It failed; there is no model.
+    /// No element matches.
     pub fn find(&self, selector: &str) -> Result<Element<'_>> {
         let found = self.post("/element", &json!({"using": "css selector", "value": selector}))?;
         Ok(Element { browser: self, id: text(&found[ELEMENT], "/element")? })
     }
 
-    /// Performs input as the specification's `actions` describes it: sequences of pointer, key and wheel.
+    /// Performs input as in the specification's `actions`: sequences of pointer, key and wheel.
     ///
     /// # Errors
-    /// A sequence that is none.
+    /// The sequence is invalid.
     pub fn perform(&self, sequences: &Value) -> Result<()> {
         self.post("/actions", &json!({"actions": sequences})).map(drop)
     }
 
-    /// Presses a mouse button at the first place of the viewport, moves through the others and lets go at the last.
+    /// Presses a mouse button at the first position of the viewport, moves through the others and releases it at the
+    /// last.
     ///
     /// # Errors
-    /// A place outside the viewport.
+    /// A position is outside the viewport.
     pub fn drag(&self, places: &[[f64; 2]]) -> Result<()> {
         let to = |[x, y]: &[f64; 2]| json!({"type": "pointerMove", "duration": 20, "x": x.round(), "y": y.round()});
         let mut actions: Vec<Value> = places.iter().map(to).collect();
@@ -177,11 +178,11 @@ impl Browser {
         self.perform(&json!([mouse]))
     }
 
-    /// Presses keys one after the other, all held until the last: `["\u{e009}", "z"]` is Control and z. WebDriver's
-    /// code points stand for keys without a character: U+E007 Enter, U+E00C Escape, U+E009 Control, U+E008 Shift.
+    /// Presses keys in order, all held until the last: `["\u{e009}", "z"]` is Control and z. Keys without a character
+    /// have code points of WebDriver: U+E007 Enter, U+E00C Escape, U+E009 Control, U+E008 Shift.
     ///
     /// # Errors
-    /// A key that is none.
+    /// A key is invalid.
     pub fn press(&self, keys: &[&str]) -> Result<()> {
         let down = keys.iter().map(|key| json!({"type": "keyDown", "value": key}));
         let up = keys.iter().rev().map(|key| json!({"type": "keyUp", "value": key}));
@@ -197,7 +198,7 @@ impl Browser {
         self.post("/window/rect", &json!({"width": width, "height": height})).map(drop)
     }
 
-    /// Shows the page as on a screen of that size, however small, in the dark or the light scheme.
+    /// Shows the page as on a screen of this size, however small, in the dark or the light scheme.
     ///
     /// # Errors
     /// The browser refuses.
@@ -209,12 +210,12 @@ impl Browser {
         self.devtools("Emulation.setEmulatedMedia", &features)
     }
 
-    /// A command of Chromium's own protocol, where WebDriver has none.
+    /// A command of Chromium's DevTools protocol, for features that WebDriver lacks.
     fn devtools(&self, command: &str, parameters: &Value) -> Result<()> {
         self.post("/goog/cdp/execute", &json!({"cmd": command, "params": parameters})).map(drop)
     }
 
-    /// Writes what is to be seen into a PNG file.
+    /// Writes a screenshot to a PNG file.
     ///
     /// # Errors
     /// The file cannot be written.
@@ -229,7 +230,7 @@ impl Browser {
         std::fs::write(path, png).map_err(WebDriverError::io(path.display().to_string()))
     }
 
-    /// What the console said since it was last asked, warnings and errors alone, network errors included.
+    /// New warnings and errors of the console, including network errors.
     ///
     /// # Errors
     /// The browser keeps no log.
@@ -268,7 +269,7 @@ impl Browser {
 
 impl Drop for Browser {
     fn drop(&mut self) {
-        // The driver ends its browser with the session; without an answer both are ended with the driver.
+        // The driver closes its browser with the session; without a response, both are killed.
         let _ = self.send("DELETE", &self.path(""), None);
         let _ = self.driver.kill();
         let _ = self.driver.wait();
@@ -279,15 +280,15 @@ impl Element<'_> {
     /// Clicks in its middle.
     ///
     /// # Errors
-    /// It cannot be seen, or something lies over it.
+    /// It is not visible, or covered.
     pub fn click(&self) -> Result<()> {
         self.post("click", &json!({})).map(drop)
     }
 
-    /// Types into it; into a file input, paths of files, one a line.
+    /// Types text into it; for a file input, one path per line.
     ///
     /// # Errors
-    /// It takes no keys, or a file is not there.
+    /// It accepts no keys, or a file does not exist.
     pub fn type_text(&self, text: &str) -> Result<()> {
         self.post("value", &json!({"text": text})).map(drop)
     }
@@ -297,7 +298,7 @@ impl Element<'_> {
     }
 }
 
-/// A port that was free a moment ago.
+/// A port that was free just now.
 fn free_address() -> io::Result<SocketAddr> {
     TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?.local_addr()
 }

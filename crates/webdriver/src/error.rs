@@ -1,39 +1,39 @@
-//! What can go wrong between a test and its browser.
+//! Errors between a test and its browser.
 
 use std::io;
 use std::path::PathBuf;
 
-/// Why the browser did not do what it was asked for.
+/// Why a command of the browser failed.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum WebDriverError {
-    /// ChromeDriver is not there or did not start.
+    /// ChromeDriver is missing or did not start.
     #[error(
         "cannot start {program} (Debian's packages chromium and chromium-driver; `make test-browser` installs them): {source}"
     )]
     NoDriver { program: &'static str, source: io::Error },
-    /// A connection that broke, or a file that could not be written.
+    /// A connection broke, or a file could not be written.
     #[error("{what}: {source}")]
     Io { what: String, source: io::Error },
-    /// ChromeDriver refused.
+    /// ChromeDriver rejected the command.
     #[error("{command}: {error}: {message}")]
     Refused {
         command: String,
-        /// WebDriver's word for it, such as "no such element".
+        /// WebDriver's error code, such as "no such element".
         error: String,
         /// The first line of the driver's explanation.
         message: String,
     },
-    /// An answer that WebDriver does not know.
+    /// A response that is not valid in WebDriver.
     #[error("{command}: expected {expected}, found {found}")]
     Unexpected {
         command: String,
-        /// What the specification has there.
+        /// The expected form.
         expected: &'static str,
         found: String,
     },
-    /// The page did not become as expected in time.
+    /// A condition on the page was not met in time.
     #[error("waited {seconds} s for {what}; the page says: {page}")]
     Timeout {
         what: String,
@@ -41,7 +41,7 @@ pub enum WebDriverError {
         /// The start of the page's text.
         page: String,
     },
-    /// A folder to be served that is not there.
+    /// The folder to serve does not exist.
     #[error("{}: expected a folder to serve", .0.display())]
     NoFolder(PathBuf),
 }

@@ -1,10 +1,10 @@
-//! As much of HTTP as ChromeDriver on this machine needs: one request, one answer, one connection.
+//! The subset of HTTP that a local ChromeDriver needs: one request, one response, one connection.
 
 use std::io::{self, BufRead, BufReader, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::time::Duration;
 
-/// A command may teach a model in the page; nothing takes longer than this.
+/// Response timeout: a command may teach a model in the page, the slowest operation.
 const LONGEST_ANSWER: Duration = Duration::from_secs(600);
 
 /// Sends a request and returns status and body.
@@ -12,7 +12,7 @@ pub(crate) fn request(driver: SocketAddr, method: &str, path: &str, body: Option
     let mut stream = TcpStream::connect_timeout(&driver, Duration::from_secs(5))?;
     stream.set_read_timeout(Some(LONGEST_ANSWER))?;
     let body = body.unwrap_or_default();
-    // One write: a head in a packet of its own would wait for its acknowledgement.
+    // In a single write: a head in its own packet would wait for its acknowledgement.
     let request = format!(
         "{method} {path} HTTP/1.1\r\nHost: {driver}\r\nContent-Type: application/json\r\nContent-Length: {}\r\n\
          Connection: close\r\n\r\n{body}",
@@ -22,7 +22,7 @@ pub(crate) fn request(driver: SocketAddr, method: &str, path: &str, body: Option
     read_answer(&mut BufReader::new(stream))
 }
 
-/// As many bytes as the head promises: the driver may keep the connection open behind them.
+/// Reads the number of bytes announced in the head: the driver may keep the connection open.
 fn read_answer(stream: &mut impl BufRead) -> io::Result<(u16, String)> {
     let invalid = || io::Error::new(io::ErrorKind::InvalidData, "expected an HTTP answer");
     let mut line = String::new();

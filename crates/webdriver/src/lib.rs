@@ -1,14 +1,14 @@
-//! Headless Chromium for the tests of our pages: what a person does with mouse, keyboard and files, and what they see.
+//! Headless Chromium for tests of this project's pages: input by mouse, keyboard and files, and the visible result.
 //!
 //! ```text
 //! Browser ─ HTTP and JSON (W3C WebDriver) ─ chromedriver ─ chromium --headless
 //! ```
 //!
-//! Both programs are Debian's (packages chromium and chromium-driver); `make test-browser` installs them. A browser has
-//! a profile of its own, which goes with it, and sends no request to the network by itself.
+//! Both programs are from Debian (packages chromium and chromium-driver); `make test-browser` installs them. A browser
+//! has its own profile, which is deleted with it, and sends no network requests by itself.
 //!
-//! Left out on purpose: other browsers, windows and frames, waiting in the driver ([`Browser::wait_for`] asks the page),
-//! and any use outside tests.
+//! Deliberately absent: other browsers, windows and frames, waiting in the driver ([`Browser::wait_for`] polls the
+//! page), and any use outside tests.
 //!
 //! ```no_run
 //! use sdg_webdriver::{Browser, BrowserOptions, serve_folder};

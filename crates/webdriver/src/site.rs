@@ -1,4 +1,4 @@
-//! A folder served as a static host would, on a port of this machine.
+//! A folder served like a static host, on a port of this machine.
 
 use std::io::{BufRead, BufReader, Write};
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
@@ -6,7 +6,7 @@ use std::path::{Component, Path, PathBuf};
 
 use crate::error::{Result, WebDriverError};
 
-/// A served folder; the thread behind it ends with the process.
+/// A served folder; its thread ends with the process.
 #[derive(Debug)]
 pub struct Site {
     address: SocketAddr,
@@ -22,7 +22,7 @@ impl Site {
 /// Serves the files of a folder.
 ///
 /// # Errors
-/// No such folder, or no free port.
+/// There is no such folder, or no free port.
 pub fn serve_folder(folder: PathBuf) -> Result<Site> {
     if !folder.is_dir() {
         return Err(WebDriverError::NoFolder(folder));
@@ -32,14 +32,14 @@ pub fn serve_folder(folder: PathBuf) -> Result<Site> {
     std::thread::spawn(move || {
         for stream in listener.incoming().flatten() {
             let folder = folder.clone();
-            // A browser opens more connections than it uses; none may hold up the others.
+            // A browser opens more connections than it uses; none may block the others.
             std::thread::spawn(move || answer(&stream, &folder));
         }
     });
     Ok(Site { address })
 }
 
-/// Answers one request; a browser that went away is no failure.
+/// Answers one request; a browser that has disconnected is not an error.
 fn answer(mut stream: &TcpStream, folder: &Path) {
     let mut lines = BufReader::new(stream).lines().map_while(std::io::Result::ok);
     let request = lines.next().unwrap_or_default();

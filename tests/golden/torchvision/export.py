@@ -47,7 +47,7 @@ GRADIENTS = [
 
 
 class NarrowResNet(ResNet):
-    """ResNet's code with a sixteenth of its channels."""
+    """ResNet with a sixteenth of its channels."""
 
     def _make_layer(self, block, planes, blocks, stride=1, dilate=False):
         if planes == 64:
@@ -78,7 +78,7 @@ def save_file(tensors, path):
 def build(kind, narrow, limits):
     if narrow:
         body = NarrowResNet(Bottleneck, [1, 1, 1, 1], norm_layer=FrozenBatchNorm2d)
-        # Its own width is of no use here and would be checked.
+        # Its own width is not used here and would be checked.
         body.fc = torch.nn.Identity()
         layers = ["layer4", "layer3", "layer2"]
         for name, parameter in body.named_parameters():
@@ -183,7 +183,7 @@ def export(folder, kind, model, limits, narrow):
 
 
 def export_exact_gradients(folder, kind, model):
-    """The gradients of the same step in double precision: what single precision's own rounding is told by."""
+    """The gradients of the same step in double precision, for measuring the rounding of single precision."""
     tensors = training_step(model.double(), kind, read_image().double())
     gradients = {k: v.float().contiguous() for k, v in tensors.items() if k.startswith("gradients.")}
     save_file(gradients, folder / "exact.safetensors")
@@ -201,7 +201,7 @@ def count_detections(model):
 
 
 def randomize_until_found(model, seed, residual_gain=1.0):
-    """A network that finds something: not every random one does."""
+    """A network with detections: not every random network has any."""
     while randomize(model, seed, residual_gain) or count_detections(model) < 4:
         seed += 10
 
@@ -258,9 +258,9 @@ def main():
         export(whole, "keypoint", model, limits, False)
         export_exact_gradients(whole, "keypoint", model)
         return
-    # The committed files change with the version; the test that runs where torch is present takes any.
+    # The committed files depend on the version; the test that runs if torch is installed accepts any version.
     assert torchvision.__version__.startswith("0.22.1"), torchvision.__version__
-    # 640x480 becomes 166x125 or 166x124, which tells how sizes are rounded.
+    # 640x480 becomes 166x125 or 166x124, which shows how sizes are rounded.
     limits = {
         "min_size": 125,
         "max_size": 400,

@@ -1,4 +1,4 @@
-//! Bodies of requests read as JSON, and the answers that all addresses give.
+//! JSON bodies of requests, and responses shared by all addresses.
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -18,9 +18,9 @@ pub fn read<T: DeserializeOwned>(what: &'static str, body: &[u8]) -> Result<T> {
     })
 }
 
-/// The answer to what broke inside.
+/// The response to an internal error.
 pub fn broken() -> Response {
-    Response::new(500, JSON, json!({"error": "this failed inside; the terminal says more"}).to_string().into_bytes())
+    Response::new(500, JSON, json!({"error": "internal error; the terminal says more"}).to_string().into_bytes())
 }
 
 pub fn json_of<T: Serialize>(outcome: Result<T>) -> Response {

@@ -1,4 +1,4 @@
-//! What a taught model finds in a picture, as the page draws it.
+//! Detections of a taught model in a picture, for the page.
 
 use std::time::Instant;
 
@@ -10,7 +10,7 @@ use crate::marks::Marks;
 use crate::session::Session;
 use crate::teacher::{FoundGrasp, GraspPose, Refusal};
 
-/// One detection; `marks` are what accepting it would mark.
+/// One detection; `marks` are the marks that accepting it would create.
 #[derive(Serialize)]
 struct DetectionView {
     score: f64,
@@ -21,23 +21,23 @@ struct DetectionView {
     touches: Vec<usize>,
 }
 
-/// All of a picture, and how long they took.
+/// All detections of a picture, and the search's duration.
 #[derive(Serialize)]
 pub struct DetectionsView {
     seconds: f64,
     detections: Vec<DetectionView>,
 }
 
-/// How much is asked of a detection.
+/// Level of detail of a detection's explanation.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Explained {
-    /// Every frame of a camera counts: reasons in words only.
+    /// Reasons in words only, which is fast enough for every frame of a camera.
     InWords,
-    /// With the places where picture and demonstration differ.
+    /// Also the positions at which picture and demonstration differ.
     WithPlaces,
 }
 
-/// Finds the part with the model in use.
+/// Detects the part with the model in use.
 pub fn detect(session: &Session, picture: &RgbImage, explained: Explained) -> Result<DetectionsView> {
     let model = session.taught_model()?;
     let size = [picture.width(), picture.height()];

@@ -10,7 +10,7 @@ use crate::http::{Request, Response};
 use crate::outline;
 use crate::session::Session;
 
-/// Answers what is asked of picture `id`; `None` where there is no such address.
+/// Answers requests about picture `id`; `None` for an unknown address.
 pub fn answer(session: &Session, request: &Request, method: &str, id: usize, rest: &[&str]) -> Option<Response> {
     let body = &request.body;
     Some(match (method, rest) {
@@ -32,22 +32,22 @@ pub fn answer(session: &Session, request: &Request, method: &str, id: usize, res
 struct BoxRequest {
     #[serde(rename = "box")]
     bbox: [f64; 4],
-    /// In the order in which they were drawn.
+    /// Strokes in the order in which they were drawn.
     #[serde(default)]
     strokes: Vec<StrokeRequest>,
 }
 
 #[derive(Deserialize)]
 struct StrokeRequest {
-    /// One for a click.
+    /// A single point for a click.
     points: Vec<[f64; 2]>,
-    /// Whether what lies under them belongs to the part.
+    /// Whether the stroke marks the part or its surroundings.
     is_inside: bool,
 }
 
-/// More strokes than any hand draws for one outline; each costs some milliseconds.
+/// Maximum number of strokes of an outline; each costs some milliseconds.
 const MAX_STROKES: usize = 100;
-/// More points than the page sends of a stroke.
+/// Maximum number of points of a stroke; the page sends fewer.
 const MAX_POINTS: usize = 1000;
 
 #[derive(Serialize)]

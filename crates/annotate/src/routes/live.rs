@@ -11,7 +11,7 @@ use crate::names::file_name;
 use crate::picture::jpeg;
 use crate::session::Session;
 
-/// Answers what is asked of the camera; `None` where there is no such address.
+/// Answers requests about the camera; `None` for an unknown address.
 pub fn answer(session: &Session, method: &str, rest: &[&str]) -> Option<Response> {
     if let ("GET", []) = (method, rest) {
         return Some(json_of(state(session)));
@@ -34,14 +34,14 @@ pub fn answer(session: &Session, method: &str, rest: &[&str]) -> Option<Response
     })
 }
 
-/// The newest frame, and how the camera is.
+/// The newest frame, and the camera's state.
 #[derive(Serialize)]
 struct LiveView {
     frame: Option<FrameView>,
     fault: Option<LiveFault>,
     /// Whether a photo can be taken now.
     is_usable: bool,
-    /// The file that the next photo goes to.
+    /// File name of the next photo.
     next_photo: String,
 }
 

@@ -1,38 +1,39 @@
 //! Requests and their answers: JSON in, JSON out, errors as `{"error": "one line"}`.
 //!
-//! Pictures are known by numbers, which hold for one session. A request with the header `Sdg-Session` is answered only where that
-//! is the id in `GET /api/session`, with 412 otherwise: a page that outlived its server must not change another picture.
+//! Pictures have numbers, which are valid for one session. A request with the header `Sdg-Session` is answered only if
+//! its value is the id in `GET /api/session`, otherwise with 412: a page of an earlier server must not change another
+//! picture.
 //!
 //! | request | does |
 //! |---|---|
 //! | `GET /`, `/page/{file}` | the page |
-//! | `GET /api/session` | all that the page starts from; `{"start": …}` where no project is open yet |
-//! | `POST /api/projects?name=&photo=` | makes a project of this name with this photo, and opens it |
-//! | `POST /api/projects/{id}/open` | opens a project of those in `start` |
-//! | `DELETE /api/projects` | leaves the project that is open |
+//! | `GET /api/session` | the data with which the page starts; `{"start": …}` if no project is open |
+//! | `POST /api/projects?name=&photo=` | creates a project with this name and photo, and opens it |
+//! | `POST /api/projects/{id}/open` | opens a project listed in `start` |
+//! | `DELETE /api/projects` | closes the open project |
 //! | `GET /api/others/{id}/picture` | another picture of the project's folder |
 //! | `POST /api/others/{id}/photo`, `/api/others/{id}/try` | makes it a photo of the part, or a picture to try |
-//! | `POST /api/images?name=` | takes a photo of the part |
+//! | `POST /api/images?name=` | adds a photo of the part |
 //! | `PUT /api/label` | renames the object |
-//! | `PUT /api/region` | the part of pictures that is searched from now on; null for all of them |
+//! | `PUT /api/region` | sets the searched region; null for the whole picture |
 //! | `GET /api/images/{id}/picture` | a marked picture |
-//! | `PUT /api/images/{id}/marks` | takes marks, writes them, says what they suffice for |
-//! | `DELETE /api/images/{id}`, `/api/trial-pictures/{id}` | takes the picture out of the session; its file stays |
-//! | `POST /api/images/{id}/outline` | proposes an outline from a box and strokes over what belongs to the part or does not; null where nothing stands out |
+//! | `PUT /api/images/{id}/marks` | stores and writes marks; returns the result of checking them |
+//! | `DELETE /api/images/{id}`, `/api/trial-pictures/{id}` | removes the picture from the session; its file is kept |
+//! | `POST /api/images/{id}/outline` | proposes an outline from a box and strokes; null if nothing differs from its surroundings |
 //! | `GET /api/images/{id}/samples/{n}?seed=` | a sample of the marks, as JPEG |
-//! | `GET`, `POST`, `DELETE /api/teaching` | news of the teaching; starts it; ends it with what there is |
-//! | `POST /api/trial-pictures?name=` | takes a picture to try |
+//! | `GET`, `POST`, `DELETE /api/teaching` | progress of the teaching; starts it; ends it with its current result |
+//! | `POST /api/trial-pictures?name=` | adds a picture to try |
 //! | `GET /api/trial-pictures/{id}/picture` | that picture |
 //! | `POST /api/trial-pictures/{id}/detect` | grasps in it |
 //! | `POST /api/trial-pictures/{id}/accept` | makes it a demonstration with the marks given |
-//! | `POST /api/trial-pictures/{id}/would-help` | what model S would find in others, had it learnt from this one, too |
-//! | `PUT /api/trial-pictures/{id}/absent` | says that the part is not there, or takes that back |
-//! | `PUT /api/models/{id}/current` | uses a version of the model, of those in `GET /api/session` |
-//! | `POST /api/models/{id}/compare/{other}` | what two versions find in the pictures to try |
-//! | `GET /api/live` | the number of the camera's newest frame, and what is wrong with the camera |
+//! | `POST /api/trial-pictures/{id}/would-help` | detections of model S in other pictures, if it also learnt from this one |
+//! | `PUT /api/trial-pictures/{id}/absent` | states that the part is not there, or revokes that |
+//! | `PUT /api/models/{id}/current` | uses a version of the model from `GET /api/session` |
+//! | `POST /api/models/{id}/compare/{other}` | detections of two versions in the pictures to try |
+//! | `GET /api/live` | the number of the camera's newest frame, and the camera's fault |
 //! | `GET /api/live/{number}/picture` | that frame, as JPEG |
 //! | `POST /api/live/{number}/detect` | grasps in it |
-//! | `POST /api/live/{number}/photo` | writes it as a photo of the part, to be marked |
+//! | `POST /api/live/{number}/photo` | writes it as a photo of the part |
 //! | `POST /api/live/{number}/keep` | makes it a picture to try |
 
 mod answers;
@@ -57,19 +58,19 @@ use crate::picture::MAX_PICTURE_BYTES;
 use crate::session::Session;
 use crate::views::SessionView;
 
-/// More than the marks of any hand; bounds what a request may make the server hold.
+/// Maximum size of a JSON body; bounds the memory that a request can use.
 const MAX_JSON_BYTES: usize = 1 << 20;
 
-/// Names the session that the numbers in a request belong to.
+/// Header with the session to which the numbers in a request belong.
 const SESSION_HEADER: &str = "sdg-session";
 
-/// How long the body of a request to `path` may be.
+/// Maximum size of the body of a request to `path`.
 pub fn max_body_bytes(path: &str) -> usize {
     let takes_picture = ["/api/trial-pictures", "/api/images", "/api/projects"].contains(&path);
     if takes_picture { MAX_PICTURE_BYTES as usize } else { MAX_JSON_BYTES }
 }
 
-/// Answers a request that the guard has let pass.
+/// Answers a request that has passed the guard.
 pub fn answer(desk: &Desk, request: &Request) -> Response {
     let head = &request.head;
     let session = desk.session();

@@ -4,7 +4,7 @@ use super::answers::json_of;
 use crate::http::Response;
 use crate::session::Session;
 
-/// Answers what is asked of version `id`; `None` where there is no such address.
+/// Answers requests about version `id`; `None` for an unknown address.
 pub fn answer(session: &Session, method: &str, id: &str, rest: &[&str]) -> Option<Response> {
     let id = id.parse::<usize>().ok()?;
     Some(match (method, rest) {

@@ -1,4 +1,4 @@
-//! Requests about the other pictures of a project's folder, and photos that come from the page.
+//! Requests about the other pictures of a project's folder, and photos added on the page.
 
 use super::answers::{json_of, picture_of};
 use crate::error::Result;
@@ -6,7 +6,7 @@ use crate::http::{Request, Response};
 use crate::session::Session;
 use crate::views::ImageView;
 
-/// Answers what is asked of picture `id`; `None` where there is no such address.
+/// Answers requests about picture `id`; `None` for an unknown address.
 pub fn answer(session: &Session, method: &str, id: usize, rest: &[&str]) -> Option<Response> {
     Some(match (method, rest) {
         ("GET", ["picture"]) => picture_of(session.other_picture(id).and_then(|picture| picture.for_browser())),
@@ -16,7 +16,7 @@ pub fn answer(session: &Session, method: &str, id: usize, rest: &[&str]) -> Opti
     })
 }
 
-/// Takes a photo from the page.
+/// Adds a photo from the page.
 pub fn upload(session: &Session, request: &Request) -> Result<ImageView> {
     let name = request.head.query_value("name").unwrap_or_else(|| "photo".to_owned());
     session.upload_photo(&name, &request.body)

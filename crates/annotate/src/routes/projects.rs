@@ -1,10 +1,10 @@
-//! Requests about which project is open.
+//! Requests to choose, create and close projects.
 
 use super::answers::json_of;
 use crate::desk::Desk;
 use crate::http::{Request, Response};
 
-/// Answers what is asked of the projects; `None` where there is no such address.
+/// Answers requests about projects; `None` for an unknown address.
 pub fn answer(desk: &Desk, request: &Request, rest: &[&str]) -> Option<Response> {
     let head = &request.head;
     Some(match (head.method.as_str(), rest) {

@@ -9,7 +9,7 @@ use crate::http::{Request, Response};
 use crate::session::Session;
 use crate::views::TrialPictureView;
 
-/// Answers what is asked of picture `id`; `None` where there is no such address.
+/// Answers requests about picture `id`; `None` for an unknown address.
 pub fn answer(session: &Session, request: &Request, method: &str, id: usize, rest: &[&str]) -> Option<Response> {
     Some(match (method, rest) {
         ("GET", ["picture"]) => picture_of(session.trial_picture(id).and_then(|trial| trial.picture.for_browser())),
@@ -30,13 +30,13 @@ pub fn answer(session: &Session, request: &Request, method: &str, id: usize, res
     })
 }
 
-/// Whether the person says that the part is not in the picture.
+/// Whether the user states that the part is not in the picture.
 #[derive(Deserialize)]
 struct Absent {
     absent: bool,
 }
 
-/// Takes a picture from the page.
+/// Adds a picture from the page.
 pub fn add(session: &Session, request: &Request) -> Result<TrialPictureView> {
     let name = request.head.query_value("name").unwrap_or_else(|| "picture".to_owned());
     session.add_trial_picture(&name, &request.body)

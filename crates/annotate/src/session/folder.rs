@@ -1,4 +1,4 @@
-//! The other pictures of a project's folder: seen by the person, and taken in one by one. Photos that come from the page.
+//! The other pictures of a project's folder, which the user adds one by one, and photos added on the page.
 
 use std::path::{Path, PathBuf};
 
@@ -9,15 +9,15 @@ use crate::picture::{Picture, pictures_in};
 use crate::session_state::{MarkedPicture, State, TrialPicture};
 use crate::views::{ImageView, OtherView, TrialPictureView};
 
-/// Other pictures that are offered: a folder of all photos of a year is no part's.
+/// Maximum number of offered pictures: a folder with a year's photos is not a part's folder.
 const MAX_OFFERED: usize = 500;
 
 impl State {
-    /// The pictures of the project's folder that are not in the project. Numbers stay as long as the session lasts.
+    /// The pictures of the project's folder that are not in the project. Their numbers are fixed for the session.
     pub fn others(&mut self) -> Vec<OtherView> {
         let Some(place) = &self.place else { return Vec::new() };
         let listed = if place.folder.as_os_str().is_empty() { Path::new(".") } else { &place.folder };
-        // A folder that cannot be listed offers nothing; what is wrong with it is told where it is written to.
+        // A folder that cannot be listed offers nothing; the error is reported when it is written to.
         for path in pictures_in(listed).unwrap_or_default() {
             let path = place.folder.join(path.file_name().unwrap_or_default());
             if self.offered.len() < MAX_OFFERED && !self.offered.contains(&path) {
@@ -44,20 +44,20 @@ impl Session {
     /// Another picture of the folder.
     ///
     /// # Errors
-    /// No such picture, a file that is none.
+    /// Unknown picture, or not a picture file.
     pub(crate) fn other_picture(&self, id: usize) -> Result<Picture> {
         let path = self.state().other(id)?.to_owned();
         Picture::open(&path)
     }
 
-    /// Makes another picture of the folder a photo of the part, with the marks that stand beside it.
+    /// Makes another picture of the folder a photo of the part, with the marks beside it.
     ///
     /// # Errors
-    /// No such picture, marks that belong to another, a project that cannot be written.
+    /// Unknown picture, marks of another picture, or the project cannot be written.
     pub fn add_photo(&self, id: usize) -> Result<ImageView> {
         let mut state = self.state();
         let path = state.other(id)?.to_owned();
-        // Taken out before and put in again, it is the same photo.
+        // A photo that was removed and is added again keeps its number.
         let known = state.images.iter().position(|image| image.picture.path == path);
         let id = match known {
             Some(id) => {
@@ -77,10 +77,10 @@ impl Session {
         Ok(state.image_view(id))
     }
 
-    /// Makes another picture of the folder one to try.
+    /// Makes another picture of the folder a picture to try.
     ///
     /// # Errors
-    /// No such picture, more than a session keeps, a project that cannot be written.
+    /// Unknown picture, more pictures than a session keeps, or the project cannot be written.
     pub fn add_other_trial(&self, id: usize) -> Result<TrialPictureView> {
         let mut state = self.state();
         let path = state.other(id)?.to_owned();
@@ -102,10 +102,10 @@ impl Session {
         Ok(state.trial_picture_view(id))
     }
 
-    /// Takes a photo of the part from the page; it is written beside the first photo under a name that is not taken.
+    /// Adds a photo of the part from the page; it is written beside the first photo under an unused name.
     ///
     /// # Errors
-    /// Bytes that are no picture, a file that cannot be written.
+    /// The bytes are not a picture, or the file cannot be written.
     pub fn upload_photo(&self, name: &str, bytes: &[u8]) -> Result<ImageView> {
         let shown = name.rsplit(['/', '\\']).next().unwrap_or(name);
         Picture::check(bytes, shown)?;

@@ -1,4 +1,4 @@
-//! A session is opened: the project where it was left, the pictures that were named, and the model in use.
+//! Opening a session: the project in its last state, the given pictures, and the model in use.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
@@ -20,7 +20,7 @@ impl Session {
     /// Opens pictures, their marks and their project.
     ///
     /// # Errors
-    /// Neither picture nor camera, a picture that cannot be read, or marks that belong to another.
+    /// Neither picture nor camera, a picture that cannot be read, or marks that belong to another picture.
     pub fn open(options: &SessionOptions, teacher: Arc<dyn GraspTeacher>) -> Result<Self> {
         let place = match (&options.project, options.images.first()) {
             (Some(folder), _) => Some(ProjectPlace::of_folder(folder)),
@@ -32,7 +32,7 @@ impl Session {
             None => (ProjectFile::default(), Gone::default()),
         };
         let mut notes: Vec<String> =
-            gone.names().map(|name| format!("{name} is not there now; the project goes on naming it.")).collect();
+            gone.names().map(|name| format!("{name} does not exist now; the project still names it.")).collect();
         let folder = place.as_ref().map_or(Path::new(""), |place| &place.folder).to_owned();
         let mut photos = options.images.clone();
         for name in &project.photos {
@@ -80,7 +80,7 @@ impl Session {
                 .and_then(|bytes| teacher.open(&bytes, &models.versions[id].summary).map_err(Error::Teacher));
             match opened {
                 Ok(model) => {
-                    // What was chosen on the page holds, whatever the model's file says.
+                    // A region chosen on the page takes precedence over the model's file.
                     if project.searched.is_none() {
                         region = model.region();
                     } else if let Err(error) = model.look_in(region) {
@@ -95,7 +95,7 @@ impl Session {
                 }
             }
         }
-        // A camera's photo is not called after the photo that is taken first.
+        // Photos of a camera are not named after the first one taken.
         let proposal = || proposed_label(first.as_deref(), home.parent().unwrap_or(Path::new("")));
         let state = State {
             is_named: label.is_some(),
@@ -128,7 +128,7 @@ impl Session {
         })
     }
 
-    /// The folder of pictures that come from the page.
+    /// The folder of pictures added on the page.
     pub(super) fn uploads(&self, state: &State) -> PathBuf {
         match (&state.place, &self.temporary) {
             (None, Some(temporary)) => temporary.path().to_owned(),
@@ -136,7 +136,7 @@ impl Session {
         }
     }
 
-    /// The first photo of a camera has a project from now on; pictures that were tried before are kept in it.
+    /// From now on the first photo of a camera has a project; pictures tried before are moved into it.
     pub(super) fn settle_place(&self, state: &mut State, id: usize) -> Result<()> {
         let Some(temporary) = self.temporary.as_ref().filter(|_| state.place.is_none()) else { return Ok(()) };
         state.place = Some(ProjectPlace::of_photo(&state.images[id].picture.path)?);
@@ -154,7 +154,7 @@ impl Session {
     }
 }
 
-/// Those of the project, then those that were named and are not among them.
+/// The pictures of the project, followed by given ones that are not among them.
 fn trial_pictures(
     project: &ProjectFile,
     folder: &Path,

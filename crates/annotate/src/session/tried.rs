@@ -1,4 +1,4 @@
-//! Pictures to try: taken in, accepted as demonstrations, said to be without the part, compared.
+//! Pictures to try: adding, accepting as demonstrations, declaring them to be without the part, comparing.
 
 use std::path::Path;
 
@@ -14,13 +14,13 @@ use crate::session_state::{MarkedPicture, TrialPicture};
 use crate::teacher::{TaughtModel, TeachRequest, TeachingMaterial};
 use crate::views::{ComparedPicture, ImageView, TrialPictureView};
 
-/// Whether learning from a picture would help in others.
+/// A query whether learning from a picture would help in others.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct HelpQuestion {
-    /// How it is to be taught.
+    /// Settings of the teaching.
     teaching: TeachRequest,
-    /// The marks that the picture would have.
+    /// The marks that the picture would get.
     marks: Marks,
     /// Numbers of the other pictures.
     others: Vec<usize>,
@@ -30,31 +30,31 @@ impl Session {
     /// A picture to try.
     ///
     /// # Errors
-    /// No such picture.
+    /// Unknown picture.
     pub(crate) fn trial_picture(&self, id: usize) -> Result<TrialPicture> {
         Ok(self.state().trial_picture(id)?.clone())
     }
 
-    /// Takes a picture that came from the page; it is kept in a folder of this session.
+    /// Adds a picture from the page; it is kept in a folder of this session.
     ///
     /// # Errors
-    /// Bytes that are no picture, more pictures than a session keeps.
+    /// The bytes are not a picture, or there are more pictures than a session keeps.
     pub fn add_trial_picture(&self, name: &str, bytes: &[u8]) -> Result<TrialPictureView> {
         let count = self.state().trial_pictures.len();
         if count >= MAX_TRIAL_PICTURES {
             return Err(Error::TooManyPictures { most: MAX_TRIAL_PICTURES });
         }
-        // The name is for people; the file's own is ours.
+        // The given name is for display; the file gets its own name.
         let extension = if bytes.starts_with(b"\x89PNG") { "png" } else { "jpg" };
         let shown: String = name.rsplit(['/', '\\']).next().unwrap_or(name).chars().take(MAX_LABEL_CHARS).collect();
-        // Held until the picture is written: the next one finds its name taken.
+        // Held until the picture is written, so that its name is taken when the next one is chosen.
         let mut state = self.state();
         let folder = self.uploads(&state);
         std::fs::create_dir_all(&folder).map_err(Error::file(&folder, "cannot make this folder"))?;
         let path = free_name(&folder.join("picture"), &shown, extension);
         sdg_files::write_atomically(&path, bytes)?;
         let picture = Picture::open(&path).map_err(|error| {
-            // What is no picture is not kept.
+            // Invalid pictures are not kept.
             let _ = std::fs::remove_file(&path);
             match error {
                 Error::Demonstration { source, .. } => Error::Demonstration { name: shown.clone(), source },
@@ -67,10 +67,11 @@ impl Session {
         Ok(state.trial_picture_view(id))
     }
 
-    /// Says that the part is not in a tried picture, which then is a negative of the next teaching; or takes that back.
+    /// Declares that the part is not in a tried picture, which becomes a negative of the next teaching; or revokes
+    /// this.
     ///
     /// # Errors
-    /// No such picture, one that is a demonstration, a project that cannot be written.
+    /// Unknown picture, the picture is a demonstration, or the project cannot be written.
     pub fn set_absent(&self, trial_id: usize, is_absent: bool) -> Result<TrialPictureView> {
         let mut state = self.state();
         state.trial_picture(trial_id)?;
@@ -82,10 +83,10 @@ impl Session {
         Ok(state.trial_picture_view(trial_id))
     }
 
-    /// Takes a picture to try out of the session. Its file stays.
+    /// Removes a picture to try from the session. Its file is kept.
     ///
     /// # Errors
-    /// No such picture, a project that cannot be written.
+    /// Unknown picture, or the project cannot be written.
     pub fn remove_trial_picture(&self, id: usize) -> Result<()> {
         let mut state = self.state();
         state.trial_picture(id)?;
@@ -93,10 +94,10 @@ impl Session {
         state.save_project()
     }
 
-    /// Puts a picture to try back that was taken out in this session.
+    /// Restores a picture to try that was removed in this session.
     ///
     /// # Errors
-    /// No such picture, a project that cannot be written.
+    /// Unknown picture, or the project cannot be written.
     pub fn put_back_trial_picture(&self, id: usize) -> Result<()> {
         let mut state = self.state();
         let count = state.trial_pictures.len();
@@ -104,10 +105,10 @@ impl Session {
         state.save_project()
     }
 
-    /// What two versions of the model find in every picture to try, in the region that is searched now.
+    /// The detections of two model versions in every picture to try, in the current search region.
     ///
     /// # Errors
-    /// No such version, files that cannot be read.
+    /// Unknown version, or files cannot be read.
     pub fn compare_versions(&self, one: usize, other: usize) -> Result<Vec<ComparedPicture>> {
         let (models, pictures, region) = {
             let state = self.state();
@@ -139,11 +140,11 @@ impl Session {
         compared.collect()
     }
 
-    /// What a model without a network that has learnt from a tried picture, too, finds in other tried ones: the best score in each. Nothing is kept.
-    /// `None` while a teaching goes on, whose model is another question.
+    /// Teaches a model without a network with a tried picture added, and returns its best score in each of other tried
+    /// pictures. Nothing is kept. `None` while a teaching is running, because its model may answer the question.
     ///
     /// # Errors
-    /// A model with a network; no such picture, marks that do not suffice.
+    /// A model with a network; an unknown picture; insufficient marks.
     pub(crate) fn would_help(&self, trial_id: usize, question: HelpQuestion) -> Result<Option<Vec<(usize, f64)>>> {
         let HelpQuestion { teaching, marks, others } = question;
         teaching.check()?;
@@ -175,11 +176,11 @@ impl Session {
         pictures.into_iter().map(best_in).collect::<Result<_>>().map(Some)
     }
 
-    /// Makes a tried picture a demonstration with these marks. One that came from the page, or that lies elsewhere, gets a place beside
-    /// the first picture, under a name of its own: marks are not written into another's folder.
+    /// Makes a tried picture a demonstration with these marks. A picture from the page, or from another folder, is
+    /// copied beside the first picture under its own name: no marks are written into other folders.
     ///
     /// # Errors
-    /// No such picture, one that is a demonstration already, a file that cannot be written.
+    /// Unknown picture, the picture is a demonstration already, or a file cannot be written.
     pub fn accept(&self, trial_id: usize, marks: Marks) -> Result<ImageView> {
         let mut state = self.state();
         let trial = state.trial_picture(trial_id)?.clone();
@@ -205,10 +206,10 @@ impl Session {
         Ok(state.image_view(id))
     }
 
-    /// Makes a frame that was shown a picture to try.
+    /// Makes a shown frame a picture to try.
     ///
     /// # Errors
-    /// No camera, a frame that is not kept any more, more pictures than a session keeps.
+    /// No camera, the frame is no longer kept, or there are more pictures than a session keeps.
     pub fn keep_frame(&self, number: u64) -> Result<TrialPictureView> {
         let bytes = png(&*self.live_desk()?.frame(number)?)?;
         self.add_trial_picture(&format!("live-{number}.png"), &bytes)

@@ -1,4 +1,4 @@
-//! A real server on a real port, and a client that sends what it is told.
+//! A real server on a real port, and a client that sends given bytes.
 
 use std::io::{Read, Write};
 use std::net::{Ipv4Addr, Shutdown, TcpStream};
@@ -18,12 +18,12 @@ use sdg_demonstration::Demonstration;
 use sdg_geometry::{GraspLine, PlanarGrasp};
 use serde_json::Value;
 
-/// A teacher whose model finds its demonstration where it was photographed; quick, for the page's own sake.
+/// A teacher whose model finds the part only where it is in its demonstration; quick, for tests of the page.
 struct InPlace;
 
 struct InPlaceModel(Demonstration, Vec<RgbImage>, Mutex<Option<Region>>);
 
-/// What is read from the file of one, which keeps nothing of it: it finds nothing.
+/// The model read from such a file, which contains nothing: it detects nothing.
 struct ReadModel(TaughtSummary, Mutex<Option<Region>>);
 
 impl TaughtModel for ReadModel {
@@ -152,7 +152,7 @@ impl TaughtModel for InPlaceModel {
     }
 }
 
-/// A server over a folder with one photo, ended when dropped.
+/// A server for a folder with one photo; stopped when dropped.
 pub struct Served {
     pub folder: tempfile::TempDir,
     pub port: u16,
@@ -161,14 +161,14 @@ pub struct Served {
     thread: Option<JoinHandle<()>>,
 }
 
-/// What a client does after it has sent.
+/// The client's action after sending.
 #[derive(PartialEq)]
 pub enum Then {
     Close,
     StaySilent,
 }
 
-/// An answer, taken apart.
+/// A parsed response.
 pub struct Answer {
     pub status: u16,
     pub head: String,
@@ -201,7 +201,7 @@ pub fn photo_png() -> Vec<u8> {
     bytes.into_inner()
 }
 
-/// How long connections may be silent unless a test is about that.
+/// Maximum silence of connections, unless a test is about it.
 const PATIENCE: Duration = Duration::from_secs(30);
 
 impl Served {
@@ -209,7 +209,7 @@ impl Served {
         Self::with_patience(PATIENCE)
     }
 
-    /// The same, closing connections after so long a silence.
+    /// The same with another maximum silence.
     pub fn with_patience(patience: Duration) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let image: PathBuf = folder.path().join("photo.png");
@@ -218,26 +218,26 @@ impl Served {
         Self::open(folder, SessionOptions { images: vec![(image, None)], ..SessionOptions::default() }, patience)
     }
 
-    /// A server on a project's folder.
+    /// A server for a project's folder.
     pub fn of_project(folder: tempfile::TempDir) -> Self {
         let options = SessionOptions { project: Some(folder.path().to_owned()), ..SessionOptions::default() };
         Self::open(folder, options, PATIENCE)
     }
 
-    /// A server on the photo of a folder, as a photo is opened.
+    /// A server for a photo in a folder.
     pub fn of_photo(folder: tempfile::TempDir, name: &str) -> Self {
         let images = vec![(folder.path().join(name), None)];
         Self::open(folder, SessionOptions { images, ..SessionOptions::default() }, PATIENCE)
     }
 
-    /// The same with pictures to try from elsewhere.
+    /// The same with pictures to try from another folder.
     pub fn of_photo_and_tried(folder: tempfile::TempDir, name: &str, tried: &std::path::Path) -> Self {
         let images = vec![(folder.path().join(name), None)];
         let trial_pictures = vec![tried.to_owned()];
         Self::open(folder, SessionOptions { images, trial_pictures, ..SessionOptions::default() }, PATIENCE)
     }
 
-    /// A server without a project, whose new ones are made in the folder.
+    /// A server without a project; new ones are created in the folder.
     pub fn of_start(folder: tempfile::TempDir) -> Self {
         let recent = RecentProjects::at(folder.path().join("state/recent.json"));
         let noted = recent.clone();
@@ -250,7 +250,7 @@ impl Served {
         Self::serve(folder, Server::bind_start(start, 0, None).unwrap())
     }
 
-    /// Ends the server and gives its folder back.
+    /// Stops the server and returns its folder.
     pub fn end(mut self) -> tempfile::TempDir {
         let folder = std::mem::replace(&mut self.folder, tempfile::tempdir().unwrap());
         drop(self);
@@ -280,7 +280,7 @@ impl Served {
         Self { folder, port, token, stop, thread: Some(thread) }
     }
 
-    /// Sends exactly these bytes, closes that direction unless told to stay silent, and reads to the end.
+    /// Sends exactly these bytes, closes the sending direction unless told to stay silent, and reads to the end.
     pub fn exchange(&self, bytes: &[u8], then: Then) -> String {
         let mut stream = TcpStream::connect((Ipv4Addr::LOCALHOST, self.port)).unwrap();
         stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
@@ -290,7 +290,7 @@ impl Served {
         }
         let mut answer = Vec::new();
         match stream.read_to_end(&mut answer) {
-            // What a server has not read when it closes is answered with a reset.
+            // If the server closes with unread bytes, the connection is reset.
             Err(error) if error.kind() != std::io::ErrorKind::ConnectionReset => panic!("{error}"),
             _ => String::from_utf8_lossy(&answer).into_owned(),
         }
@@ -305,7 +305,7 @@ impl Served {
             head += &format!("{name}: {value}\r\n");
         }
         stream.write_all(format!("{head}\r\n").as_bytes()).unwrap();
-        // A server that refuses by the head alone may close before it has read the body.
+        // A server that rejects the head may close before it has read the body.
         let _ = stream.write_all(body);
         let mut answer = Vec::new();
         let _ = stream.read_to_end(&mut answer);
@@ -323,7 +323,7 @@ impl Served {
         format!("sdg-annotate-{}={}", self.port, self.token)
     }
 
-    /// A request as the page makes it.
+    /// A request in the form of the page.
     pub fn ask(&self, method: &str, path: &str, body: &[u8]) -> Answer {
         let (host, cookie) = (self.host(), self.cookie());
         let origin = format!("http://{host}");

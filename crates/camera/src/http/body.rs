@@ -1,4 +1,4 @@
-//! An answer's body: its bytes, freed of their framing.
+//! The body of a response, without its framing.
 
 use std::io::{ErrorKind, Read};
 use std::net::TcpStream;
@@ -6,32 +6,32 @@ use std::time::Instant;
 
 use super::waiting::{in_words, time_left};
 
-/// A chunk's size in hexadecimal, with extensions.
+/// Maximum length of a chunk's size line: hexadecimal digits and extensions.
 const MAX_CHUNK_LINE_BYTES: usize = 1024;
-/// Read at once.
+/// Bytes per read.
 const PIECE_BYTES: usize = 64 << 10;
 
-/// Where a body ends.
+/// The end of a body.
 #[derive(Debug)]
 pub(super) enum Framing {
-    /// After so many bytes.
+    /// After this number of bytes.
     Length { left: u64 },
-    /// In chunks, each with its size before it.
+    /// In chunks, each preceded by its size.
     Chunked(Chunk),
     /// When the connection is closed.
     UntilClose,
 }
 
-/// Where in the chunks.
+/// Position within the chunks.
 #[derive(Debug)]
 pub(super) enum Chunk {
-    /// Within the line with the size: what there is of it.
+    /// In the size line; the part received so far.
     Size(Vec<u8>),
-    /// Within the data.
+    /// In the data.
     Data { left: u64 },
-    /// Within the line end after the data.
+    /// In the line end after the data.
     LineEnd,
-    /// Behind the last.
+    /// After the last chunk.
     End,
 }
 
@@ -44,7 +44,7 @@ impl Framing {
         matches!(self, Self::Length { left: 0 } | Self::Chunked(Chunk::End))
     }
 
-    /// Moves the body's own bytes from what was read to `out`.
+    /// Copies the body's bytes, without framing, to `out`.
     fn unframe(&mut self, mut bytes: &[u8], out: &mut Vec<u8>) -> Result<(), String> {
         while !bytes.is_empty() && !self.has_ended() {
             match self {
@@ -105,22 +105,22 @@ fn take_up_to(left: &mut u64, bytes: &mut &[u8], out: &mut Vec<u8>) {
     *left -= count as u64;
 }
 
-/// What a read gave.
+/// Result of a read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Progress {
-    /// More bytes follow.
+    /// More data may follow.
     More,
-    /// None until the deadline.
+    /// No data until the deadline.
     Late,
-    /// The body is over.
+    /// The body is complete.
     End,
 }
 
-/// A body that is being read.
+/// A body being read.
 pub(super) struct Body {
     stream: TcpStream,
     framing: Framing,
-    /// What came with the head, freed of its framing, until it is handed out.
+    /// Bytes of the body received with the head, without framing, until they are returned.
     first: Vec<u8>,
 }
 
@@ -132,10 +132,10 @@ impl Body {
         Ok(Self { stream, framing, first })
     }
 
-    /// Waits for bytes until the deadline and adds them to `out`. Without a deadline it takes what is there.
+    /// Waits for bytes until the deadline and appends them to `out`. Without a deadline it takes the available bytes.
     ///
     /// # Errors
-    /// In words, how the connection or its framing broke.
+    /// Text that describes the error of the connection or of its framing.
     pub(super) fn read(&mut self, out: &mut Vec<u8>, deadline: Option<Instant>) -> Result<Progress, String> {
         if !self.first.is_empty() {
             out.append(&mut self.first);

@@ -1,4 +1,4 @@
-//! One request and the head of its answer.
+//! One request and the head of its response.
 
 use std::io::{Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
@@ -10,33 +10,33 @@ use super::body::{Body, Framing};
 use super::url::Url;
 use super::waiting::{in_words, time_left};
 
-/// More than any camera's head.
+/// Maximum size of a response's head.
 pub(super) const MAX_HEAD_BYTES: usize = 16 << 10;
-/// More headers than any camera's.
+/// Maximum number of headers.
 pub(super) const MAX_HEADERS: usize = 64;
-/// From an address to the pictures.
+/// Maximum number of redirects.
 const MAX_REDIRECTS: u32 = 5;
 
-/// An answer with status 200.
+/// A response with status 200.
 pub(super) struct Answer {
     pub(super) content_type: String,
     pub(super) body: Body,
 }
 
-/// The answer to a server's challenge, kept from picture to picture: each is then asked for once.
+/// The client's state for the server's challenge, kept between pictures: each picture then needs only one request.
 #[derive(Default)]
 pub(super) struct Login(Option<PasswordClient>);
 
-/// Asks, says who asks where that is wanted, and follows redirects.
+/// Sends a request, authenticates if required, and follows redirects.
 ///
 /// # Errors
-/// In words, why there is no answer with a body.
+/// Text that says why there is no response with a body.
 pub(super) fn get(url: &Url, login: &mut Login, deadline: Instant) -> Result<Answer, String> {
     let mut url = url.clone();
     for _ in 0..=MAX_REDIRECTS {
         let known = login.authorization(&url).unwrap_or_default();
         let reply = match get_once(&url, known.as_deref(), deadline)? {
-            // Also where what was answered before is stale.
+            // Also if the previous authentication has become stale.
             Reply::Challenges(challenges) => {
                 login.challenged(&url, &challenges)?;
                 get_once(&url, login.authorization(&url)?.as_deref(), deadline)?
@@ -57,12 +57,12 @@ pub(super) fn get(url: &Url, login: &mut Login, deadline: Instant) -> Result<Ans
 enum Reply {
     Answer(Answer),
     Redirect(String),
-    /// Status 401: how the camera wants to know who asks.
+    /// Status 401: the authentication challenges.
     Challenges(Vec<String>),
 }
 
 impl Login {
-    /// Takes a server's challenges, digest or basic.
+    /// Accepts a server's challenge, digest or basic.
     fn challenged(&mut self, url: &Url, challenges: &[String]) -> Result<(), String> {
         if url.credentials().is_none() {
             return Err(
@@ -75,7 +75,7 @@ impl Login {
         Ok(())
     }
 
-    /// The value of the header that says who asks; `None` where no server has asked for it.
+    /// The value of the Authorization header; `None` if no server has requested it.
     fn authorization(&mut self, url: &Url) -> Result<Option<String>, String> {
         let (Some(client), Some((username, password))) = (&mut self.0, url.credentials()) else { return Ok(None) };
         let params = http_auth::PasswordParams { username, password, uri: url.path(), method: "GET", body: Some(&[]) };
@@ -103,7 +103,7 @@ fn get_once(url: &Url, authorization: Option<&str>, deadline: Instant) -> Result
     loop {
         if let Some((head, length)) = Head::read(&bytes)? {
             bytes.drain(..length);
-            // 100 Continue and its like stand before the answer.
+            // Interim responses such as 100 Continue precede the final one.
             if (100..200).contains(&head.status) {
                 continue;
             }
@@ -136,7 +136,7 @@ fn connect(url: &Url, deadline: Instant) -> Result<TcpStream, String> {
     Err(why)
 }
 
-/// What counts of an answer's head.
+/// The relevant fields of a response's head.
 #[derive(Debug, Default, PartialEq, Eq)]
 struct Head {
     status: u16,
@@ -148,7 +148,7 @@ struct Head {
 }
 
 impl Head {
-    /// The head and its length; `None` while it has not all arrived.
+    /// The head and its length; `None` while it is incomplete.
     fn read(bytes: &[u8]) -> Result<Option<(Self, usize)>, String> {
         let mut headers = [httparse::EMPTY_HEADER; MAX_HEADERS];
         let mut answer = httparse::Response::new(&mut headers);

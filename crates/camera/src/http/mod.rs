@@ -4,8 +4,8 @@
 //! Url ── exchange: connect, request, head, redirects ── Body: framing ─┬─ Multipart ── MotionJpeg   (one connection)
 //!                                                                      └─ one picture ── Snapshots  (a connection each)
 //! ```
-//! A small client of its own: cameras need no more of HTTP, and everything that a server can send is bounded in memory and
-//! in time. Absent: TLS, compression, cookies, proxies, keep-alive between snapshots.
+//! A minimal HTTP client: cameras need no more, and everything that a server can send is bounded in memory and in time.
+//! Absent: TLS, compression, cookies, proxies, keep-alive between snapshots.
 
 mod body;
 mod exchange;
@@ -23,7 +23,7 @@ use crate::source::Source;
 
 pub use url::Url;
 
-/// Asks the server and finds out by its answer which of the two it is.
+/// Sends a request and determines from the response which of the two kinds the server is.
 pub(crate) fn connect(url: &Url, options: &OpenOptions, deadline: Instant) -> Result<Box<dyn Source>, CameraError> {
     let refused = |why: String| CameraError::Open { address: url.to_string(), why };
     let mut login = exchange::Login::default();

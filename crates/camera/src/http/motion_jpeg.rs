@@ -1,4 +1,4 @@
-//! Motion JPEG: one answer that does not end, a picture in each part.
+//! Motion JPEG: one endless response with a picture in each part.
 
 use std::time::{Duration, Instant, SystemTime};
 
@@ -9,8 +9,8 @@ use super::multipart::Multipart;
 use crate::decode::decode;
 use crate::source::{Missing, Source, Taken};
 
-/// For so long, newer pictures that have arrived are looked for. A server that sends faster than that can be read would be followed
-/// for ever.
+/// Maximum time for skipping to newer pictures. Without it, a server that sends faster than the client reads would be
+/// followed for ever.
 const MAX_CATCH_UP: Duration = Duration::from_millis(20);
 
 /// One connection.
@@ -18,22 +18,22 @@ pub(super) struct MotionJpeg {
     multipart: Multipart,
     body: Body,
     frame: PixelFrame,
-    /// How the connection ended, found while looking for newer pictures.
+    /// The end of the connection, if it was found while skipping.
     end: Option<Result<Progress, String>>,
 }
 
 impl MotionJpeg {
     /// # Errors
-    /// In words, a content type without a boundary.
+    /// Text that says that the content type has no boundary.
     pub(super) fn new(content_type: &str, body: Body, frame: PixelFrame) -> Result<Self, String> {
         Ok(Self { multipart: Multipart::new(content_type)?, body, frame, end: None })
     }
 
-    /// Goes on to the newest part that has arrived; counts those that it passes over.
+    /// Skips to the newest part received; counts the skipped parts.
     fn catch_up(&mut self, mut part: Vec<u8>) -> (Vec<u8>, u64) {
         let start = Instant::now();
         let mut num_skipped = 0;
-        // The next call meets the broken framing again and reports it.
+        // The next call finds the broken framing again and reports it.
         loop {
             match self.multipart.next_part() {
                 Ok(Some(newer)) => {

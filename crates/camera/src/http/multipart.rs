@@ -3,16 +3,16 @@
 use super::exchange::{MAX_HEAD_BYTES, MAX_HEADERS};
 use crate::decode::MAX_ENCODED_BYTES;
 
-/// Cuts a body at its boundaries.
+/// Splits a body at its boundaries.
 ///
-/// Cameras differ: the boundary is announced with or without its leading dashes, line ends are CRLF or LF, a part tells its length or
-/// ends at the next boundary. All of that is read.
+/// Cameras differ, and all variants are accepted: the boundary is announced with or without its leading dashes, line
+/// ends are CRLF or LF, a part states its length or ends at the next boundary.
 #[derive(Debug)]
 pub(super) struct Multipart {
     /// `--` and the boundary.
     delimiter: Vec<u8>,
     buffer: Vec<u8>,
-    /// Up to here the buffer was searched for the delimiter.
+    /// The buffer was searched for the delimiter up to this position.
     searched: usize,
     state: State,
 }
@@ -21,17 +21,17 @@ pub(super) struct Multipart {
 enum State {
     /// Before a boundary.
     Boundary,
-    /// Between a boundary and the part.
+    /// Between a boundary and its part.
     Head,
-    /// Within a part of so many bytes.
+    /// In a part of known length.
     Sized(usize),
-    /// Within a part that ends at the next boundary.
+    /// In a part that ends at the next boundary.
     Unsized,
 }
 
 impl Multipart {
     /// # Errors
-    /// In words, a content type without a boundary.
+    /// Text that says that the content type has no boundary.
     pub(super) fn new(content_type: &str) -> Result<Self, String> {
         let parameters = content_type.split(';').skip(1).filter_map(|parameter| parameter.trim().split_once('='));
         let boundary = parameters.into_iter().find(|(name, _)| name.trim().eq_ignore_ascii_case("boundary"));
@@ -44,26 +44,26 @@ impl Multipart {
         Ok(Self { delimiter, buffer: Vec::new(), searched: 0, state: State::Boundary })
     }
 
-    /// Where bytes are added.
+    /// The buffer to append data to.
     pub(super) fn buffer(&mut self) -> &mut Vec<u8> {
         &mut self.buffer
     }
 
-    /// Whether a part has begun and is not whole.
+    /// Whether a part has begun and is incomplete.
     pub(super) fn is_in_part(&self) -> bool {
         matches!(self.state, State::Sized(_) | State::Unsized)
     }
 
-    /// The next whole part, without its head; `None` until there is more.
+    /// The next complete part, without its head; `None` until there is more data.
     ///
     /// # Errors
-    /// In words, what no camera sends. Nothing can be read behind it.
+    /// Text that describes the malformed data. Nothing after it can be read.
     pub(super) fn next_part(&mut self) -> Result<Option<Vec<u8>>, String> {
         loop {
             match self.state {
                 State::Boundary => {
                     let Some(at) = self.find_delimiter() else {
-                        // What was searched is thrown away but for a delimiter that has begun.
+                        // Discards the searched bytes, except for the beginning of a delimiter.
                         self.buffer.drain(..self.searched);
                         self.searched = 0;
                         return Ok(None);
@@ -122,9 +122,9 @@ struct PartHead {
 }
 
 impl PartHead {
-    /// The head behind a boundary, and its length with the empty line; `None` while it has not all arrived.
+    /// The head after a boundary, and its length with the empty line; `None` while it is incomplete.
     fn read(bytes: &[u8]) -> Result<Option<(Self, usize)>, String> {
-        // The rest of the boundary's line: nothing, or `--` behind the last part.
+        // The rest of the boundary's line: empty, or `--` after the last part.
         let Some(line_end) = bytes.iter().position(|&byte| byte == b'\n') else {
             return Ok(None);
         };

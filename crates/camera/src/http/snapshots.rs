@@ -1,4 +1,4 @@
-//! Single pictures, fetched again and again.
+//! Single pictures, fetched repeatedly.
 
 use std::thread::sleep;
 use std::time::{Duration, Instant, SystemTime};
@@ -16,7 +16,7 @@ use crate::source::{Missing, Source, Taken};
 pub(super) struct Snapshots {
     url: Url,
     login: Login,
-    /// The answer that showed that these are single pictures.
+    /// The response that identified the server as one of single pictures.
     first: Option<Answer>,
     interval: Duration,
     next_at: Instant,
@@ -41,7 +41,7 @@ impl Source for Snapshots {
     fn take(&mut self, deadline: Instant) -> Result<Option<Taken>, Missing> {
         let wait = self.next_at.saturating_duration_since(Instant::now());
         sleep(wait);
-        // The time between pictures, which was asked for, is not the camera's.
+        // Waiting for the requested interval is not a delay of the camera.
         let deadline = deadline + wait;
         self.next_at = Instant::now() + self.interval;
         let mut answer = match self.first.take() {
@@ -61,7 +61,7 @@ impl Source for Snapshots {
                 }
                 Ok(Progress::More) => {}
                 Ok(Progress::End) => break,
-                // The rest of a picture that is late is not waited for: the next one is asked for anew.
+                // A late picture is abandoned: the next call requests a new one.
                 Ok(Progress::Late) => return Err(Missing::Late),
                 Err(why) => return Err(Missing::Torn(format!("{} bytes, then: {why}", bytes.len()))),
             }

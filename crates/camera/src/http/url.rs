@@ -5,10 +5,10 @@ use std::str::FromStr;
 
 use crate::error::CameraError;
 
-/// An `http://` address, with user and password where the camera requires them.
+/// An `http://` address, with user and password if the camera requires them.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Url {
-    /// Host and port as in the `Host` header: without the port where it is 80.
+    /// Host and port as in the `Host` header: without port 80.
     authority: String,
     host: String,
     port: u16,
@@ -24,7 +24,7 @@ struct Credentials {
 }
 
 impl Url {
-    /// The host's name or number; a number of IPv6 without its brackets.
+    /// The host's name or address; an IPv6 address without its brackets.
     pub(crate) fn host(&self) -> &str {
         &self.host
     }
@@ -46,10 +46,10 @@ impl Url {
         self.credentials.as_ref().map(|Credentials { user, password }| (user.as_str(), password.as_str()))
     }
 
-    /// Where a redirect leads. User and password go along only to the same host and port.
+    /// The target of a redirect. User and password are sent only to the same host and port.
     ///
     /// # Errors
-    /// In words, a target that is not followed.
+    /// Text that says why the target is not followed.
     pub(crate) fn redirected(&self, location: &str) -> Result<Self, String> {
         let target = match location {
             rest if rest.starts_with("//") => format!("http:{rest}"),
@@ -75,7 +75,7 @@ impl FromStr for Url {
     fn from_str(text: &str) -> Result<Self, CameraError> {
         let refused = |expected: &str| CameraError::Address { expected: expected.into(), found: text.into() };
         let rest = text.strip_prefix("http://").ok_or_else(|| refused("an address that begins with http://"))?;
-        // What would end the request's first line early has no place in it.
+        // Characters that would end the request line early are rejected.
         if text.chars().any(|character| character.is_ascii_control() || character == ' ') {
             return Err(refused("an address without blanks (write %20)"));
         }

@@ -1,15 +1,15 @@
-//! How long a read or write may still wait, and what the system says when it took longer.
+//! The remaining time of a read or write, and the text of a timeout.
 
 use std::io;
 use std::time::{Duration, Instant};
 
-/// `None` when it is over.
+/// The time until the deadline; `None` if it has passed.
 pub(super) fn time_left(deadline: Instant) -> Option<Duration> {
-    // A read timeout of 0 is refused by the system; less than a millisecond is as good as nothing.
+    // The system rejects a read timeout of 0; below a millisecond the time counts as over.
     deadline.checked_duration_since(Instant::now()).filter(|left| *left >= Duration::from_millis(1))
 }
 
-/// The system's message; that of a timeout depends on the system.
+/// The system's message; timeouts get a uniform text, because theirs depends on the system.
 pub(super) fn in_words(error: io::Error) -> String {
     match error.kind() {
         io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut => "nothing in time".to_owned(),

@@ -1,4 +1,4 @@
-// The picture says everything to those who see it; the same in words to a screen reader, and to everybody that the program has ended.
+// Passes the description of the picture to screen readers, and shows that the program has ended.
 const words = document.getElementById('words');
 const ended = document.getElementById('ended');
 
@@ -7,7 +7,7 @@ async function look() {
     const answer = await fetch('/words');
     const text = await answer.text();
     if (text !== words.textContent) words.textContent = text;
-    if (!ended.hidden) location.reload(); // started again with the same port
+    if (!ended.hidden) location.reload(); // restarted with the same port
   } catch {
     ended.hidden = false;
   }

@@ -1,17 +1,17 @@
-//! Which of a node's formats and sizes is taken.
+//! Choice among a node's formats and sizes.
 
 use super::node::Format;
 use crate::options::{Encoding, OpenOptions};
 
-/// What is asked of the driver.
+/// The settings requested from the driver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Choice {
     pub(super) encoding: Encoding,
     pub(super) size: (u32, u32),
 }
 
-/// The best of a node's formats: of the wanted size, fast enough, and with the least lost in its encoding, in that order.
-/// `None` where there is none that is read here.
+/// The best of a node's formats. Criteria in this order: the wanted size, a sufficient frame rate, the smallest loss of
+/// the encoding. `None` if no format is supported.
 pub(super) fn choose(formats: &[Format], options: &OpenOptions) -> Option<Choice> {
     let wanted = (options.width, options.height);
     let rated = formats.iter().filter_map(|format| {
@@ -19,7 +19,7 @@ pub(super) fn choose(formats: &[Format], options: &OpenOptions) -> Option<Choice
         let (size, place) = format.sizes.nearest(wanted)?;
         let differs = size.0.abs_diff(wanted.0) + size.1.abs_diff(wanted.1);
         let fps = format.max_fps.get(place).copied().filter(|fps| *fps > 0.0);
-        // Drivers round: 29.97 frames a second are as good as 30.
+        // Drivers round: 29.97 frames per second count as 30.
         let is_slow = options.fps.zip(fps).is_some_and(|(wanted, fps)| fps < wanted * 0.99);
         let rank = Encoding::ALL.iter().position(|known| *known == encoding);
         Some(((differs, is_slow, rank), Choice { encoding, size }))
@@ -42,7 +42,7 @@ mod tests {
         OpenOptions { width, height, fps, ..OpenOptions::default() }
     }
 
-    /// A usual USB webcam: large uncompressed frames are slow.
+    /// A common USB webcam: large uncompressed frames are slow.
     fn webcam() -> Vec<Format> {
         vec![
             format(Some(Encoding::Mjpeg), &[(1280, 720), (640, 480)], &[30.0, 30.0]),

@@ -1,10 +1,10 @@
-//! Cameras of Video4Linux 2, by the crate `linuxvideo`: Linux alone.
+//! Cameras of Video4Linux 2, with the crate `linuxvideo`: Linux only.
 //!
 //! ```text
 //! /dev/video* ── nodes: what each offers ── choice: encoding and size ── stream: buffers to pictures
 //! ```
-//! The driver's own frame counter and time are not to be had: frames are numbered as they are read, and carry the time at which they
-//! were read.
+//! The driver's frame counter and timestamps are not accessible: frames are numbered as they are read, with the time at
+//! which they were read.
 
 #[cfg_attr(not(target_os = "linux"), allow(dead_code))]
 mod choice;
@@ -16,13 +16,13 @@ mod stream;
 
 pub use node::{Format, Node, Sizes};
 
-/// The nodes of this machine that capture pictures, in the order of their numbers; none where V4L2 is missing.
+/// The nodes of this machine that capture pictures, in the order of their numbers; empty without V4L2.
 #[cfg(target_os = "linux")]
 pub fn nodes() -> Vec<Node> {
     nodes::nodes()
 }
 
-/// None: V4L2 is Linux's.
+/// Empty: V4L2 exists only on Linux.
 #[cfg(not(target_os = "linux"))]
 pub fn nodes() -> Vec<Node> {
     Vec::new()
@@ -31,12 +31,12 @@ pub fn nodes() -> Vec<Node> {
 #[cfg(target_os = "linux")]
 pub(crate) use stream::open;
 
-/// V4L2 is Linux's.
+/// Fails: V4L2 exists only on Linux.
 #[cfg(not(target_os = "linux"))]
 pub(crate) fn open(
     name: &crate::NodeName,
     _options: &crate::OpenOptions,
 ) -> Result<Box<dyn crate::source::Source>, crate::CameraError> {
     let address = crate::Address::V4l(name.clone()).to_string();
-    Err(crate::CameraError::Open { address, why: "expected Linux, which alone has V4L2".to_owned() })
+    Err(crate::CameraError::Open { address, why: "expected Linux: V4L2 exists only there".to_owned() })
 }

@@ -7,40 +7,40 @@ use crate::options::Encoding;
 /// A V4L2 node that captures pictures.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Node {
-    /// As in `/dev/video0`.
+    /// Path such as `/dev/video0`.
     pub path: PathBuf,
     /// The card's name.
     pub name: String,
     /// The driver's name.
     pub driver: String,
-    /// Where it is attached.
+    /// The bus address.
     pub bus: String,
-    /// What it offers, in the driver's order.
+    /// Its formats, in the driver's order.
     pub formats: Vec<Format>,
 }
 
-/// One way in which a node delivers its pictures.
+/// A pixel format of a node.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Format {
-    /// V4L2's four letters.
+    /// V4L2's four-character code.
     pub fourcc: String,
     /// The driver's description.
     pub description: String,
-    /// The encoding, where it is one that is read here.
+    /// The encoding, if supported.
     pub encoding: Option<Encoding>,
     /// Sizes in pixels: a list, or a range with steps.
     pub sizes: Sizes,
-    /// The highest frame rate of each of [`Sizes::Listed`], in frames a second; 0 where the driver does not say. Empty for an encoding
-    /// that is not read here.
+    /// Maximum frame rate of each of [`Sizes::Listed`], in frames per second; 0 if the driver does not give it. Empty
+    /// for an unsupported encoding.
     pub max_fps: Vec<f64>,
 }
 
 /// The sizes of a format, in pixels.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Sizes {
-    /// These: width and height.
+    /// A list of width and height.
     Listed(Vec<(u32, u32)>),
-    /// All from the smallest to the largest; a driver may round.
+    /// All sizes in a range; the driver may round.
     Range {
         /// The smallest width and height.
         min: (u32, u32),
@@ -50,7 +50,7 @@ pub enum Sizes {
 }
 
 impl Sizes {
-    /// The size next to the wanted one by its number of pixels and its shape, and its place in the list.
+    /// The size closest to the wanted one in number of pixels and shape, and its index in the list.
     pub(super) fn nearest(&self, wanted: (u32, u32)) -> Option<((u32, u32), usize)> {
         match self {
             Self::Listed(sizes) => {

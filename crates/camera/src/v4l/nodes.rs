@@ -1,4 +1,4 @@
-//! What the nodes of this machine offer.
+//! Enumerates the nodes of this machine.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -14,7 +14,7 @@ pub(super) fn nodes() -> Vec<Node> {
     paths().iter().filter_map(|path| read(path).ok()).filter(|node| !node.formats.is_empty()).collect()
 }
 
-/// `/dev/video*` in the order of the numbers.
+/// `/dev/video*` in numerical order.
 pub(super) fn paths() -> Vec<PathBuf> {
     let number = |path: &Path| path.file_name()?.to_str()?.strip_prefix("video")?.parse::<u32>().ok();
     let entries = fs::read_dir("/dev").into_iter().flatten().filter_map(|entry| Some(entry.ok()?.path()));
@@ -23,7 +23,7 @@ pub(super) fn paths() -> Vec<PathBuf> {
     paths.into_iter().map(|(_, path)| path).collect()
 }
 
-/// The card, driver and formats of one node; its formats are empty where it does not capture pictures.
+/// The card, driver and formats of one node; the formats are empty if it does not capture pictures.
 pub(super) fn read(path: &Path) -> std::io::Result<Node> {
     let device = Device::open(path)?;
     let card = device.capabilities()?;
@@ -48,11 +48,11 @@ fn read_format(device: &Device, format: PixelFormat, description: &str) -> Forma
         Ok(FrameSizes::Stepwise(sizes) | FrameSizes::Continuous(sizes)) => {
             Sizes::Range { min: (sizes.min_width(), sizes.min_height()), max: (sizes.max_width(), sizes.max_height()) }
         }
-        // A driver without this list takes what it is asked for, or says what it gives instead.
+        // A driver without this list accepts the requested size, or returns the one that it uses instead.
         Err(_) => Sizes::Range { min: (1, 1), max: (u32::MAX, u32::MAX) },
     };
     let max_fps = match &sizes {
-        // Dozens of calls a size: for what is read alone.
+        // Dozens of calls per size: only for supported formats.
         Sizes::Listed(sizes) if encoding.is_some() => sizes.iter().map(|size| max_fps(device, format, *size)).collect(),
         _ => Vec::new(),
     };

@@ -1,4 +1,4 @@
-//! A node that delivers frames.
+//! Frames from a node.
 
 use std::path::PathBuf;
 use std::thread::sleep;
@@ -19,9 +19,9 @@ use crate::options::{Encoding, OpenOptions};
 use crate::source::{Missing, Source, Taken};
 use crate::yuv::{rgb24_to_rgb, yuyv_to_rgb};
 
-/// Between looks at whether a buffer is filled: the wait has an end so, which the system's own has not.
+/// Interval of checks for a filled buffer: the system's own wait has no timeout.
 const LOOK_EVERY: Duration = Duration::from_millis(1);
-/// Buffers that were filled while no picture was read for longer than this are dropped: they are that old.
+/// If no picture was read for longer than this, the filled buffers are dropped: they are too old.
 const MAX_AGE: Duration = Duration::from_millis(200);
 /// V4L2's exposure times are in units of 100 µs.
 const EXPOSURES_A_SECOND: f64 = 1e4;
@@ -31,8 +31,8 @@ const EXPOSURE_MANUAL: i32 = 1;
 /// Opens a node and starts it.
 ///
 /// # Errors
-/// [`CameraError::Open`] where there is no such node or it has no format that is read here, [`CameraError::Setting`] where it does not
-/// take a fixed exposure or white balance.
+/// [`CameraError::Open`] if there is no such node or it has no supported format, [`CameraError::Setting`] if it rejects
+/// a fixed exposure or white balance.
 pub(crate) fn open(name: &NodeName, options: &OpenOptions) -> Result<Box<dyn Source>, CameraError> {
     let address = Address::V4l(name.clone()).to_string();
     let refused = |why: String| CameraError::Open { address: address.clone(), why };
@@ -57,7 +57,7 @@ fn all_encodings() -> String {
     Encoding::ALL.map(fourcc).join(" or ")
 }
 
-/// The node's path; in words, why there is none.
+/// The node's path, or text that says why there is none.
 fn find(name: &NodeName, options: &OpenOptions) -> Result<PathBuf, String> {
     if let NodeName::Path(path) = name {
         return Ok(path.clone());
@@ -85,13 +85,13 @@ fn find(name: &NodeName, options: &OpenOptions) -> Result<PathBuf, String> {
     })
 }
 
-/// Fixes exposure and white balance where that is asked for.
+/// Sets fixed exposure and white balance if requested.
 fn set_controls(device: &mut Device, options: &OpenOptions, address: &str) -> Result<(), CameraError> {
     let mut set = |setting: &'static str, values: [(Cid, i32); 2]| {
         for (control, value) in values {
             let range = device.controls().map_while(Result::ok).find(|known| known.id() == control);
             let refused = |found: String| CameraError::Setting { address: address.to_owned(), setting, found };
-            let range = range.ok_or_else(|| refused(format!("none of V4L2's name {control:?}")))?;
+            let range = range.ok_or_else(|| refused(format!("no V4L2 control {control:?}")))?;
             if !(range.minimum()..=range.maximum()).contains(&value) {
                 let found = format!(
                     "that {} goes from {} to {}, not to {value}",
@@ -140,7 +140,8 @@ impl Stream {
         }
         let bytes_per_row = given.bytes_per_line() as usize;
         if let Some(fps) = options.fps {
-            // The driver takes the nearest rate that it has; frames tell which. One without rates refuses.
+            // The driver uses its nearest frame rate; the frames' times show which. A driver without frame rates
+            // returns an error.
             let interval = Fract::new(1000, (fps * 1000.0).round() as u32);
             capture.set_frame_interval(interval).map_err(|error| ("takes no frame rate", error))?;
         }

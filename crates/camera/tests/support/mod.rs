@@ -1,4 +1,4 @@
-//! A server that does what a script says, and pictures to tell apart.
+//! A server that runs a script, and distinguishable pictures.
 
 use std::io::{Read, Write};
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
@@ -11,10 +11,10 @@ use image::codecs::jpeg::JpegEncoder;
 use image::{Rgb, RgbImage};
 use sdg_camera::{Address, Camera, CameraError, Frame, OpenOptions};
 
-/// Without a frame for so long a camera of these tests is stale.
+/// Time without a frame after which a camera of these tests is stale.
 pub const STALL_TIMEOUT: Duration = Duration::from_millis(400);
 
-/// What a connection does, after its request was read.
+/// The actions on a connection after its request was read.
 pub type Script = Box<dyn Fn(&mut TcpStream) + Send + Sync>;
 
 /// A JPEG of one level of grey.
@@ -25,7 +25,7 @@ pub fn jpeg(level: u8) -> Vec<u8> {
     bytes
 }
 
-/// A part with that picture; the boundary is `cut`.
+/// A part with a picture of this level; the boundary is `cut`.
 pub fn part(level: u8, has_length: bool) -> Vec<u8> {
     let picture = jpeg(level);
     let length = if has_length { format!("Content-Length: {}\r\n", picture.len()) } else { String::new() };
@@ -46,7 +46,7 @@ pub fn open(address: &str) -> Box<dyn Camera> {
     try_open(address).unwrap()
 }
 
-/// Answers on 127.0.0.1 until it is dropped, one connection after the other; a connection that the client closed is left.
+/// Answers on 127.0.0.1 until it is dropped, one connection at a time; connections closed by the client are abandoned.
 pub struct Server {
     port: u16,
     is_stopped: Arc<AtomicBool>,
@@ -54,7 +54,7 @@ pub struct Server {
 }
 
 impl Server {
-    /// Each connection has its script; those after the last have `further`.
+    /// Each connection runs its script; later ones run `further`.
     pub fn start(scripts: Vec<Script>, further: Script) -> Self {
         Self::start_at(0, scripts, further)
     }
@@ -65,7 +65,7 @@ impl Server {
         Self::serve(port, move |mut stream, _| {
             let next = scripts.next();
             let further = Arc::clone(&further);
-            // In a thread: scripts sleep.
+            // In a thread, because scripts sleep.
             std::thread::spawn(move || match next {
                 Some(script) => script(&mut stream),
                 None => further(&mut stream),
@@ -73,7 +73,7 @@ impl Server {
         })
     }
 
-    /// Each request goes to the closure.
+    /// Each request is passed to the closure.
     pub fn start_with_requests(answer: impl Fn(&str, &mut TcpStream) + Send + 'static) -> Self {
         Self::serve(0, move |mut stream, request| answer(&request, &mut stream))
     }

@@ -1,10 +1,10 @@
-//! The descriptors by which the webcam names its formats and its endpoint.
+//! The descriptors with which the webcam announces its formats and its endpoint.
 
 /// The sizes of its frames, by frame index from 1.
 pub const FRAME_SIZES: [(u16, u16); 2] = [(640, 480), (320, 240)];
-/// More than one frame.
+/// Maximum size of a frame.
 pub const MAX_PAYLOAD_BYTES: u32 = 1 << 20;
-/// In units of 100 ns: 20 frames a second.
+/// Frame interval in units of 100 ns: 20 frames per second.
 const INTERVAL: u32 = 500_000;
 
 /// The negotiated stream: format 1 and this frame index.
@@ -20,7 +20,7 @@ pub fn probe(frame: u8) -> [u8; 26] {
 /// Device (1), configuration (2) and strings (3).
 pub fn descriptor(kind: u8, index: u8) -> Option<Vec<u8>> {
     match (kind, index) {
-        // Vendor 0x1209, product 1: pid.codes' numbers for tests.
+        // Vendor 0x1209, product 1: numbers of pid.codes for tests.
         (1, _) => Some(vec![18, 1, 0, 2, 0xef, 2, 1, 64, 0x09, 0x12, 1, 0, 0, 1, 0, 1, 0, 1]),
         (2, _) => Some(configuration()),
         (3, 0) => Some(vec![4, 3, 9, 4]),
@@ -71,7 +71,7 @@ fn configuration() -> Vec<u8> {
     with_total_length(all, 2)
 }
 
-/// Writes the length of all into the first descriptor.
+/// Writes the total length into the first descriptor.
 fn with_total_length(mut bytes: Vec<u8>, at: usize) -> Vec<u8> {
     let length = (bytes.len() as u16).to_le_bytes();
     bytes[at..at + 2].copy_from_slice(&length);

@@ -1,5 +1,5 @@
-//! A USB webcam in plain Rust: the kernel's `vhci-hcd` hands over a socket what it would send over a cable (USB/IP), and this answers
-//! as a camera of the USB video class with one bulk endpoint and motion JPEG.
+//! A USB webcam in plain Rust: the kernel's `vhci-hcd` passes the data of the USB cable over a socket (USB/IP), and
+//! this code answers as a camera of the USB video class with one bulk endpoint and motion JPEG.
 //!
 //! Sources: the kernel's Documentation/usb/usbip_protocol.rst; USB Device Class Definition for Video Devices 1.0.
 
@@ -26,7 +26,7 @@ const INTERVAL: Duration = Duration::from_millis(50);
 const STALLED: i32 = -32;
 const UNLINKED: i32 = -104;
 
-/// What the host has set.
+/// The settings made by the host.
 #[derive(Debug, Clone, Copy)]
 pub struct Settings {
     /// 1: manual.
@@ -48,7 +48,8 @@ pub struct UsbCamera {
 impl UsbCamera {
     pub fn plug_in() -> Self {
         let (cable, kernels_end) = UnixStream::pair().unwrap();
-        // Port, socket, device number, speed: 3 is high speed. A port is free again some time after a device was pulled out.
+        // Port, socket, device number, speed: 3 is high speed. After a device was unplugged, its port becomes free with
+        // a delay.
         let told = format!("0 {} 65537 3", kernels_end.as_raw_fd());
         let start = Instant::now();
         while let Err(error) = fs::write("/sys/devices/platform/vhci_hcd.0/attach", &told) {
@@ -81,7 +82,7 @@ impl UsbCamera {
         *self.settings.lock().unwrap()
     }
 
-    /// The next frame ends in its middle.
+    /// Truncates the next frame in the middle.
     pub fn cut_next_frame(&self) {
         self.settings.lock().unwrap().is_next_cut = true;
     }
@@ -97,11 +98,11 @@ impl Drop for UsbCamera {
 struct Device {
     cable: UnixStream,
     settings: Arc<Mutex<Settings>>,
-    /// The stream's format and frame, as the host has negotiated it.
+    /// The format and frame size negotiated by the host.
     probe: [u8; 26],
     /// Requests for stream data: sequence number and length.
     waiting: VecDeque<(u32, usize)>,
-    /// The frame that is being sent, and how far.
+    /// The frame being sent, and the position in it.
     payload: Vec<u8>,
     sent: usize,
     num_frames: u32,
@@ -109,7 +110,7 @@ struct Device {
 }
 
 impl Device {
-    /// Answers until the cable is cut.
+    /// Answers until the cable is unplugged.
     fn run(mut self) {
         let _ = self.cable.set_read_timeout(Some(Duration::from_millis(2)));
         loop {
@@ -179,7 +180,7 @@ impl Device {
         self.cable.write_all(&bytes).ok()
     }
 
-    /// A control request: what is sent back, empty for one that takes data; `None` for what the camera does not know.
+    /// A control request: the data to return, empty for a request with data; `None` for an unknown request.
     fn control(&mut self, setup: [u8; 8], data: &[u8]) -> Option<Vec<u8>> {
         let [kind, request, value_low, value_high, index_low, index_high, ..] = setup;
         match (kind, request) {
@@ -237,7 +238,7 @@ impl Device {
         Some(told.to_le_bytes()[..size].to_vec())
     }
 
-    /// Answers requests for stream data: a frame is one payload, the short request ends it.
+    /// Answers requests for stream data: a frame is one payload, ended by a short transfer.
     fn stream(&mut self) -> Option<()> {
         while let Some(&(number, length)) = self.waiting.front() {
             if self.sent == self.payload.len() {
@@ -274,7 +275,7 @@ impl Device {
     }
 }
 
-/// Three bars, a corner that tells frames apart, and no Huffman tables.
+/// Three bars, a corner that differs between frames, and no Huffman tables.
 fn webcam_jpeg((width, height): (u16, u16), number: u32) -> Vec<u8> {
     let (width, height) = (u32::from(width), u32::from(height));
     let picture = RgbImage::from_fn(width, height, |x, y| {

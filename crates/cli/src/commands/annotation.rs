@@ -1,4 +1,4 @@
-//! `sdg annotation`: annotation files from one tool's format to another's.
+//! `sdg annotation`: converts annotation files from one tool's format to another's.
 
 use std::path::PathBuf;
 
@@ -35,10 +35,10 @@ pub struct ConvertAnnotationArgs {
     /// The file to write
     #[arg(value_name = "OUT")]
     pub output: PathBuf,
-    /// The image, where IN is of several images or does not say how large its image is
+    /// The image; needed if IN has several images or does not state the size of its image
     #[arg(long, value_name = "IMAGE")]
     pub image: Option<PathBuf>,
-    /// The format to write: coco, labelme or yolo-pose; without it, coco for .json and yolo-pose for .txt
+    /// The format to write: coco, labelme or yolo-pose; default: coco for .json, yolo-pose for .txt
     #[arg(long, value_name = "NAME")]
     pub format: Option<String>,
     /// Print one JSON object
@@ -53,11 +53,11 @@ pub fn run(args: &AnnotationArgs) -> Result<Outcome> {
     }
 }
 
-/// What the output has no room for is listed on standard error, and in the JSON.
+/// Converts a file. Information that the output format cannot hold is listed on standard error and in the JSON.
 fn convert(args: &ConvertAnnotationArgs) -> Result<Outcome> {
     let format = format_of_output(args)?;
     if sdg_files::is_same_file(&args.input, &args.output) {
-        return Err(Usage(format!("{}: expected another file to write than to read", args.output.display())).into());
+        return Err(Usage(format!("{}: expected an output file other than the input", args.output.display())).into());
     }
     sdg_files::check_writable(&args.output)?;
     let input = AnnotationFile::read(&args.input)?;
@@ -98,7 +98,7 @@ fn convert(args: &ConvertAnnotationArgs) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// As asked for, or as the name's ending says.
+/// The format given by `--format`, else by the file name's extension.
 fn format_of_output(args: &ConvertAnnotationArgs) -> Result<AnnotationFormat> {
     let writable = AnnotationFormat::ALL.into_iter().filter(|format| *format != AnnotationFormat::OpenDr);
     match &args.format {
@@ -118,7 +118,8 @@ fn format_of_output(args: &ConvertAnnotationArgs) -> Result<AnnotationFormat> {
     }
 }
 
-/// Size and name of the image and what is marked on it: by the image itself, or by what the file says of its only one.
+/// Reads the marks, with size and name of their image: from the image itself if it is given, else from the file's only
+/// entry.
 fn read_marks(
     args: &ConvertAnnotationArgs,
     input: &AnnotationFile,

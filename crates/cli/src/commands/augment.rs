@@ -1,4 +1,4 @@
-//! `sdg augment`: augmented samples as pictures and COCO JSON, to look at.
+//! `sdg augment`: writes augmented samples as pictures and COCO JSON, for inspection.
 
 use std::path::PathBuf;
 
@@ -15,24 +15,25 @@ use crate::exit::{Outcome, Usage};
 /// `sdg augment`
 #[derive(Debug, ClapArgs)]
 pub struct AugmentArgs {
-    /// A photo, and after a colon its annotation (COCO, LabelMe, YOLO-pose, OpenDR's boxes_*.npy) unless it stands beside the
-    /// photo: .json, .txt, or in a YOLO dataset's folder of labels; repeat for several views
+    /// A photo, followed by a colon and its annotation (COCO, LabelMe, YOLO-pose, OpenDR's boxes_*.npy). The annotation
+    /// may be omitted if it is beside the photo (.json, .txt) or in a YOLO dataset's folder of labels; repeat for
+    /// several views
     #[arg(long = "demo", required = true, value_name = "IMAGE[:ANNOTATION]")]
     pub demonstrations: Vec<String>,
-    /// Samples to write
+    /// Number of samples to write
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub count: u32,
-    /// Folder to write into; made if missing
+    /// Folder to write to; created if missing
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// The augmentation: edge (what teaching uses), or paper (the original's)
+    /// The augmentation: edge (used in teaching), or paper (as in the paper)
     #[arg(long, default_value = "edge", value_name = "NAME")]
     pub preset: String,
-    /// Those samples instead that `sdg teach` with the same seed tries the finished model on, at most 640x480 pixels large: the
-    /// first 40 are the ones of its figures, for model S the first 24
+    /// Write the held-back samples instead, on which `sdg teach` with the same seed tests the finished model, of at
+    /// most 640x480 pixels; its figures are of the first 40, for model S of the first 24
     #[arg(long, conflicts_with = "preset")]
     pub held_back: bool,
-    /// Decides every random choice
+    /// Seed of all random choices
     #[arg(long, default_value_t = 1, value_name = "N")]
     pub seed: u64,
     /// End with one JSON object on standard output
@@ -40,10 +41,11 @@ pub struct AugmentArgs {
     pub json: bool,
 }
 
-/// The file that lists every sample's marks.
+/// The file with the marks of all samples.
 const ANNOTATIONS: &str = "annotations.json";
 
-/// Pictures first, the list of them last: a run that breaks off leaves no list of pictures that are not there.
+/// Writes the pictures first and the list of their marks last, so that an interrupted run leaves no list of missing
+/// pictures.
 pub fn run(args: &AugmentArgs) -> Result<Outcome> {
     let config = match args.preset.as_str() {
         "edge" => AugmentationConfig::default(),

@@ -1,4 +1,4 @@
-//! `sdg completions`: what the shell needs to complete commands and options.
+//! `sdg completions`: the shell's completion script.
 
 use std::io::Write;
 
@@ -19,7 +19,7 @@ pub struct CompletionsArgs {
 pub fn run(args: &CompletionsArgs, mut command: clap::Command) -> Result<Outcome> {
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut command, "sdg", &mut script);
-    // Written at once, so that a closed pipe is an error and not a panic of the generator.
+    // Written in one call, so that a closed pipe is returned as an error; the generator would panic.
     std::io::stdout().lock().write_all(&script)?;
     Ok(Outcome::Done)
 }

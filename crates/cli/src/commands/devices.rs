@@ -1,4 +1,4 @@
-//! `sdg devices`: what this build and this machine can compute on.
+//! `sdg devices`: the devices available in this build and on this machine.
 
 use std::io::Write;
 
@@ -18,15 +18,15 @@ pub struct DevicesArgs {
     pub json: bool,
 }
 
-/// The device of `--device`, ready to compute.
+/// Opens the device of `--device`.
 ///
 /// # Errors
-/// One that this build or this machine lacks.
+/// The device is not in this build or not on this machine.
 pub fn open(args: &ComputeArgs) -> Result<Device> {
     args.device.open().context("--device")
 }
 
-/// A line for each device, and for each backend that has none, the reason.
+/// Prints one line per device, and the reason for each backend without devices.
 pub fn run(args: &DevicesArgs) -> Result<Outcome> {
     let mut stdout = std::io::stdout().lock();
     let backends = ComputeBackend::ALL.map(|backend| (backend, backend.devices()));

@@ -1,4 +1,4 @@
-//! `sdg grasp`: one grasp, from the picture to the lifted part, or to the part in its place; with a real arm or a simulated one.
+//! `sdg grasp`: one grasp, from the picture to the lifted or placed part; with a real or a simulated arm.
 
 use std::path::PathBuf;
 use std::time::Instant;
@@ -32,65 +32,65 @@ use crate::shared_args::{ComputeArgs, ToldHeightArgs};
 /// `sdg grasp`
 #[derive(Debug, Args)]
 pub struct GraspArgs {
-    /// The arm: HOST or HOST:PORT of a Franka, or sim for a simulated one; without it, the address in the workcell's file
+    /// The arm: HOST or HOST:PORT of a Franka, or sim for a simulated one; default: the address in the workcell's file
     #[arg(long, value_name = "ADDRESS|sim")]
     pub robot: Option<RobotChoice>,
-    /// Where pictures come from, as for sdg detect --from. With --robot sim: sim:PART or sim:PART?seed=N, a part on the table of
-    /// the simulated arm
+    /// The camera, as for sdg detect --from. With --robot sim: sim:PART or sim:PART?seed=N, a part on the simulated
+    /// arm's table
     #[arg(long, value_name = "ADDRESS")]
     pub from: Address,
-    /// The camera's file; without it, the one that the workcell's file names
+    /// The camera's file; default: the one named in the workcell's file
     #[arg(long, value_name = "FILE")]
     pub camera: Option<PathBuf>,
-    /// A grasp model that sdg teach wrote from photos of a calibrated camera
+    /// A grasp model that sdg teach made from photos of a calibrated camera
     #[arg(long, value_name = "FILE")]
     pub grasp_model: PathBuf,
-    /// The workcell's file: robot, tool, camera, table, where the arm may be, where it looks out from
+    /// The workcell's file: robot, tool, camera, table, the arm's workspace and look-out poses
     #[arg(long, value_name = "FILE")]
     pub workcell: PathBuf,
-    /// Put the part down in this place of the workcell's file, and look where it lies: NAME, or NAME:CELL for a cell of a tray,
-    /// counted from 1 along its x
+    /// Put the part down at this place of the workcell's file, and check its position with the camera: NAME, or
+    /// NAME:CELL for a cell of a tray, counted from 1 along the tray's x axis
     #[arg(long, value_name = "NAME")]
     pub place: Option<String>,
-    /// How high the part lies
+    /// The part's height
     #[command(flatten)]
     pub height: ToldHeightArgs,
-    /// Come down softly on the last 2 cm: for a table whose height is not known to a millimetre
+    /// Descend softly, until contact at most, over the last 2 cm: for a table whose height is not known to a millimetre
     #[arg(long)]
     pub soft: bool,
-    /// Plan the grasp from where the arm stands, draw it, and ask before anything moves
+    /// Plan the grasp from the arm's current posture, draw it, and ask for confirmation before anything moves
     #[arg(long)]
     pub dry_run: bool,
-    /// Do not ask, for programs
+    /// Do not ask for confirmation; for programs
     #[arg(long)]
     pub yes: bool,
     /// Share of the joints' velocity limits, above 0 and at most 0.6
     #[arg(long, value_name = "SHARE", default_value_t = DEFAULT_SPEED)]
     pub speed: f64,
-    /// The oldest picture on which a motion may rest
+    /// Maximum age of a picture on which a motion is based
     #[arg(long, value_name = "SECS", default_value_t = 1.0)]
     pub max_detection_age_secs: f64,
-    /// Drive a real arm from a thread that the kernel may delay; for simulated ones
+    /// Drive an arm on the network from a thread without real-time priority; for simulated arms
     #[arg(long)]
     pub no_realtime: bool,
-    /// Folder for what --dry-run draws, and for grasp.png, the cell after a simulated grasp
+    /// Folder for the drawings of --dry-run, and for grasp.png, the cell after a simulated grasp
     #[arg(long, value_name = "DIR", default_value = "dry-run")]
     pub out: PathBuf,
-    /// Where the arm's last second is written after an error, as CSV
+    /// File for the arm's last second of states after an error, as CSV
     #[arg(long, value_name = "FILE", default_value = "robot-states.csv")]
     pub states: PathBuf,
-    /// Where the network computes
+    /// Device for the network
     #[command(flatten)]
     pub compute: ComputeArgs,
     /// End with one JSON object on standard output
     #[arg(long)]
     pub json: bool,
-    /// What the camera is asked for; its size is that of the camera's file
+    /// Settings of the camera; its size is that of the camera's file
     #[command(flatten)]
     pub request: RequestArgs,
 }
 
-/// What a grasp needs besides an arm.
+/// The inputs of a grasp besides the arm.
 struct Prepared {
     workcell: Workcell,
     model: GraspModel,
@@ -99,12 +99,13 @@ struct Prepared {
     place: Option<(PlaceGoal, PlacingConfig)>,
 }
 
-/// Reads and checks everything, then connects to the arm and grasps.
+/// Reads and checks all inputs, then connects to the arm and grasps.
 pub fn run(args: &GraspArgs) -> Result<Outcome> {
     let prepared = prepare(args)?;
     let choice = RobotChoice::named(args.robot.as_ref(), prepared.workcell.address.as_deref())?;
     let interrupt = Interrupt::watch();
-    // What is there and is no folder is told before anything moves; a folder is made when there is something to write.
+    // An output path that is not a folder is reported before anything moves; the folder is created when there is
+    // something to write.
     if args.out.exists() {
         sdg_files::prepare_folder(&args.out)?;
     }
@@ -191,7 +192,7 @@ fn simulated(args: &GraspArgs, prepared: &Prepared, interrupt: &Interrupt) -> Re
         let path = args.out.join("grasp.png");
         let render = RenderConfig { width: 800, height: 600, ..RenderConfig::default() };
         sdg_files::write_png(&path, &cell.scene_image(render)?)?;
-        eprintln!("the cell after it: {}", path.display());
+        eprintln!("the cell after the grasp: {}", path.display());
     }
     Ok(outcome)
 }
@@ -205,7 +206,7 @@ fn simulated(_args: &GraspArgs, _prepared: &Prepared, _interrupt: &Interrupt) ->
     .into())
 }
 
-/// One grasp with any arm; a real one, which has an address, moves after a person has agreed.
+/// One grasp with any arm. A real arm, which has an address, moves only after a person has confirmed.
 fn attempt<A: CompliantArm, P: Pictures<A>>(
     args: &GraspArgs,
     prepared: &Prepared,
@@ -240,7 +241,7 @@ fn attempt<A: CompliantArm, P: Pictures<A>>(
     let camera_pose = prepared.camera.pose;
     let mut robot = Robot::new(arm, limits, robots::watch(interrupt));
     let ended = run_sequence(&mut robot, &mut finder, camera_pose, &prepared.config, prepared.place.as_ref());
-    // A part that is not there is no error, and one that is held or in its place is none.
+    // Neither a missing part nor a part that is held or in its place is an error.
     let has_failed = match &ended {
         Ok(ended) => ended.failed.is_some() && !is_nothing_found(&ended.grasp),
         Err(_) => true,
@@ -252,7 +253,7 @@ fn attempt<A: CompliantArm, P: Pictures<A>>(
     print_report(args, prepared, &ended, started.elapsed().as_secs_f64(), address.unwrap_or("sim"))
 }
 
-/// Plans from where the arm stands, draws and prints the plan.
+/// Plans from the arm's current posture; draws and prints the plan.
 fn dry_run<A: Arm>(
     args: &GraspArgs,
     prepared: &Prepared,
@@ -278,7 +279,7 @@ fn dry_run<A: Arm>(
     Ok(())
 }
 
-/// The closing lines, or the one object.
+/// Prints the closing lines, or the JSON object.
 fn print_report(args: &GraspArgs, prepared: &Prepared, ended: &Ended, secs: f64, robot: &str) -> Result<Outcome> {
     if args.json {
         println!("{}", json_line(&to_json(prepared, ended, secs, robot))?);
@@ -293,15 +294,15 @@ fn print_report(args: &GraspArgs, prepared: &Prepared, ended: &Ended, secs: f64,
     match (failed, &prepared.place) {
         (None, None) => {
             let width_mm = grasp.closed.map_or(f64::NAN, |hand| hand.opening_m * 1e3);
-            // A simulated arm ends with the program.
-            let then = if robot == "sim" { "" } else { "; sdg robot open lets it go" };
+            // A simulated arm exists only as long as the program.
+            let then = if robot == "sim" { "" } else { "; sdg robot open releases it" };
             eprintln!("the part is held, {width_mm:.0} mm between the fingers ({took}){then}");
             Ok(Outcome::Done)
         }
         (None, Some((goal, _))) => {
             let where_it_lies = match (beside, goal.bin_m) {
                 (Some(_), Some(_)) => "is in".to_owned(),
-                (None, _) => "is let go over".to_owned(),
+                (None, _) => "was released over".to_owned(),
                 (Some(error), None) => format!(
                     "lies {:.1} mm and {:.1}° beside its place in",
                     error.distance_m() * 1e3,
@@ -319,7 +320,7 @@ fn print_report(args: &GraspArgs, prepared: &Prepared, ended: &Ended, secs: f64,
     }
 }
 
-/// Whether a look was taken and the part was not in it; a motion that was refused before is another matter.
+/// Whether a picture was taken and did not contain the part; a motion that was refused before is a different case.
 fn is_nothing_found(report: &GraspReport) -> bool {
     let is_look = matches!(report.outcome, GraspOutcome::Failed { step: GraspStep::Detect, .. });
     is_look && report.targets.last() == Some(&None)
@@ -371,7 +372,7 @@ fn to_json(prepared: &Prepared, ended: &Ended, secs: f64, robot: &str) -> Value 
     object
 }
 
-/// How high the marks lie over the table, and where that is from.
+/// The marks' height over the table, and its source.
 fn height_json(height: &HeightReport, table_height_m: f64) -> Value {
     let over_table_mm = |height_m: f64| 1e3 * (height_m - table_height_m);
     json!({

@@ -1,4 +1,4 @@
-//! `sdg man`: manual pages, made from the same definition as the help.
+//! `sdg man`: manual pages, generated from the same definitions as the help.
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -14,12 +14,12 @@ use crate::exit::Outcome;
 /// `sdg man`
 #[derive(Debug, ClapArgs)]
 pub struct ManArgs {
-    /// Write a page of every command into this folder; without it, the page of sdg goes to standard output
+    /// Write one page per command to this folder; without it, the page of sdg goes to standard output
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
 }
 
-/// The page of `sdg` itself to standard output, or a page of every command into a folder.
+/// Prints the page of `sdg` on standard output, or writes one page per command to a folder.
 pub fn run(args: &ManArgs, root: Command) -> Result<Outcome> {
     let mut root = root.disable_help_subcommand(true);
     root.build();

@@ -1,4 +1,4 @@
-//! One file or folder for each verb: its arguments, and what it does.
+//! The verbs, one file or folder each: arguments and implementation.
 
 pub mod annotate;
 pub mod annotation;

@@ -1,4 +1,4 @@
-//! `sdg simulate --fci`: a Panda in MuJoCo on the network, for any program that speaks the Franka Control Interface.
+//! `sdg simulate --fci`: a simulated Panda in MuJoCo on the network, for any client of the Franka Control Interface.
 
 use std::net::IpAddr;
 use std::thread;
@@ -15,23 +15,24 @@ use crate::exit::Outcome;
 use crate::interrupt::Interrupt;
 use crate::parts::part_named;
 
-/// How often Ctrl-C and the server are looked at.
+/// Interval at which Ctrl-C and the server are checked.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
 
 /// `sdg simulate`
 #[derive(Debug, ClapArgs)]
 pub struct SimulateArgs {
-    /// Speak the Franka Control Interface (the Panda's, libfranka 0.9): robot on TCP port 1337, hand on 1338, states over UDP
+    /// Serve the Franka Control Interface (of the Panda, libfranka 0.9): robot on TCP port 1337, hand on 1338, states
+    /// over UDP
     #[arg(long, required = true)]
     pub fci: bool,
-    /// Wait for the client's answer before every millisecond of a motion: nothing is lost, and nothing depends on the machine's
-    /// speed
+    /// Wait for the client's answer in every millisecond of a motion: no packet is lost, and the result does not depend
+    /// on the machine's speed
     #[arg(long)]
     pub lockstep: bool,
-    /// A part on the table: one of those shipped under datasets/
+    /// A part on the table: one of the parts in datasets/
     #[arg(long, value_name = "NAME")]
     pub object: Option<String>,
-    /// Decides where the part lies
+    /// Seed of the part's pose
     #[arg(long, default_value_t = 1, value_name = "N")]
     pub seed: u64,
     /// Address to listen on; any program that reaches it can move the simulated robot
@@ -40,7 +41,7 @@ pub struct SimulateArgs {
     /// TCP port of the robot; the hand's is the next one
     #[arg(long, default_value_t = sdg_fci::wire::ROBOT_PORT, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=65534))]
     pub port: u16,
-    /// Print the addresses and, at the end, what was counted as JSON objects, one a line
+    /// Print the addresses and, at the end, the counters as JSON objects, one per line
     #[arg(long)]
     pub json: bool,
 }

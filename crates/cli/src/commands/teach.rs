@@ -31,25 +31,29 @@ use crate::teaching_progress::TeachingProgress;
 /// `sdg teach`
 #[derive(Debug, ClapArgs)]
 pub struct TeachArgs {
-    /// The grasp model, by letter or name: A or crop (box, turn from its crop), B or box (box, turn from keypoints), C or
-    /// keypoints, D or mask (mask, turn from texture or outline), S or shape (no network: a search for the demonstration in
-    /// the whole image, ready at once)
+    /// The grasp model, by letter or name: A or crop (detects a box, turn from the box's crop), B or box (box, turn
+    /// from keypoints), C or keypoints, D or mask (mask, turn from texture or outline), S or shape (no network:
+    /// searches the whole image for the demonstration; ready at once)
     #[arg(long, default_value = "C", value_name = "NAME")]
     pub model: String,
-    /// A photo, and after a colon its annotation (COCO, LabelMe, YOLO-pose, OpenDR's boxes_*.npy) unless it stands beside the
-    /// photo: .json, .txt, or in a YOLO dataset's folder of labels; repeat for several views
+    /// A photo, followed by a colon and its annotation (COCO, LabelMe, YOLO-pose, OpenDR's boxes_*.npy). The annotation
+    /// may be omitted if it is beside the photo (.json, .txt) or in a YOLO dataset's folder of labels; repeat for
+    /// several views
     #[arg(long = "demo", required_unless_present = "demos", value_name = "IMAGE[:ANNOTATION]")]
     pub demonstrations: Vec<String>,
-    /// Instead, many parts: a folder of photos with marks beside them, each of a part, and of folders with several photos of
-    /// a part; --out is then a folder for models and a page that says which look alike and which need another photo. What is
-    /// there already is not taught again. Lines "NAME 4" or "NAME full" of symmetries.txt in it are a part's --symmetry
+    /// Teach many parts: a folder of photos with marks beside them, each of one part, and of folders with several
+    /// photos of one part. --out is then a folder for the models and a page that lists similar parts and parts that
+    /// need another photo. Existing models are kept. Lines "NAME 4" or "NAME full" in its symmetries.txt give a part's
+    /// --symmetry
     #[arg(long, value_name = "DIR", conflicts_with_all = ["demonstrations", "negatives", "camera", "region"])]
     pub demos: Option<PathBuf>,
-    /// Of --demos this part alone, without the page, so that machines can share the parts; repeat for several
+    /// Teach only this part of --demos, without the page, so that several machines can share the parts; repeat for
+    /// several
     #[arg(long = "part", value_name = "NAME", requires = "demos", conflicts_with = "demonstrations")]
     pub parts: Vec<String>,
-    /// A picture without the part, above all one in which a model found it: used in teaching, and the score is set so that nothing
-    /// is accepted there, as far as nine in ten parts stay accepted; repeat for several
+    /// A picture without the part, preferably one with a false detection. It is used in teaching, and the score is
+    /// calibrated so that nothing is accepted in it, as long as nine in ten parts are still accepted; repeat for
+    /// several
     #[arg(long = "negative", value_name = "IMAGE")]
     pub negatives: Vec<PathBuf>,
     /// The file to write
@@ -59,41 +63,44 @@ pub struct TeachArgs {
     /// takes hours
     #[arg(long, default_value = "edge", value_name = "NAME")]
     pub preset: String,
-    /// Decides every random choice
+    /// Seed of all random choices
     #[arg(long, default_value_t = 1, value_name = "N")]
     pub seed: u64,
-    /// Seconds that the network's training may take at most
+    /// Maximum seconds for training the network
     #[arg(long, value_name = "SECS", value_parser = seconds)]
     pub time_budget: Option<f64>,
-    /// How often the part looks the same in a whole turn: 1 for most, 4 for a square, full for a disc
+    /// Number of turns, within a full rotation, in which the part looks the same: 1 for most parts, 4 for a square,
+    /// full for a disc
     #[arg(long, default_value = "1", value_name = "N|full", value_parser = symmetry)]
     pub symmetry: RotationalSymmetry,
-    /// Smallest and largest size of the part in a picture, over its size in the photo: 0.95-1.05 where the camera always has
-    /// the same height, which also tells parts that differ in size; more where it does not, or where the photo was both
-    /// cropped and resized
+    /// Smallest and largest size of the part in a picture, relative to its size in the photo: 0.95-1.05 if the camera's
+    /// height is constant, which also distinguishes parts of different sizes; a wider range if it is not, or if the
+    /// photo was both cropped and resized
     #[arg(long, default_value = "0.75-1.35", value_name = "LOW-HIGH", value_parser = size_tolerance)]
     pub size_tolerance: SizeTolerance,
-    /// Search only this part of pictures for the part: left edge, upper edge, width and height in pixels of the photo. A part counts
-    /// whose grasp point lies in it and at least half of the part. Kept in the model's file, for pictures as large as the photo
+    /// Search only this part of pictures: left edge, upper edge, width and height in pixels of the photo. A part counts
+    /// if its grasp point and at least half of its area are in the region. The region is stored in the model's file,
+    /// for pictures of the photo's size
     #[arg(long, value_name = "X,Y,W,H", allow_hyphen_values = true, value_parser = region)]
     pub region: Option<SearchRegion>,
     /// The calibrated camera that took the photos
     #[command(flatten)]
     pub camera: TaughtCameraArgs,
-    /// Optimiser steps instead of the preset's
+    /// Number of optimiser steps, in place of the preset's
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub steps: Option<u32>,
-    /// Weights to start from: base weights of `make base-weights`, any file that `sdg weights convert` reads or writes, a
-    /// grasp model, or none to start from nothing; without it, preset edge starts from the base weights in this program
+    /// Initial weights: base weights made by `make base-weights`, any file that `sdg weights convert` reads or writes,
+    /// a grasp model, or none for random initialisation; default: preset edge starts from the base weights included in
+    /// this program
     #[arg(long, value_name = "FILE")]
     pub base_weights: Option<PathBuf>,
-    /// Start this part from nothing all the same, such as roi_heads.box_predictor; repeat for several
+    /// Initialise this part randomly in spite of --base-weights, such as roi_heads.box_predictor; repeat for several
     #[arg(long = "reinit", value_name = "PREFIX", requires = "base_weights")]
     pub reinitialized: Vec<String>,
-    /// Folder for a page about the teaching: photo and marks, samples, curves
+    /// Folder for a page on the teaching: photo and marks, samples, curves
     #[arg(long, value_name = "DIR")]
     pub report: Option<PathBuf>,
-    /// Where the network computes
+    /// Device for the network
     #[command(flatten)]
     pub compute: ComputeArgs,
     /// End with one JSON object on standard output
@@ -101,7 +108,7 @@ pub struct TeachArgs {
     pub json: bool,
 }
 
-/// Equal turns in a whole one, or that no turn can be seen.
+/// Parses a number of turns, or `full` for a part whose rotation is not visible.
 pub(super) fn symmetry(text: &str) -> Result<RotationalSymmetry, String> {
     match (text, text.parse::<u32>()) {
         ("full", _) => Ok(RotationalSymmetry::Full),
@@ -111,13 +118,13 @@ pub(super) fn symmetry(text: &str) -> Result<RotationalSymmetry, String> {
     }
 }
 
-/// Where the sources have the base weights that this build may lack.
+/// Path, in the sources, of the base weights that this build may lack.
 const SHIPPED_FILE: &str = "crates/grasp/weights/edge.safetensors";
 
-/// What `--base-weights` says for a start from nothing.
+/// Value of `--base-weights` for random initialisation.
 const NO_BASE_WEIGHTS: &str = "none";
 
-/// How to teach, but for what is taught from and the weights to start from.
+/// The teaching options, except for the demonstrations and the initial weights.
 pub(super) fn options(args: &TeachArgs) -> Result<TeachOptions> {
     let mut options = TeachOptions::new(args.seed);
     options.kind = parse("--model", &args.model)?;
@@ -131,10 +138,10 @@ pub(super) fn options(args: &TeachArgs) -> Result<TeachOptions> {
     Ok(options)
 }
 
-/// Teaches with progress on standard error, writes the model's file, and tries it on held-back samples.
+/// Teaches with progress on standard error, writes the model's file, and tests it on held-back samples.
 ///
 /// # Errors
-/// Those of teaching as [`GraspError`]; a file that cannot be written.
+/// Errors of teaching as [`GraspError`]; the file cannot be written.
 pub(super) fn teach_to_file(
     demonstrations: &[Demonstration],
     options: &TeachOptions,
@@ -150,7 +157,7 @@ pub(super) fn teach_to_file(
     Ok((file, figures))
 }
 
-/// Checks everything that can be wrong before it starts to take minutes.
+/// Checks all inputs before the teaching, which takes minutes.
 pub fn run(args: &TeachArgs) -> Result<Outcome> {
     let mut options = options(args)?;
     let files = TeachingFiles {
@@ -222,7 +229,7 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
         });
         println!("{}", json_line(&line)?);
     } else {
-        // What a person waits for, not the teaching alone.
+        // The time that a person waits, not only that of the teaching.
         let (seconds, training) = (clock::elapsed_secs(), taught_words::training(&taught));
         let object = taught.model.object();
         println!("taught \"{object}\" in {seconds:.1} s, of which the teaching took {:.1} s{training}", facts.seconds);
@@ -234,7 +241,7 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
         }
         if let Some(NegativeFacts { pictures, refused, log_odds }) = facts.negatives {
             println!(
-                "refuses {refused} of {pictures} pictures without the part; every score has {:.1} log-odds less for them",
+                "refuses {refused} of {pictures} pictures without the part; for them, every score is lowered by {:.1} log-odds",
                 -log_odds
             );
         }
@@ -257,7 +264,7 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
     Ok(if failure.is_some() { Outcome::ModelFails } else { Outcome::Done })
 }
 
-/// Names the option where its region is the reason.
+/// Adds the option's name if its region is the cause of the error.
 fn of_region(error: anyhow::Error) -> anyhow::Error {
     match error.downcast_ref() {
         Some(GraspError::Region(_)) => error.context("--region"),
@@ -302,7 +309,7 @@ pub(super) fn command(args: &TeachArgs) -> String {
     command
 }
 
-/// Puts the weights to start from into the options. What does not simply fit is refused at once, because teaching takes
+/// Adds the initial weights to the options. Weights that do not fit are rejected before the teaching, which takes
 /// minutes; the whole report is part of the JSON at the end.
 pub(super) fn read_base_weights(args: &TeachArgs, options: &mut TeachOptions) -> Result<Option<Value>> {
     let Some(path) = &args.base_weights else { return Ok(None) };
@@ -339,7 +346,7 @@ pub(super) fn read_base_weights(args: &TeachArgs, options: &mut TeachOptions) ->
     Ok(told.map(|report: Report| json!(report)))
 }
 
-/// An argument that names one of a few things; another name is wrong usage.
+/// Parses an argument with a fixed set of values; another value is wrong usage.
 fn parse<T: FromStr<Err: Display>>(argument: &str, name: &str) -> Result<T> {
     Ok(name.parse().map_err(|error| Usage(format!("{argument}: {error}")))?)
 }

@@ -1,4 +1,4 @@
-//! `sdg teach --demos DIR`: many parts taught, checked against each other, and one page.
+//! `sdg teach --demos DIR`: teaches many parts, compares them with each other, and writes one page.
 
 use std::path::Path;
 
@@ -16,7 +16,8 @@ use crate::exit::{Outcome, Usage};
 use crate::interrupt::Interrupt;
 use crate::progress::EvaluationProgress;
 
-/// Teaches what is not taught yet; then, unless single parts were asked for, runs each model on every photo.
+/// Teaches the parts that have no model yet; then, unless `--part` selects single parts, runs each model on every
+/// photo.
 pub fn run(args: &TeachArgs, folder: &Path) -> Result<Outcome> {
     let mut options = options(args)?;
     read_base_weights(args, &mut options)?;
@@ -34,7 +35,7 @@ pub fn run(args: &TeachArgs, folder: &Path) -> Result<Outcome> {
             Some(outcome) => outcome,
             None => {
                 let Some((model, outcome)) = teach_part(part, options, &|| interrupt.is_requested()) else {
-                    bail!("interrupted: the same command goes on with {}", part.name);
+                    bail!("interrupted: the same command continues with {}", part.name);
                 };
                 store.write(&part.name, model.as_deref(), &PartRecord { key, outcome: outcome.clone() })?;
                 outcome
@@ -76,7 +77,7 @@ pub fn run(args: &TeachArgs, folder: &Path) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// The parts that `--part` names, or all.
+/// The parts selected by `--part`, or all.
 fn asked_for<'a>(args: &TeachArgs, parts: &'a [PartDemonstrations]) -> Result<Vec<&'a PartDemonstrations>> {
     if args.parts.is_empty() {
         return Ok(parts.iter().collect());
@@ -91,7 +92,7 @@ fn asked_for<'a>(args: &TeachArgs, parts: &'a [PartDemonstrations]) -> Result<Ve
     args.parts.iter().map(named).collect()
 }
 
-/// What a part's model depends on.
+/// The inputs that a part's model depends on.
 fn key(args: &TeachArgs, part: &PartDemonstrations, options: &TeachOptions) -> Result<Value> {
     let symmetry = part.symmetry.unwrap_or(options.symmetry);
     Ok(json!({
@@ -108,7 +109,7 @@ fn key(args: &TeachArgs, part: &PartDemonstrations, options: &TeachOptions) -> R
     }))
 }
 
-/// What became of single parts: one that has no model is a failure of the call, as for a single teaching.
+/// Reports single parts. A part without a model makes the call fail, as in teaching one part.
 fn told(args: &TeachArgs, outcomes: Vec<(String, PartOutcome)>) -> Result<Outcome> {
     if args.json {
         let parts: Vec<Value> =

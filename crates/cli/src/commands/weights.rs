@@ -32,11 +32,11 @@ pub struct WeightsArgs {
 /// The verbs of `sdg weights`.
 #[derive(Debug, Subcommand)]
 pub enum WeightsCommand {
-    /// Convert a checkpoint to this project's safetensors, with a report of every name
+    /// Convert a checkpoint to this project's safetensors, with a report on every tensor name
     Convert(ConvertArgs),
-    /// Print what a checkpoint holds, without converting it
+    /// Print the contents of a checkpoint, without converting it
     Inspect(InspectArgs),
-    /// Compare the detector of a checkpoint, stage by stage, with the outputs of the original
+    /// Compare the detector of a checkpoint, stage by stage, with the outputs of the original implementation
     Verify(VerifyArgs),
 }
 
@@ -49,16 +49,16 @@ pub struct ConvertArgs {
     /// The file to write
     #[arg(value_name = "OUT")]
     pub output: PathBuf,
-    /// The detector: r50-detectron2, r50-torchvision; without it, as the names of the checkpoint say
+    /// The detector: r50-detectron2, r50-torchvision; default: recognised by the names in the checkpoint
     #[arg(long, value_name = "NAME", conflicts_with = "config")]
     pub preset: Option<String>,
     /// The detector's configuration as JSON, for other widths and depths
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
-    /// Store kernels and matrices in half precision: a file half as large
+    /// Store kernels and matrices in half precision, which halves the file
     #[arg(long)]
     pub f16: bool,
-    /// Leave this part as initialised, such as roi_heads.box_predictor; repeat for several
+    /// Leave this part at its initial values, such as roi_heads.box_predictor; repeat for several
     #[arg(long = "reinit", value_name = "PREFIX")]
     pub reinitialized: Vec<String>,
     /// Print the report as one JSON object
@@ -83,16 +83,16 @@ pub struct VerifyArgs {
     /// A checkpoint of any format that convert reads, or a converted file
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
-    /// The detector's configuration as JSON; a converted file brings its own
+    /// The detector's configuration as JSON; a converted file contains its own
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
-    /// The image that the original was given
+    /// The input image of the original's outputs
     #[arg(long, value_name = "IMAGE")]
     pub image: PathBuf,
     /// Outputs of the original at each stage: safetensors
     #[arg(long, value_name = "FILE")]
     pub against: PathBuf,
-    /// Where the network computes
+    /// Device for the network
     #[command(flatten)]
     pub compute: ComputeArgs,
     /// Print one JSON object
@@ -109,7 +109,7 @@ pub fn run(args: &WeightsArgs) -> Result<Outcome> {
     }
 }
 
-/// The same error with the options that it is about.
+/// Adds the names of the options that the error is about.
 fn in_options(error: anyhow::Error) -> anyhow::Error {
     match error.downcast_ref() {
         Some(ConfigError::UnknownPreset { .. }) => Usage(format!("--preset: {error}")).into(),
@@ -120,7 +120,7 @@ fn in_options(error: anyhow::Error) -> anyhow::Error {
     }
 }
 
-/// The network to fill, and the metadata that says which one it is.
+/// The network to fill, and the metadata that identifies it.
 fn target(args: &ConvertArgs, checkpoint: &Checkpoint) -> Result<(Architecture, BTreeMap<String, String>)> {
     let naming = naming_of(checkpoint)?;
     if is_backbone_alone(checkpoint, naming) && args.preset.is_none() && args.config.is_none() {
@@ -136,7 +136,7 @@ fn target(args: &ConvertArgs, checkpoint: &Checkpoint) -> Result<(Architecture, 
     Ok((architecture_of(&config), metadata))
 }
 
-/// The report comes first, whole even where something is missing; then the file is written, or nothing is.
+/// Prints the report first, complete even if tensors are missing; then writes the file, or nothing.
 fn convert(args: &ConvertArgs) -> Result<Outcome> {
     let named = || args.input.display().to_string();
     let (mut source, checkpoint) = open(&args.input)?;
@@ -183,7 +183,7 @@ fn convert(args: &ConvertArgs) -> Result<Outcome> {
 fn inspect(args: &InspectArgs) -> Result<Outcome> {
     let (source, checkpoint) = open(&args.file)?;
     let sha256 = sha256_of(&args.file).with_context(|| args.file.display().to_string())?;
-    // Unknown names are worth looking at, too.
+    // Tensor names that are not recognised are shown too.
     let naming = naming_of(&checkpoint).ok();
     let types: Vec<_> = checkpoint.element_types().iter().map(|(e, count)| format!("{count} {}", e.name())).collect();
     let mut stdout = std::io::stdout().lock();
@@ -228,7 +228,7 @@ fn inspect(args: &InspectArgs) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// Builds the detector, fills it and compares it; nothing is written.
+/// Builds the detector, loads the weights and compares the outputs; writes nothing.
 fn verify(args: &VerifyArgs) -> Result<Outcome> {
     let config = args.config.as_deref().map(read_config).transpose()?;
     let image = sdg_inputs::read_image(&args.image)?;
@@ -250,7 +250,7 @@ fn verify(args: &VerifyArgs) -> Result<Outcome> {
     }
 }
 
-/// A text from a file, whatever it holds, on one line.
+/// Any text of a file, on one line.
 fn one_line(text: &str) -> String {
     text.chars().map(|c| if c.is_control() { char::REPLACEMENT_CHARACTER } else { c }).collect()
 }

@@ -1,4 +1,4 @@
-//! `sdg workcell`: what a workcell's file says.
+//! `sdg workcell`: shows a workcell's file.
 
 use std::path::PathBuf;
 
@@ -11,7 +11,8 @@ use crate::exit::Outcome;
 /// The verbs of `sdg workcell`.
 #[derive(Debug, Subcommand)]
 pub enum WorkcellCommand {
-    /// Draw the cell seen from above: table, workspace, places, obstacles, look-outs, and where the hand reaches the table
+    /// Draw the cell from above: table, workspace, places, obstacles, look-out poses, and the part of the table that
+    /// the hand reaches
     Show(ShowArgs),
 }
 
@@ -21,13 +22,13 @@ pub struct ShowArgs {
     /// The workcell's file
     #[arg(value_name = "FILE")]
     pub workcell: PathBuf,
-    /// Height of the tcp over the table at which reach is looked at, hand straight down
+    /// Height of the tcp over the table for which reach is computed, with the hand pointing straight down
     #[arg(long, value_name = "MM", default_value_t = 20.0)]
     pub height_mm: f64,
-    /// Width of a square of the map that reach is looked at in
+    /// Size of a square of the map of reach
     #[arg(long, value_name = "MM", default_value_t = 25.0)]
     pub grid_mm: f64,
-    /// The picture
+    /// The picture to write
     #[arg(long, value_name = "FILE", default_value = "workcell.png")]
     pub out: PathBuf,
 }

@@ -1,4 +1,4 @@
-//! Whether a person agrees that the arm moves.
+//! Asks a person for permission to move the arm.
 
 use std::io::{BufRead, IsTerminal, Write};
 
@@ -12,17 +12,17 @@ pub(crate) enum Consent {
     Refused,
 }
 
-/// Asks on the terminal; `--yes` has answered. Without a terminal the answer is no.
+/// Asks on the terminal; `is_yes` skips the question. If stdin is not a terminal, the answer is no.
 ///
 /// # Errors
-/// A terminal that cannot be read.
+/// The terminal cannot be read.
 pub(crate) fn confirm(question: &str, is_yes: bool) -> Result<Consent> {
     if is_yes {
         return Ok(Consent::Given);
     }
     let stdin = std::io::stdin();
     if !stdin.is_terminal() {
-        eprintln!("{question} Nobody is at the terminal to answer: nothing moves. Programs give --yes.");
+        eprintln!("{question} stdin is not a terminal, so nothing moves; pass --yes to confirm.");
         return Ok(Consent::Refused);
     }
     eprint!("{question} [y/N] ");

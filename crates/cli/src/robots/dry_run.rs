@@ -1,13 +1,13 @@
-//! A planned grasp, described.
+//! Prints and draws a planned grasp.
 
 use anyhow::{Result, anyhow};
 use sdg_cell::DryRun;
 use sdg_robot::{Arm, PlannedAction};
 
-/// A line for each motion, and how the plan ends.
+/// Prints one line per motion, and the end of the plan.
 ///
 /// # Errors
-/// The step that cannot be planned.
+/// A step cannot be planned.
 pub(crate) fn print_plan(plan: &DryRun, is_seen: bool) -> Result<()> {
     let geometry = plan.arm.geometry();
     for action in plan.arm.actions() {
@@ -20,7 +20,7 @@ pub(crate) fn print_plan(plan: &DryRun, is_seen: bool) -> Result<()> {
             PlannedAction::Wait(_) => {}
             PlannedAction::Down { end, duration_secs } => {
                 let z_mm = geometry.forward(end).translation.z * 1e3;
-                eprintln!("  down softly until something is felt, about {z_mm:.0} mm, in {duration_secs:.1} s");
+                eprintln!("  down softly until contact, about {z_mm:.0} mm, in {duration_secs:.1} s");
             }
             PlannedAction::Hand(sdg_robot::HandCommand::Move { opening_m, .. }) => {
                 eprintln!("  hand open to {:.0} mm", opening_m * 1e3);
@@ -33,14 +33,16 @@ pub(crate) fn print_plan(plan: &DryRun, is_seen: bool) -> Result<()> {
     match &plan.failed {
         None => eprintln!("  {:.0} s in all", plan.arm.duration_secs()),
         Some(_) if !is_seen => {
-            eprintln!("  the part is not seen from where the arm stands: this is the way to the look-out poses only");
+            eprintln!(
+                "  the part is not visible from the arm's current posture: only the way to the look-out poses is planned"
+            );
         }
         Some((step, why)) => return Err(anyhow!("{step}: {why}")),
     }
     Ok(())
 }
 
-/// Without the simulator there is nothing to draw with.
+/// Drawing needs the simulator.
 #[cfg(not(feature = "simulation"))]
 pub(crate) fn draw_dry_run(
     _plan: &DryRun,

@@ -1,4 +1,4 @@
-//! Arms as commands use them: which one, what it sees, whether a person agrees, and what is kept after an error.
+//! Arms as commands use them: selection, camera pictures, confirmation by a person, and records after an error.
 
 mod confirm;
 mod dry_run;
@@ -44,10 +44,10 @@ impl FromStr for RobotChoice {
 }
 
 impl RobotChoice {
-    /// The arm that the command line names, or else the workcell's file.
+    /// The arm named on the command line, else in the workcell's file.
     ///
     /// # Errors
-    /// [`Usage`] where neither does.
+    /// [`Usage`] if neither names one.
     pub(crate) fn named(option: Option<&Self>, of_workcell: Option<&str>) -> Result<Self> {
         match (option, of_workcell) {
             (Some(choice), _) => Ok(choice.clone()),
@@ -59,7 +59,7 @@ impl RobotChoice {
     }
 }
 
-/// How the loop that drives a real arm is scheduled.
+/// Scheduling of the control loop of a real arm.
 pub(crate) fn scheduling(no_realtime: bool) -> Scheduling {
     if no_realtime { Scheduling::Ordinary } else { Scheduling::RealTime }
 }
@@ -67,21 +67,21 @@ pub(crate) fn scheduling(no_realtime: bool) -> Scheduling {
 /// `--speed`.
 ///
 /// # Errors
-/// [`Usage`] for what is no share, or too large a one.
+/// [`Usage`] for a value out of range.
 pub(crate) fn pace(speed: f64) -> Result<Pace> {
     Pace::at_speed(speed).map_err(|error| Usage(format!("--{error}")).into())
 }
 
-/// Stops the arm where Ctrl-C is pressed.
+/// A watch that stops the arm on Ctrl-C.
 pub(crate) fn watch(interrupt: &Interrupt) -> Watch {
     let interrupt = interrupt.clone();
     Watch::new(Box::new(move || interrupt.is_requested().then_some(StopReason::Interrupted)))
 }
 
-/// Writes the last second of an arm's states after an error, and says where; nothing where no state was seen.
+/// Writes the arm's last second of states after an error and prints the path; does nothing if no state was received.
 ///
 /// # Errors
-/// A file that cannot be written.
+/// The file cannot be written.
 pub(crate) fn write_states(path: &Path, watch: &Watch) -> Result<()> {
     if watch.states().len() > 0 {
         sdg_files::write(path, watch.states_csv().as_bytes())?;

@@ -1,4 +1,4 @@
-//! `sim:PART?seed=N` for a simulated arm: the parts on its table.
+//! `sim:PART?seed=N` for a simulated arm: the scene on its table.
 
 use anyhow::Result;
 use sdg_simulation::scene::{SceneVariation, VariationConfig};
@@ -6,10 +6,10 @@ use sdg_simulation::scene::{SceneVariation, VariationConfig};
 use crate::exit::Usage;
 use crate::parts::part_named;
 
-/// The scene of an address without its `sim:`.
+/// The scene of an address, given without its `sim:`.
 ///
 /// # Errors
-/// A part or an option that there is not.
+/// Unknown part or option.
 pub(crate) fn simulated_scene(text: &str) -> Result<SceneVariation> {
     let (part, options) = text.split_once('?').unwrap_or((text, ""));
     let part = part_named("--from", part)?;

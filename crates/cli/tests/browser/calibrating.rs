@@ -11,7 +11,7 @@ use super::page::{assert_accessible, repository};
 use crate::rendering::cameras::{CAMERAS, board, poses};
 use crate::rendering::{Exposure, Random, render};
 
-/// A program that ends with the test.
+/// A process that is killed when dropped.
 struct Ended(Child);
 
 impl Drop for Ended {
@@ -32,7 +32,7 @@ fn the_page_shows_the_board_and_what_is_lacking() {
         let picture = render(&board(), &camera, pose, &Exposure::ORDINARY, &mut Random(k as u64));
         picture.save(frames.join(format!("{k}.png"))).unwrap();
     }
-    // Frames go round, so that the page has a picture for as long as it is looked at.
+    // The frames repeat, so that the page always has a picture.
     let from = format!("dir:{}?fps=4&loop", frames.display());
     let arguments = ["camera", "calibrate", "--from", &from, "--no-browser", "--out", "camera.yaml"];
     let mut command = Command::new(env!("CARGO_BIN_EXE_sdg"));

@@ -1,4 +1,4 @@
-//! What corrects marks: strokes over an outline, the box drawn to it, the gripper turned along a straight part.
+//! Corrections of marks: strokes over an outline, the box fitted to it, the gripper aligned with a straight part.
 
 use image::{Rgb, RgbImage};
 use nalgebra::{Point2, Vector2};
@@ -8,17 +8,17 @@ use serde_json::json;
 
 use super::page::Page;
 
-/// A straight part of one of several forms, and how it lies.
+/// A straight part of one of several shapes, and its pose.
 struct Straight {
     image: RgbImage,
     bbox: BoundingBox,
-    /// Of its axis, in degrees.
+    /// Angle of its axis, in degrees.
     angle_deg: f64,
-    /// On its shank, a little beside the axis, as a person clicks.
+    /// A point on its shank, slightly off the axis, as a person clicks.
     click: Point2<f64>,
 }
 
-/// The same numbers in every run: steps of the golden ratio.
+/// Evenly spread numbers, the same in every run: steps of the golden ratio.
 fn spread(number: usize, step: f64) -> f64 {
     (number as f64 * step).fract()
 }
@@ -38,7 +38,7 @@ fn straight(number: usize) -> Straight {
         t.abs() < half_length && s.abs() < half
     };
     let image = RgbImage::from_fn(330, 300, |x, y| {
-        // Nine places a pixel make soft edges.
+        // Nine samples per pixel, for soft edges.
         let places =
             (0..9).map(|i| Point2::new(f64::from(x) + f64::from(i % 3) / 3.0, f64::from(y) + f64::from(i / 3) / 3.0));
         let share = places.filter(|&place| is_part(place)).count() as f64 / 9.0;
@@ -58,7 +58,7 @@ fn straight(number: usize) -> Straight {
     Straight { image, bbox, angle_deg: angle.to_degrees(), click }
 }
 
-/// Issue 47.
+/// The limit of issue 47.
 const MAX_OFF_DEG: f64 = 3.0;
 
 #[test]

@@ -1,4 +1,4 @@
-//! `sdg detect --from … --draw PORT`: live pictures with what was found in them.
+//! `sdg detect --from … --draw PORT`: live pictures with detections drawn on them.
 
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
@@ -8,7 +8,7 @@ use serde_json::json;
 
 use super::page::{assert_accessible, repository, shipped_photo};
 
-/// A program that ends with the test.
+/// A process that is killed when dropped.
 struct Ended(Child);
 
 impl Drop for Ended {

@@ -1,4 +1,4 @@
-//! Everything that the mouse does, by keys alone.
+//! All actions of the mouse, by keys alone.
 
 use serde_json::json;
 
@@ -18,7 +18,7 @@ fn all_marks_are_made_and_corrected_by_keys() {
     let browser = &page.browser;
     let press = |keys: &[&str]| browser.press(keys).unwrap();
 
-    // A box in the middle, its corner and then itself moved.
+    // A box in the middle; first its corner is moved, then the box.
     press(&["b"]);
     press(&[ENTER]);
     let start = page.saved().bbox;
@@ -28,11 +28,11 @@ fn all_marks_are_made_and_corrected_by_keys() {
     let corner = page.saved().bbox;
     assert_eq!([corner.x2 - start.x2, corner.y2 - start.y2, corner.x1 - start.x1], [-1.0, 10.0, 0.0]);
 
-    // Looked for in such a box there may be an outline or none; it is not what this is about.
+    // Whether an outline is found in such a box does not matter here.
     if page.saved().outline.is_some() {
         page.click("[data-clear=outline]");
     }
-    // A button that was pressed before has the focus; the key of a mark takes it to the photo.
+    // A button pressed earlier has the focus; the key of a mark moves the focus to the photo.
     browser.run("document.getElementById('undo').focus()", &[]).unwrap();
     press(&["g"]);
     press(&[ENTER]);
@@ -49,11 +49,11 @@ fn all_marks_are_made_and_corrected_by_keys() {
     assert!((moved.jaw_width.unwrap() - placed.jaw_width.unwrap() - 1.0).abs() < 0.02);
     assert!((b.center().x - a.center().x + 1.0).abs() < 0.02 && (b.center().y - a.center().y).abs() < 0.02);
 
-    // Numbers are typed, too.
+    // Numbers can be typed too.
     page.fill("#grasp-width", "44");
     assert_eq!(page.saved().jaw_width, Some(44.0));
 
-    // Deleted and brought back.
+    // Deleted and restored.
     browser.run("document.querySelector('[data-body]').focus()", &[]).unwrap();
     press(&[DELETE]);
     page.wait_for("no gripper", "return document.querySelector('#do-grasp.done') === null");
@@ -62,7 +62,7 @@ fn all_marks_are_made_and_corrected_by_keys() {
     page.wait_for("the gripper again", "return document.querySelector('#do-grasp.done') !== null");
     assert_eq!(page.saved().jaw_width, Some(44.0));
 
-    // Help opens by key, says what the keys are, and closes.
+    // The help opens by key, lists the keys, and closes.
     press(&["?"]);
     assert!(page.text("#help").contains("Turn the gripper"));
     page.screenshot("help");

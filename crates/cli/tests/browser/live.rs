@@ -1,4 +1,4 @@
-//! A photo taken with a camera, marked, taught, and the model tried on the camera's pictures.
+//! A photo is taken with a camera, marked and taught, and the model is tried on the camera's pictures.
 
 use std::path::Path;
 
@@ -8,17 +8,18 @@ use serde_json::json;
 use super::page::{BOX, HOLD, Page, shipped_photo};
 use super::photo_to_grasp::patiently;
 
-/// The wrist camera as the shipped photos were taken: straight down from 0.58 m, the picture's right along -y of the base.
+/// The wrist camera in the pose of the shipped photos: straight down from 0.58 m; right in the picture is -y of the
+/// base.
 const CAMERA: &str = include_str!("../wrist.yaml");
 
 fn picture() -> RgbImage {
     image::open(shipped_photo()).unwrap().into_rgb8()
 }
 
-/// Puts one picture before the `dir:` camera, instead of the one before.
+/// Replaces the picture of the `dir:` camera.
 fn show(table: &Path, name: &str, picture: &RgbImage) {
     let before: Vec<_> = std::fs::read_dir(table).unwrap().map(|entry| entry.unwrap().path()).collect();
-    // Hidden while it is written, as other programs do it.
+    // Hidden while it is written, as other programs do.
     let hidden = table.join(format!(".{name}"));
     picture.save(&hidden).unwrap();
     std::fs::rename(hidden, table.join(name)).unwrap();
@@ -60,14 +61,14 @@ fn a_photo_from_the_camera_is_marked_taught_and_tried_live() {
     page.screenshot("live-2-marked");
     teach(&page);
 
-    // The part lies the other way round, elsewhere.
+    // The part is now rotated by half a turn, at another place.
     show(&table, "b.png", &image::imageops::rotate180(&picture()));
     page.click("#go-try");
     found_at(&page, [640.0 - HOLD[0], 480.0 - HOLD[1]]);
     assert!(page.text("#live-time").contains(" ms"), "{}", page.text("#live-time"));
     page.screenshot("live-3-tried");
     page.assert_accessible("tried live");
-    // And back: what is drawn follows.
+    // And back: the drawing follows.
     show(&table, "c.png", &picture());
     found_at(&page, HOLD);
 
@@ -99,7 +100,7 @@ fn teach(page: &Page) {
     patiently(page, "a model", "return document.getElementById('teach-outcome').innerText.includes('Written to')");
 }
 
-/// Waits until a grasp is drawn there on the live picture.
+/// Waits until a grasp is drawn at this position of the live picture.
 fn found_at(page: &Page, place: [f64; 2]) {
     const MAX_DISTANCE_PX: f64 = 12.0;
     let drawn = format!(
@@ -112,7 +113,7 @@ fn found_at(page: &Page, place: [f64; 2]) {
             && document.getElementById('live-found').innerText.includes('Found the part')",
         place[0], place[1]
     );
-    // The words and the drawing are of the same frame; the next frame may change both between two questions.
+    // Text and drawing are of the same frame; the next frame may change both between two queries.
     patiently(page, "the grasp where the part is, and the words", &drawn);
 }
 
@@ -125,7 +126,7 @@ fn pause_and_keep(page: &Page, table: &Path) {
     page.wait_for("its grasp", "return document.getElementById('strip').innerText.includes('1 found')");
     page.browser.press(&["l"]).unwrap();
     page.wait_for("nothing", "return document.getElementById('live-found').innerText.includes('nothing to grasp')");
-    // The kept picture can be looked at, and the camera comes back to the stage.
+    // The kept picture can be viewed, and the camera returns to the stage.
     page.click("#strip button");
     page.wait_for("the kept picture", "return document.getElementById('photo').alt.startsWith('Photo live-')");
     page.wait_for("its grasp", "return document.getElementById('found').innerText.includes('Found the part')");
@@ -134,7 +135,7 @@ fn pause_and_keep(page: &Page, table: &Path) {
     wait_for_state(page, "Live");
 }
 
-/// What was found in an old picture is neither drawn nor told.
+/// Detections in an old picture are neither drawn nor reported.
 fn lose_the_camera(page: &Page, table: &Path) {
     show(table, "e.png", &picture());
     found_at(page, HOLD);
@@ -171,7 +172,8 @@ fn with_a_calibrated_camera_the_grasp_is_told_in_millimetres() {
     page.click("#go-try");
     found_at(&page, HOLD);
     let told = page.text("#live-found .pose");
-    // By hand from the marks on the photo, which lies straight above: 550 pixels of focal length, 0.564 m above the marks.
+    // Calculated by hand from the marks on the photo, which is vertical: focal length 550 pixels, 0.564 m above the
+    // marks.
     let (in_picture, told) = told.split_once('\n').unwrap();
     assert!(in_picture.contains(" px, ") && in_picture.contains('°'), "{in_picture}");
     let number = |name: &str| -> f64 {
@@ -184,7 +186,7 @@ fn with_a_calibrated_camera_the_grasp_is_told_in_millimetres() {
     page.screenshot("live-calibrated");
     page.assert_accessible("with a calibrated camera");
 
-    // Pictures of another size are not this camera's.
+    // Pictures of another size are not from this camera.
     show(&page.folder.path().join("table"), "b.png", &image::imageops::thumbnail(&picture(), 320, 240));
     wait_for_state(&page, "Another size");
     page.assert_quiet();

@@ -9,11 +9,11 @@ use sdg_webdriver::{Browser, BrowserOptions};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
-/// The pendulum lies here on its photo; its handle's middle is a good place to grasp it.
+/// The pendulum's box on its photo; the middle of its handle is a good place to grasp it.
 pub const BOX: [f64; 4] = [255.0, 164.0, 392.0, 282.0];
 pub const HOLD: [f64; 2] = [325.0, 225.0];
 
-/// The page and all that is behind it; everything ends when dropped.
+/// The page with its server and browser; all are stopped when dropped.
 pub struct Page {
     pub browser: Browser,
     pub folder: TempDir,
@@ -31,7 +31,7 @@ pub fn shipped_photo() -> PathBuf {
 }
 
 impl Page {
-    /// Opens the page on a copy of the shipped pendulum's photo, which nothing is marked on.
+    /// Opens the page on a copy of the shipped pendulum's photo, without marks.
     pub fn open() -> Self {
         let folder = tempfile::tempdir().unwrap();
         std::fs::copy(shipped_photo(), folder.path().join("photo.png")).unwrap();
@@ -51,20 +51,20 @@ impl Page {
         page
     }
 
-    /// Ends the server without a word.
+    /// Kills the server.
     pub fn stop_server(&mut self) {
         self.server.kill().unwrap();
         self.server.wait().unwrap();
     }
 
-    /// As on a full disk, no file can be written; or they can again.
+    /// Prevents writing files, as on a full disk, or allows it again.
     pub fn fill_disk(&self, is_full: bool) {
         let limit = if is_full { "--fsize=0:unlimited" } else { "--fsize=unlimited:unlimited" };
         let status = Command::new("prlimit").args(["--pid", &self.server.id().to_string(), limit]).status();
         assert!(status.unwrap().success(), "prlimit of Debian's util-linux");
     }
 
-    /// Starts it again with the same arguments.
+    /// Starts the server again with the same arguments.
     pub fn start_server(&mut self) {
         (self.server, self.url) = serve(&self.folder, &self.arguments);
     }
@@ -80,7 +80,7 @@ impl Page {
         self.browser.find(css).unwrap().click().unwrap();
     }
 
-    /// Opens what is folded.
+    /// Opens a folded section.
     pub fn unfold(&self, css: &str) {
         if self.browser.run("return document.querySelector(arguments[0]).open", &[json!(css)]).unwrap() == json!(false)
         {
@@ -88,7 +88,7 @@ impl Page {
         }
     }
 
-    /// Chooses a model to teach; all but C are folded.
+    /// Chooses the model to teach; all letters but C are in a folded section.
     pub fn choose_model(&self, letter: &str) {
         if letter != "C" {
             self.unfold("#other-models");
@@ -96,8 +96,8 @@ impl Page {
         self.click(&format!("[name=model][value={letter}]"));
     }
 
-    /// Writes over what a field shows, by keys alone: the page may write a field that is not in focus at any time, and
-    /// one that is not shown yet takes no focus.
+    /// Replaces the text of a field by keys alone. The page may write to a field without focus at any time, and a
+    /// hidden field takes no focus.
     pub fn fill(&self, css: &str, text: &str) {
         let shown = format!("return document.querySelector({css:?}).checkVisibility()");
         self.wait_for("a field that is shown", &shown);
@@ -109,14 +109,14 @@ impl Page {
         text.as_str().unwrap_or_default().to_owned()
     }
 
-    /// Where a place of the photo is on the screen.
+    /// Position on the screen of a point of the photo.
     pub fn on_screen(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let script = "const p = document.getElementById('photo'), r = p.getBoundingClientRect();
             const k = r.width / p.naturalWidth; return [r.left + arguments[0] * k, r.top + arguments[1] * k]";
         numbers(&self.browser.run(script, &[json!(x), json!(y)]).unwrap())
     }
 
-    /// The middle of a handle on the screen.
+    /// Middle of a handle on the screen.
     pub fn handle(&self, css: &str) -> [f64; 2] {
         let script = "const r = document.querySelector(arguments[0]).getBoundingClientRect();
             return [r.left + r.width / 2, r.top + r.height / 2]";
@@ -129,21 +129,21 @@ impl Page {
         self.browser.drag(&[corner(BOX[0], BOX[1]), middle, corner(BOX[2], BOX[3])]).unwrap();
     }
 
-    /// Waits until what was just done is shown, sent and answered.
+    /// Waits until the last action is shown, sent and answered.
     pub fn settle(&self) {
         let script = "return new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(
             document.getElementById('propose').innerText !== 'Looking…' && document.getElementById('saved').innerText !== 'Saving…'))))";
         self.wait_for("the page to settle", script);
     }
 
-    /// Waits until what was just done is drawn.
+    /// Waits until the last action is drawn.
     pub fn settle_frames(&self) {
         let script =
             "return new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(true))))";
         self.wait_for("the page to draw", script);
     }
 
-    /// Waits until all is saved and reads what stands on the disk.
+    /// Waits until everything is saved and reads the saved marks.
     pub fn saved(&self) -> Annotation {
         self.settle();
         self.wait_for(
@@ -168,7 +168,7 @@ impl Page {
     }
 }
 
-/// What axe-core finds wrong with a page as it is now.
+/// Asserts that axe-core finds no violations on the current page.
 pub fn assert_accessible(browser: &Browser, about: &str) {
     let path = repository().join("target/browser-test/npm/node_modules/axe-core/axe.min.js");
     let axe =
@@ -181,13 +181,13 @@ pub fn assert_accessible(browser: &Browser, about: &str) {
 }
 
 fn serve(folder: &TempDir, arguments: &[String]) -> (Child, String) {
-    // A file larger than a test allows is then an error, as on a full disk, instead of the program's end.
+    // A file above the test's size limit is then an error, as on a full disk, and does not end the program.
     let mut server = Command::new("sh")
         .args(["-c", "trap '' XFSZ; exec \"$0\" \"$@\"", env!("CARGO_BIN_EXE_sdg")])
         .args(["annotate", "--no-browser", "--json"])
         .args(arguments)
         .current_dir(folder.path())
-        // It is ended without a word, and what it keeps for the session goes with the folder.
+        // The server is killed; its session files are deleted with the folder.
         .env("TMPDIR", folder.path())
         .env("XDG_STATE_HOME", folder.path().join("state"))
         .stdout(Stdio::piped())

@@ -1,4 +1,4 @@
-//! The way that the page is made for: mark with the mouse, see samples, teach, try, learn from what was found.
+//! The page's main task: mark with the mouse, view samples, teach, try, learn from a detection.
 
 use std::time::Duration;
 
@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use super::page::{BOX, HOLD, Page, shipped_photo};
 
-/// Issue 47: the page loads in under a second and stays below 190 KB, its photo apart.
+/// The limits of issue 47: the page loads in under a second and is smaller than 190 KB without its photo.
 const MAX_LOAD_MS: f64 = 1000.0;
 const MAX_PAGE_BYTES: f64 = 190_000.0;
 
@@ -17,7 +17,7 @@ fn from_a_photo_to_a_taught_model_and_another_demonstration() {
     assert_light(&page);
     page.assert_accessible("empty page");
     page.screenshot("1-empty");
-    // What needs marks is off, and says why.
+    // Controls that need marks are disabled and say why.
     let off = |css: &str| {
         let script = "const b = document.querySelector(arguments[0]); return b.disabled ? b.title : 'on'";
         page.browser.run(script, &[css.into()]).unwrap()
@@ -74,7 +74,7 @@ fn mark(page: &Page) {
     assert!(close(boxed.bbox.x1, BOX[0]) && close(boxed.bbox.y2, BOX[3]), "{:?}", boxed.bbox);
     assert_eq!(boxed.label, "pendulum");
 
-    // The outline is looked for by itself.
+    // The outline is proposed automatically.
     page.wait_for("the outline", "return document.querySelector('#do-outline.done') !== null");
     let outline = page.saved().outline.unwrap();
     assert!(
@@ -93,7 +93,7 @@ fn mark(page: &Page) {
     assert!((line.center().x - HOLD[0]).abs() < 10.0 && (line.center().y - HOLD[1]).abs() < 10.0, "{line:?}");
     page.screenshot("2-marked");
 
-    // A jaw dragged outwards opens both; undo takes it back, redo brings it again.
+    // Dragging one jaw outwards opens both; undo and redo work.
     let before = placed.jaw_width.unwrap();
     let jaw = page.handle("[data-jaw='1'] .jaw");
     let away = [jaw[0] - 14.0, jaw[1] + 18.0];
@@ -109,7 +109,7 @@ fn mark(page: &Page) {
     browser.press(&["\u{e009}", "z"]).unwrap();
     page.wait_for("undo", "return !document.getElementById('redo').disabled");
 
-    // The end of the line dragged a quarter around turns the gripper: now it lies along the part.
+    // Dragging the end of the line by a quarter turn rotates the gripper: now it is parallel to the part.
     let (end, middle) = (page.handle("[data-end='end'] .knob"), page.on_screen([line.center().x, line.center().y]));
     let around = [middle[0] - (end[1] - middle[1]), middle[1] + (end[0] - middle[0])];
     let half = [0.5 * (end[0] + around[0]), 0.5 * (end[1] + around[1])];
@@ -122,7 +122,7 @@ fn mark(page: &Page) {
     browser.press(&["\u{e009}", "z"]).unwrap();
     page.wait_for("no warning", "return document.querySelector('[data-code=gripper_along]') === null");
 
-    // A point of the outline dragged, and a reload: everything is as it was left.
+    // A point of the outline is dragged and the page reloaded: the state is unchanged.
     page.click("#do-outline h2");
     page.settle();
     page.assert_accessible("with the outline's points");
@@ -150,7 +150,7 @@ fn see_samples(page: &Page) {
 fn teach(page: &Page) {
     page.screenshot("5-teach");
     page.assert_accessible("teaching");
-    // A few steps of a network, which starts from the shipped weights: a model already.
+    // A few steps of a network that starts from the shipped weights give a model already.
     page.click("[name=model][value=C]");
     page.click("#more summary");
     page.assert_accessible("all settings");
@@ -167,7 +167,7 @@ fn teach(page: &Page) {
     page.choose_model("S");
     page.click("#fixed-height");
     page.click("#teach-start");
-    // Both are kept, and the figures are those of the finished model, without a network as well.
+    // Both models are kept, and the figures are those of the finished model, also of one without a network.
     let instant = "const models = [...document.querySelectorAll('#version-list li')].map((li) => li.innerText);
         return models.length === 2 && models[1].includes('2: S') && / of \\d+ found/.test(models[1])
             && models[1].includes('in use')";
@@ -179,7 +179,7 @@ fn teach(page: &Page) {
     page.assert_accessible("taught");
 }
 
-/// Asks again for longer than the browser's own patience: the computer may be busy.
+/// Retries for longer than the browser's own timeout: the computer may be busy.
 pub fn patiently(page: &Page, what: &str, script: &str) -> Value {
     const TIMES: usize = 8;
     for _ in 1..TIMES {
@@ -192,18 +192,18 @@ pub fn patiently(page: &Page, what: &str, script: &str) -> Value {
 }
 
 fn try_on_another_picture(page: &Page) {
-    // The part lies the other way round, elsewhere.
+    // The part is now rotated by half a turn, at another place.
     let other = page.folder.path().join("other.png");
     let turned = image::imageops::rotate180(&image::open(shipped_photo()).unwrap().into_rgb8());
     turned.save(&other).unwrap();
     let before = page.saved_grasp();
     page.click("#go-try");
-    // What only looks like a picture is told by its name.
+    // A file that only looks like a picture is reported with its name.
     let broken = page.folder.path().join("broken.png");
     std::fs::write(&broken, "no picture").unwrap();
     page.browser.find("#picture-input").unwrap().type_text(broken.to_str().unwrap()).unwrap();
     page.wait_for("its error", "return document.getElementById('try-error').innerText.includes('broken.png')");
-    // The browser's console has the refusal, too, and nothing else.
+    // The browser's console has the refusal too, and nothing else.
     let told = page.browser.console_errors().unwrap();
     assert!(told.len() == 1 && told[0].contains("422"), "{told:?}");
     page.screenshot("9-broken");
@@ -214,7 +214,7 @@ fn try_on_another_picture(page: &Page) {
     page.screenshot("8-found");
     page.assert_accessible("trying");
 
-    // Right: it becomes a demonstration beside the photo, with the grasp where the part lies.
+    // A confirmed detection becomes a demonstration beside the photo, with the grasp at the part's position.
     page.click(".found button");
     page.wait_for(
         "another demonstration",

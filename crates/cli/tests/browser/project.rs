@@ -1,4 +1,4 @@
-//! A project: opened again, its versions, pictures without the part, refused ones that are right, the server's end.
+//! A project: reopening it, its versions, pictures without the part, wrongly refused pictures, the server's end.
 
 use std::net::TcpListener;
 use std::path::Path;
@@ -10,7 +10,7 @@ use serde_json::json;
 use super::page::{BOX, HOLD, Page, repository, shipped_photo};
 use super::photo_to_grasp::patiently;
 
-/// Opens a project that holds the pendulum's photo under these names, each with the marks that are shipped.
+/// Opens a project with copies of the pendulum's photo under these names, each with the shipped marks.
 fn open(further: &[&str], photos: &[&str]) -> Page {
     let folder = tempfile::tempdir().unwrap();
     let project = folder.path().join("project");
@@ -45,7 +45,7 @@ fn try_picture(page: &Page, name: &str, picture: &RgbImage) {
     page.click("#tab-try");
     page.browser.find("#picture-input").unwrap().type_text(path.to_str().unwrap()).unwrap();
     page.wait_for(name, &format!("return document.getElementById('photo').alt === 'Photo {name}'"));
-    // The answer to the picture before stays until the next frame.
+    // The answer for the picture before stays until the next frame.
     page.settle_frames();
     patiently(
         page,
@@ -58,7 +58,7 @@ fn photo() -> RgbImage {
     image::open(shipped_photo()).unwrap().into_rgb8()
 }
 
-/// The part with half of it under something.
+/// The part, half covered.
 fn half_covered() -> RgbImage {
     let mut picture = photo();
     for y in 150..300 {
@@ -69,7 +69,7 @@ fn half_covered() -> RgbImage {
     picture
 }
 
-/// The part twice: its surroundings copied to another corner.
+/// Two copies of the part: its surroundings are copied to another corner.
 fn two_parts() -> RgbImage {
     let mut picture = photo();
     let [x, y, width, height] = [BOX[0] - 8.0, BOX[1] - 8.0, BOX[2] - BOX[0] + 16.0, BOX[3] - BOX[1] + 16.0];
@@ -98,7 +98,7 @@ fn several_found_ones_have_numbers() {
     page.screenshot("project-11-two");
     page.assert_accessible("two found");
 
-    // The least score decides, in the list, in the picture and in the row.
+    // The minimum score takes effect in the list, in the picture and in the row.
     let count = page.text("#least-score-count");
     assert!(count.starts_with("Found 2 of ") && count.contains("at 0.50, in 1 of 1 pictures"), "{count}");
     let slide =
@@ -112,7 +112,7 @@ fn several_found_ones_have_numbers() {
     page.assert_accessible("nothing at the highest least score");
     page.browser.run(slide, &[json!("0.5")]).unwrap();
 
-    // Zoomed to, the part fills more of the stage.
+    // Zoomed in, the part fills more of the stage.
     let scale = "return document.getElementById('photo').getBoundingClientRect().width";
     let whole = page.browser.run(scale, &[]).unwrap().as_f64().unwrap();
     page.browser
@@ -120,7 +120,7 @@ fn several_found_ones_have_numbers() {
         .unwrap();
     page.wait_for("the part to fill the stage", &format!("{scale} > {}", 1.5 * whole));
 
-    // Another picture, with nothing in it, comes first when the row is sorted.
+    // Another picture, without detections, comes first when the row is sorted.
     try_picture(&page, "empty.png", &RgbImage::from_pixel(640, 480, Rgb([140, 140, 135])));
     let row = "return [...document.querySelectorAll('#strip button')].map((b) => b.children[1].innerText)";
     assert_eq!(page.browser.run(row, &[]).unwrap(), json!(["two.png", "empty.png"]));
@@ -133,7 +133,7 @@ fn several_found_ones_have_numbers() {
     }
     page.click("#strip li:nth-child(2) button");
     page.wait_for("the other picture", "return document.getElementById('photo').alt === 'Photo two.png'");
-    // All pictures as files: a line for each grasp, or an object for each picture.
+    // All pictures as files: one line per grasp, or one object per picture.
     let saved = |css: &str| {
         let script = "const made = URL.createObjectURL; let blob;
             URL.createObjectURL = (given) => made.call(URL, (blob = given));
@@ -163,7 +163,7 @@ fn a_refused_one_says_why_and_is_learnt_from() {
     page.settle_frames();
     let found = page.text("#found");
     assert!(found.contains("Refused") && found.contains("Why:"), "{found}");
-    assert!(found.contains("Right all the same: learn from it") && found.contains("The part is not here"), "{found}");
+    assert!(found.contains("Right after all: learn from it") && found.contains("The part is not here"), "{found}");
     let dots = "return document.querySelectorAll('#overlay .differs path').length";
     assert!(page.browser.run(dots, &[]).unwrap().as_u64().unwrap() > 0, "where it differs is shown");
     page.screenshot("project-1-refused");
@@ -179,7 +179,7 @@ fn a_refused_one_says_why_and_is_learnt_from() {
         "a demonstration",
         "return document.getElementById('found').innerText.includes('A demonstration now')",
     );
-    // Model S is taught in seconds: it learns at once, and what that changed is told, be it nothing.
+    // Model S is taught in seconds: it learns at once, and the page reports the effect, even if there is none.
     let told = "const text = document.getElementById('learnt').innerText; return text.startsWith('The new model finds') && text";
     patiently(&page, "the change", told);
     page.settle_frames();
@@ -197,7 +197,7 @@ fn a_refused_one_says_why_and_is_learnt_from() {
     let read = Annotation::read(&std::fs::read(marks).unwrap(), &facts).unwrap().remove(0);
     let grasp = read.grasp.unwrap().center();
     assert!((grasp.x - HOLD[0]).hypot(grasp.y - HOLD[1]) < 40.0, "{grasp:?}");
-    // Said to be without the part, a picture makes the model old.
+    // A picture declared to be without the part makes the model outdated.
     try_picture(&page, "empty.png", &RgbImage::from_pixel(640, 480, Rgb([140, 140, 135])));
     let not_here =
         "[...document.querySelectorAll('#found button')].find((b) => b.innerText === 'The part is not here').click()";
@@ -211,7 +211,7 @@ fn a_refused_one_says_why_and_is_learnt_from() {
     page.wait_for("the old result", "return !document.getElementById('teach-old').hidden");
     page.screenshot("project-2-stale");
     page.assert_accessible("versions");
-    // In the last step, too, "Teach again" teaches.
+    // "Teach again" also works in the last step.
     page.click("#tab-try");
     assert!(page.text("#try-intro").contains("This model is old"), "{}", page.text("#try-intro"));
     let again = "[...document.querySelectorAll('#found button')].find((b) => b.innerText === 'Teach again').click()";
@@ -242,7 +242,7 @@ fn a_picture_without_the_part_is_kept_and_versions_are_compared_after_opening_ag
     teach_s(&page, 2);
     assert!(page.text("#version-list").contains("1 without the part"), "{}", page.text("#version-list"));
 
-    // Left and opened again: everything is there. The page is left first, or it would ask for the server in between.
+    // Closed and reopened: everything is there. The page is closed first, or it would call the server in between.
     page.browser.open("about:blank").unwrap();
     page.stop_server();
     page.start_server();
@@ -260,7 +260,7 @@ fn a_picture_without_the_part_is_kept_and_versions_are_compared_after_opening_ag
     let compared = "const text = document.getElementById('compared').innerText;
         return text.includes('other.png') && text.includes('empty.png') && text";
     patiently(&page, "the table", compared);
-    // Each checkbox is beside its word, and the button in the card; "in use" is no warning.
+    // Each checkbox is beside its label, and the button is in the card; "in use" is no warning.
     let layout = "const cards = [...document.querySelectorAll('#version-list li')];
         const middle = (r) => (r.top + r.bottom) / 2, rect = (e) => e.getBoundingClientRect();
         const word = (label) => { const range = document.createRange(); range.selectNode(label.lastChild); return rect(range); };
@@ -286,7 +286,7 @@ fn the_server_s_end_is_told_and_marks_are_kept_in_the_browser() {
     // A port that was free a moment ago.
     let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port().to_string();
     let mut page = open(&["--port", &port, "--token-file", "key"], &["earlier", "photo"]);
-    // Taken out, put back and taken out again: the server that is started anew gives the other photo its number.
+    // Removed, restored and removed again: the restarted server gives the other photo its number.
     for again in [true, false] {
         page.click("#remove-photo");
         page.wait_for("the other photo", "return document.getElementById('photo').alt === 'Photo photo.png'");
@@ -309,7 +309,7 @@ fn the_server_s_end_is_told_and_marks_are_kept_in_the_browser() {
     }
     page.wait_for("kept here", "return (localStorage.getItem('kept-marks') ?? '').includes('photo.png')");
     assert!(page.text("#saved").starts_with("Not saved"), "{}", page.text("#saved"));
-    // photo.json is LabelMe's, which stays as it is: changes are written beside it.
+    // photo.json is a LabelMe file and stays unchanged: changes are written beside it.
     let saved = page.folder.path().join("project/photo.coco.json");
     assert!(!saved.exists());
     page.start_server();
@@ -328,7 +328,7 @@ fn the_server_s_end_is_told_and_marks_are_kept_in_the_browser() {
     assert!(!saved.with_file_name("earlier.coco.json").exists(), "the other photo is left alone");
     page.wait_for("nothing kept any more", "return localStorage.getItem('kept-marks') === null");
 
-    // Started again with another key, it does not answer to this page any more, which says what to do.
+    // Restarted with another token, the server refuses this page, which says what to do.
     page.stop_server();
     std::fs::remove_file(page.folder.path().join("key")).unwrap();
     page.start_server();
@@ -348,7 +348,7 @@ fn on_a_full_disk_a_banner_stays_and_saving_is_tried_again() {
     page.wait_for("the banner", "return !document.getElementById('unsaved').hidden");
     let banner = page.text("#unsaved");
     assert!(banner.starts_with("Not saved: the marks on photo.png (") && banner.contains("too large"), "{banner}");
-    // Elsewhere on the page, and later, it is still there.
+    // The message remains, elsewhere on the page and later.
     page.click("#tab-try");
     page.settle_frames();
     page.wait_for("another try", "return new Promise((done) => setTimeout(() => done(true), 3500))");
@@ -371,7 +371,7 @@ fn a_click_corrects_the_outline_and_is_undone() {
     page.settle();
     let area = |page: &Page| page.saved().outline.unwrap().area();
     let before = area(&page);
-    // A corner of the box with nothing but the table is said to belong to the part.
+    // A corner of the box that contains only table is marked as part.
     page.click("[data-tool=in]");
     page.browser.drag(&[page.on_screen([270.0, 265.0])]).unwrap();
     page.settle();
@@ -392,7 +392,7 @@ fn that_an_outline_has_no_holes_is_said() {
     let middle = [0.5 * (BOX[0] + BOX[2]), 0.5 * (BOX[1] + BOX[3])];
     let washer = RgbImage::from_fn(640, 480, |x, y| {
         let radius = (f64::from(x) - middle[0]).hypot(f64::from(y) - middle[1]);
-        // Two greys of a table, and a dark ring on it.
+        // A table with two greys, and a dark ring on it.
         let table = if (x / 8 + y / 8).is_multiple_of(2) { 150 } else { 156 };
         Rgb([if (25.0..56.0).contains(&radius) { 70 } else { table }; 3])
     });
@@ -413,7 +413,7 @@ fn that_an_outline_has_no_holes_is_said() {
     assert!((after / area - 1.0).abs() < 0.05, "{after} of {area}");
     page.screenshot("project-10-hole");
     page.assert_accessible("a click in a hole");
-    // A round outline raises the question whether the part looks the same when turned.
+    // For a round outline the page asks whether the part looks the same when turned.
     page.click("#tab-teach");
     page.wait_for("the question", "return document.getElementById('symmetry').open");
     assert!(page.text("#symmetry-why").contains("Any turn"), "{}", page.text("#symmetry-why"));
@@ -441,7 +441,7 @@ fn at_360_px_nothing_lies_on_the_part_or_the_tools() {
             Math.max(part.width, part.height)]";
     let told = page.browser.run(overlap, &[]).unwrap();
     assert_eq!((&told[0], &told[1]), (&json!(false), &json!(false)));
-    // Zoomed to after the box, the part is large enough beside its handles.
+    // Zoomed in after the box is drawn, so that the part is large compared with its handles.
     assert!(told[2].as_f64().unwrap() > 120.0, "{told}");
     page.screenshot("project-7-360");
     page.assert_quiet();

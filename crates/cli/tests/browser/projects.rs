@@ -1,4 +1,4 @@
-//! Which project the page is about: a photo's own, one that is chosen, a new folder's photo.
+//! The page's project: a photo's own, a chosen one, or a new folder for a photo.
 
 use serde_json::json;
 
@@ -19,7 +19,7 @@ fn theme(page: &Page, name: &str) {
     page.browser.emulate(1280, 800, false).unwrap();
 }
 
-/// Presses what opens the folder, and waits until its pictures are listed.
+/// Presses the control that opens the folder, and waits until its pictures are listed.
 fn open_folder(page: &Page, css: &str) {
     page.browser.run("document.getElementById('folder-list').replaceChildren()", &[]).unwrap();
     page.click(css);
@@ -64,7 +64,7 @@ fn without_an_argument_a_photo_becomes_a_project_that_is_found_again() {
     let listed = page.text("#recent-list");
     assert!(listed.starts_with("hanging pendulum") && listed.contains("/hanging_pendulum"), "{listed}");
     theme(&page, "recent");
-    // A name that is taken is told, and nothing is written over.
+    // A name that exists already is reported, and no file is overwritten.
     page.browser.find("#new-input").unwrap().type_text(shipped_photo().to_str().unwrap()).unwrap();
     page.wait_for("the form", "return !document.getElementById('new-part').hidden");
     page.fill("#new-name", "hanging pendulum");
@@ -91,7 +91,7 @@ fn a_photo_is_opened_again_with_its_models_and_tried_pictures() {
     page.click("#teach-start");
     patiently(&page, "a version", "return document.querySelectorAll('#version-list li').length === 1");
     page.click("#tab-try");
-    // Nothing of the folder is taken in until it is added.
+    // No file of the folder is used until it is added.
     assert_eq!(page.text("#add-others"), "From this folder (1)…");
     open_folder(&page, "#add-others");
     page.wait_for("the folder", "return document.querySelectorAll('#folder-list img').length === 1");
@@ -143,7 +143,7 @@ fn in_a_new_folder_the_photo_is_chosen_and_the_name_is_asked_for_once() {
     theme(&page, "named");
     page.click("#keep-name");
     page.wait_for("no question", "return document.getElementById('naming').hidden");
-    // A second photo, and out again.
+    // A second photo is added and removed again.
     open_folder(&page, "#add-photo");
     page.click("#folder-list li:nth-child(1) button");
     photo_of_page(&page, "IMG_1.png");

@@ -1,15 +1,15 @@
-//! The part of the pictures that is searched: drawn on a picture, set by numbers, live, and in the model that is taught next.
+//! The searched region: drawn on a picture, given as numbers, on live pictures, and in the next taught model.
 
 use serde_json::json;
 
 use super::page::{HOLD, Page, shipped_photo};
 use super::photo_to_grasp::patiently;
 
-/// Round the pendulum, and beside it.
+/// A region around the pendulum, and one beside it.
 const ON_IT: [f64; 4] = [220.0, 140.0, 200.0, 200.0];
 const BESIDE_IT: [f64; 4] = [20.0, 20.0, 180.0, 160.0];
 
-/// The page on the shipped photo with its marks, and a camera that shows the same.
+/// The page with the shipped photo and its marks, and a camera that shows the same picture.
 fn open() -> Page {
     let folder = tempfile::tempdir().unwrap();
     let table = folder.path().join("table");
@@ -17,7 +17,7 @@ fn open() -> Page {
     std::fs::copy(shipped_photo(), table.join("a.png")).unwrap();
     std::fs::copy(shipped_photo(), folder.path().join("photo.png")).unwrap();
     let marks = shipped_photo().with_file_name("annotation.json");
-    // Marks in COCO belong to the photo by its name.
+    // COCO marks are assigned to the photo by its name.
     let text = std::fs::read_to_string(marks).unwrap().replace("image.png", "photo.png");
     std::fs::write(folder.path().join("photo.json"), text).unwrap();
     let page = Page::open_in(folder, &["photo.png", "--from", "dir:table?fps=10&loop"]);
@@ -78,7 +78,7 @@ fn a_region_is_drawn_and_typed_and_holds_live_and_in_the_next_model() {
     page.screenshot("region-1-live");
     page.assert_accessible("a region on the live picture");
 
-    // On a picture, by its numbers, round the part.
+    // On a picture, given as numbers, around the part.
     let other = page.folder.path().join("other.png");
     std::fs::copy(shipped_photo(), &other).unwrap();
     page.browser.find("#picture-input").unwrap().type_text(other.to_str().unwrap()).unwrap();
@@ -95,7 +95,7 @@ fn a_region_is_drawn_and_typed_and_holds_live_and_in_the_next_model() {
     page.screenshot("region-2-typed");
     page.assert_accessible("a region by numbers");
 
-    // What the part does not fit in is refused in words, and what was set stays.
+    // A region too small for the part is rejected with a message, and the old one is kept.
     drag(&page, [HOLD[0] - 20.0, HOLD[1] - 20.0, 40.0, 40.0]);
     page.wait_for(
         "the refusal",
@@ -106,7 +106,7 @@ fn a_region_is_drawn_and_typed_and_holds_live_and_in_the_next_model() {
     page.screenshot("region-3-refused");
     page.assert_accessible("a region that is refused");
 
-    // The next model keeps it; a reload shows it again.
+    // The next model stores the region; after a reload it is shown again.
     teach(&page);
     assert_eq!(region_of_file(&page), Some(ON_IT.map(|side| side as u32)));
     page.browser.run("window.isOld = true; location.reload()", &[]).unwrap();

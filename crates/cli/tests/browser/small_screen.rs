@@ -1,4 +1,4 @@
-//! A phone's width, and the dark.
+//! A phone's width, and the dark colour scheme.
 
 use serde_json::json;
 
@@ -30,7 +30,7 @@ fn every_step_fits_a_small_screen_in_light_and_dark() {
             }
         }
     }
-    // The one action is in sight without scrolling.
+    // The only action is visible without scrolling.
     page.click("#tab-teach");
     for (width, height) in [(390, 800), (1280, 800)] {
         page.browser.emulate(width, height, false).unwrap();

@@ -1,4 +1,4 @@
-//! Pictures that are tried: jaws that touch a neighbour, which refused one helps most, two hundred at once.
+//! Tried pictures: jaws that touch a neighbour, the refused picture that helps most, two hundred pictures at once.
 
 use image::{Rgb, RgbImage};
 use serde_json::{Value, json};
@@ -23,7 +23,7 @@ fn taught() -> Page {
     page
 }
 
-/// Adds pictures at once.
+/// Adds several pictures in one action.
 fn add(page: &Page, pictures: &[(String, RgbImage)]) {
     let paths: Vec<_> = pictures.iter().map(|(name, _)| page.folder.path().join(name)).collect();
     for (path, (_, picture)) in paths.iter().zip(pictures) {
@@ -33,7 +33,7 @@ fn add(page: &Page, pictures: &[(String, RgbImage)]) {
     page.browser.find("#picture-input").unwrap().type_text(&paths.join("\n")).unwrap();
 }
 
-/// Whether so many pictures were looked at.
+/// Whether this number of pictures has been searched.
 fn looked_at(count: usize) -> String {
     format!(
         "const words = [...document.querySelectorAll('#strip button')].map((b) => b.innerText);
@@ -49,7 +49,7 @@ fn crop(picture: &RgbImage, [x, y]: [u32; 2]) -> RgbImage {
     image::imageops::crop_imm(picture, x, y, 320, 240).to_image()
 }
 
-/// What a button saves.
+/// The file that a button saves.
 fn saved(page: &Page, css: &str) -> String {
     let script = "const made = URL.createObjectURL; let blob;
         URL.createObjectURL = (given) => made.call(URL, (blob = given));
@@ -75,7 +75,7 @@ fn jaws_that_would_touch_a_neighbour_are_told() {
     let record: Value = serde_json::from_str(saved(&page, "#save-json").lines().next().unwrap()).unwrap();
     let touching = record["detections"].as_array().unwrap().iter().filter(|one| one["jaws_touch"] != json!([]));
     assert_eq!(touching.count(), told.len(), "{record}");
-    // Words for screen readers alone make the page no longer.
+    // Texts for screen readers must not make the page longer.
     let room = page.browser.run("return document.documentElement.scrollHeight - innerHeight", &[]).unwrap();
     assert_eq!(room, json!(0), "the panel scrolls, not the page");
     page.screenshot("tried-1-jaws");
@@ -112,7 +112,7 @@ fn the_page_says_which_refused_picture_helps_most() {
     page.wait_for("that picture", &format!("return document.getElementById('photo').alt === 'Photo {name}'"));
     let learn = "const b = [...document.querySelectorAll('#found button')].find((b) => /learn from it/.test(b.innerText)); if (b) b.click(); return Boolean(b)";
     page.wait_for("the button", learn);
-    // What was said comes true.
+    // The prediction is correct.
     let learnt = "const text = document.getElementById('learnt').innerText; return text.startsWith('The new model finds') && text";
     let learnt = patiently(&page, "what was learnt", learnt);
     assert!(learnt.as_str().unwrap().contains("finds the part in 3 of 3 pictures"), "{learnt}");
@@ -124,7 +124,7 @@ fn the_page_says_which_refused_picture_helps_most() {
 #[ignore = "make test-browser: needs Chromium"]
 fn two_hundred_pictures_are_tried_and_saved() {
     const COUNT: usize = 200;
-    /// The grasp of the shipped marks, and how far it may be found from it, in pixels.
+    /// The grasp of the shipped marks, and the maximum distance of the detected one, in pixels.
     const MAX_OFF_PX: f64 = 2.0;
     let page = taught();
     let photo = photo();
@@ -162,7 +162,7 @@ fn two_hundred_pictures_are_tried_and_saved() {
         let [x, y] = place(number).map(f64::from);
         places.extend(found.into_iter().map(|at| [at[0] + x, at[1] + y]));
     }
-    // All are the same part of the same photo.
+    // All show the same part of the same photo.
     let middle = |axis: usize| places.iter().map(|at| at[axis]).sum::<f64>() / places.len() as f64;
     let middle = [middle(0), middle(1)];
     assert!((middle[0] - HOLD[0]).hypot(middle[1] - HOLD[1]) < 40.0, "{middle:?}");

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicU16, Ordering};
 
 static NUM_STARTED: AtomicU16 = AtomicU16::new(0);
 
-/// A simulated Panda on the network, as another program would start it; ended when dropped.
+/// A simulated Panda on the network, started as another program; killed when dropped.
 pub struct Simulated {
     child: Child,
     pub address: String,
@@ -15,7 +15,7 @@ pub struct Simulated {
 
 impl Simulated {
     pub fn start(further: &[&str]) -> Self {
-        // Two neighbouring ports that are free now, and that no other test of this process is about to take.
+        // Two free neighbouring ports that no other test of this process is about to use.
         let begin = 20_000 + std::process::id() as u16 % 20_000 + NUM_STARTED.fetch_add(1, Ordering::Relaxed) * 50;
         let port = (begin..60_000)
             .find(|&port| (port..port + 2).all(|port| TcpListener::bind(("127.0.0.1", port)).is_ok()))

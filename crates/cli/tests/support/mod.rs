@@ -1,4 +1,4 @@
-//! What tests of the command line share: running `sdg`, the shipped demonstrations, a folder that goes away.
+//! Shared code of the command line's tests: running `sdg`, the shipped demonstrations, a temporary folder.
 #![allow(missing_docs)]
 
 use std::ffi::OsStr;
@@ -11,12 +11,12 @@ use std::process::{Command, Output};
 use image::RgbImage;
 use sdg_demonstration::{Annotation, ImageFacts};
 
-/// Runs `sdg` and waits for its end.
+/// Runs `sdg` and waits until it exits.
 pub fn sdg(arguments: &[impl AsRef<OsStr>]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_sdg")).args(arguments).output().unwrap()
 }
 
-/// Standard output of a call that succeeds.
+/// Standard output of a call that must succeed.
 pub fn stdout(arguments: &[&str]) -> String {
     let output = sdg(arguments);
     assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
@@ -28,10 +28,11 @@ pub fn shipped(part: &str, name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets/demonstrations").join(part).join(name)
 }
 
-/// Writes model S of the shipped pendulum, taught with seed 1: with a camera, 16 mm of its marks and 9 mm of the grasp, or without.
+/// Writes model S of the shipped pendulum, taught with seed 1: with a camera, marks at 16 mm and grasp at 9 mm, or
+/// without.
 ///
-/// Thirty tests need one of the two, each in a process of its own, and a teaching takes five seconds of a core. So the first that asks for
-/// a file teaches it, for this program and these inputs, and the others copy it.
+/// Thirty tests need one of the two models, each in its own process, and a teaching takes five seconds of a core. So
+/// the first test that needs a model teaches it, for this program and these inputs, and the others copy the file.
 pub fn taught_pendulum(out: impl AsRef<Path>, camera: Option<&Path>) {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("taught");
     fs::create_dir_all(&folder).unwrap();
@@ -47,7 +48,7 @@ pub fn taught_pendulum(out: impl AsRef<Path>, camera: Option<&Path>) {
     camera_file.hash(&mut hasher);
     let model = folder.join(format!("pendulum-{:016x}.sdg", hasher.finish()));
 
-    // What the model was made of stands in the file that is locked, from when the model is whole.
+    // The inputs of the model are written into the locked file once the model is complete.
     let mut lock =
         File::options().read(true).write(true).create(true).truncate(false).open(model.with_extension("lock")).unwrap();
     lock.lock().unwrap();
@@ -68,7 +69,8 @@ pub fn taught_pendulum(out: impl AsRef<Path>, camera: Option<&Path>) {
     fs::copy(&model, out).unwrap();
 }
 
-/// The pendulum's photo with the part in it once more, cut out along its marked outline and laid down so many pixels further.
+/// The pendulum's photo with a second copy of the part, cut out along its marked outline and shifted by `[dx, dy]`
+/// pixels.
 pub fn pendulum_twice([dx, dy]: [i64; 2]) -> RgbImage {
     let mut picture = image::open(shipped("pendulum", "image.png")).unwrap().into_rgb8();
     let (width, height) = picture.dimensions();
@@ -82,7 +84,7 @@ pub fn pendulum_twice([dx, dy]: [i64; 2]) -> RgbImage {
     picture
 }
 
-/// A folder that is deleted at the end.
+/// A folder that is deleted when dropped.
 pub struct Folder {
     folder: tempfile::TempDir,
 }
@@ -92,12 +94,12 @@ impl Folder {
         Self { folder: tempfile::tempdir().unwrap() }
     }
 
-    /// The path of a file in it.
+    /// The path of a file in the folder.
     pub fn path(&self, name: &str) -> String {
         self.folder.path().join(name).to_str().unwrap().to_owned()
     }
 
-    /// Writes a file, and gives its path.
+    /// Writes a file and returns its path.
     pub fn text(&self, name: &str, text: &str) -> String {
         fs::write(self.path(name), text).unwrap();
         self.path(name)

@@ -1,4 +1,4 @@
-//! Ways to write the marks of a scene down, none of which loses anything of the grasp.
+//! Ways to store the marks of a scene without losing any part of the grasp.
 
 use rand::Rng;
 use rand::seq::SliceRandom;
@@ -9,19 +9,19 @@ use super::json_text::written;
 use super::picture::pick;
 use super::scene::{HEIGHT, Scene, WIDTH};
 
-/// A file of marks, what stands beside it, and how both were made.
+/// A file of marks, the files beside it, and a description.
 #[derive(Debug, Clone)]
 pub struct Marks {
-    /// Below the variant's folder.
+    /// Path below the variant's folder.
     pub name: String,
     pub bytes: Vec<u8>,
     pub beside: Vec<(String, Vec<u8>)>,
-    /// Formats that `sdg annotation convert` writes on the way, one after the other.
+    /// Formats of intermediate conversions by `sdg annotation convert`, in order.
     pub through: Vec<&'static str>,
     pub recipe: String,
 }
 
-/// The path of a picture as it stands in a file of marks.
+/// The path of a picture as stored in a file of marks.
 pub fn path_in_marks(dice: &mut Pcg64Mcg, name: &str) -> String {
     let escaped: String = name
         .bytes()
@@ -61,7 +61,7 @@ pub fn lossless(dice: &mut Pcg64Mcg, scene: &Scene, photo: &str) -> Marks {
     marks
 }
 
-/// JSON in a file, of whatever style and name.
+/// JSON in a file, in any style and with any name.
 pub fn in_json(dice: &mut Pcg64Mcg, value: &Value, recipe: &str) -> Marks {
     let (bytes, style) = written(dice, value);
     let name = *pick(dice, &["photo.json", "Schl\u{fc}ssel marks.JSON", "marks/a.json", "export.txt", "100%.json"]);
@@ -74,7 +74,7 @@ pub fn in_json(dice: &mut Pcg64Mcg, value: &Value, recipe: &str) -> Marks {
     }
 }
 
-/// Marks in LabelMe's own fields; shapes in any order, with others beside them.
+/// Marks in LabelMe's own fields; shapes in any order, among others.
 pub fn labelme(dice: &mut Pcg64Mcg, scene: &Scene, photo: &str) -> Value {
     let group = pick(dice, &[json!(1), json!(null), json!("7"), json!(12)]).clone();
     let [x1, y1, x2, y2] = scene.corners;
@@ -110,7 +110,7 @@ pub fn labelme(dice: &mut Pcg64Mcg, scene: &Scene, photo: &str) -> Value {
     file
 }
 
-/// COCO with ids of any kind, keypoints in the order that the category names, other images and annotations around it.
+/// COCO with ids of any kind, keypoints in the order of the category's names, and other images and annotations.
 pub fn coco(dice: &mut Pcg64Mcg, scene: &Scene, photo: &str) -> (Value, String) {
     let as_id = |dice: &mut Pcg64Mcg, id: u32| match dice.random_range(0..3) {
         0 => json!(id),
@@ -164,7 +164,7 @@ pub fn coco(dice: &mut Pcg64Mcg, scene: &Scene, photo: &str) -> (Value, String) 
     (file, recipe)
 }
 
-/// A row of labels, with its data.yaml in one of the ways in which it is written.
+/// A row of labels, with its data.yaml in one of its common forms.
 pub fn yolo(dice: &mut Pcg64Mcg, scene: &Scene) -> Marks {
     let [across, down] = [f64::from(WIDTH), f64::from(HEIGHT)];
     let [x1, y1, x2, y2] = scene.corners;

@@ -1,11 +1,13 @@
-//! One picture and its marks in 300 variants: each gives the same grasp, or is refused in one line that names file and field.
+//! One picture and its marks in 300 variants: each gives the same grasp, or is rejected with one line that names file
+//! and field.
 //!
 //! ```text
 //! scene ─┬─ picture: encoding, depth, alpha, Exif, name ──── detect ───────────┐
 //!        ├─ marks: format, order, ids, units, paths, names ─ convert to COCO ──┼─ the same grasp, or a refusal
 //!        └─ a sample of both ─────────────────────────────── teach, detect ────┘
 //! ```
-//! A variant follows from the seed and its number, so that a failure can be made again: `SDG_VARIANTS_SEED=7 cargo nextest run …`.
+//! A variant is determined by the seed and its number, so that a failure can be reproduced: `SDG_VARIANTS_SEED=7 cargo
+//! nextest run …`.
 
 mod json_text;
 mod marks;
@@ -35,13 +37,13 @@ use crate::picture_kinds::with_orientation;
 use crate::support::{Folder, stdout};
 
 const NUM_VARIANTS: usize = 300;
-/// Of those without any loss; all of them must give the grasp.
+/// Minimum number of lossless variants; all of them must give the grasp.
 const MIN_LOSSLESS: usize = 200;
-/// Every so many variants are taught from as well.
+/// Every variant whose number is a multiple of this is also taught from.
 const TAUGHT_EACH: usize = 19;
 const DEFAULT_SEED: u64 = 1;
 const SEED_VARIABLE: &str = "SDG_VARIANTS_SEED";
-/// Stands beside the photo where the marks may be of another one.
+/// Name of a photo in the folder that the marks may refer to instead.
 const OTHER_PHOTO: &str = "other photo.png";
 
 fn scene() -> &'static Scene {
@@ -56,17 +58,17 @@ fn other_scene() -> &'static Scene {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Kind {
-    /// The picture without loss.
+    /// The picture, stored without loss.
     Picture,
-    /// The marks without loss, of a picture without loss.
+    /// The marks, stored without loss, for a picture stored without loss.
     Marks,
-    /// The picture with other pixels, or damaged.
+    /// The picture with changed pixels, or damaged.
     SpoiltPicture,
     WrongMarks,
 }
 
 impl Kind {
-    /// Of ten variants eight lose nothing.
+    /// Eight of ten variants are lossless.
     fn of(idx: usize) -> Self {
         match idx % 10 {
             0..=3 => Self::Picture,
@@ -85,7 +87,7 @@ struct Variant {
     kind: Kind,
     photo: Photo,
     marks: Marks,
-    /// A refusal has one of these; none where nothing may be refused.
+    /// A refusal contains one of these words; empty if a refusal is not allowed.
     refusal_words: &'static [&'static str],
     is_relative: bool,
     is_taught: bool,
@@ -121,7 +123,7 @@ impl Variant {
         }
     }
 
-    /// Writes its files into a folder and runs the program on them.
+    /// Writes the variant's files to a folder and runs the program on them.
     fn run(&self, folder: &Path, model: &str) -> Outcome {
         let at = |name: &str| folder.join(name);
         let mut files = vec![(&self.photo.name, &self.photo.bytes), (&self.marks.name, &self.marks.bytes)];
@@ -157,7 +159,7 @@ impl Variant {
         }
         let mut input = marks;
         for (idx, format) in self.marks.through.iter().chain(&["coco"]).enumerate() {
-            // Each step has a folder of its own for its data.yaml.
+            // Each step has its own folder for its data.yaml.
             let step = at(&format!("step {idx}"));
             fs::create_dir(&step).unwrap();
             let output = step.join("marks").display().to_string();
@@ -171,7 +173,7 @@ impl Variant {
     }
 }
 
-/// A model of the scene, which all variants of the picture are looked at with.
+/// A model of the scene, with which all variants of the picture are searched.
 fn taught(folder: &Folder) -> String {
     scene().photo.save(folder.path("scene.png")).unwrap();
     let mut dice: Pcg64Mcg = generator_at(0, 1, 0);

@@ -1,4 +1,4 @@
-//! What came of a variant, measured against the scene that it was made of.
+//! The outcome of a variant, compared with its scene.
 
 use std::process::Output;
 
@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use super::scene::Scene;
 
-/// A grasp is the same up to this distance and this turn.
+/// Grasps are the same up to this distance and this turn.
 const SAME_PX: f64 = 0.5;
 const SAME_DEG: f64 = 0.5;
 
@@ -20,7 +20,7 @@ pub enum Outcome {
 }
 
 impl Outcome {
-    /// What is one outcome too many for this variant.
+    /// Turns an outcome that this variant must not have into a failure.
     pub fn into_failure(self, what: &str) -> Self {
         match self {
             Self::Other(why) => Self::Other(why),
@@ -35,7 +35,7 @@ fn is_same(scene: &Scene, middle: [f64; 2], angle_deg: f64) -> bool {
     (middle[0] - x).hypot(middle[1] - y) <= SAME_PX && turn.abs() <= SAME_DEG
 }
 
-/// What `sdg detect --json` found in one picture; `None` where it found or read nothing.
+/// The detections of `sdg detect --json` in one picture; `None` if nothing was found or read.
 pub fn of_detection(done: &Output, scene: &Scene) -> Option<Outcome> {
     let line: Value = serde_json::from_slice(&done.stdout).ok()?;
     let [detection] = line["detections"].as_array()?.as_slice() else {
@@ -49,7 +49,7 @@ pub fn of_detection(done: &Output, scene: &Scene) -> Option<Outcome> {
     })
 }
 
-/// What a COCO file of the program marks; boxes and outlines count where they are there.
+/// The marks in a COCO file of the program; boxes and outlines are compared if present.
 pub fn of_marks(coco: &[u8], scene: &Scene) -> Outcome {
     let file: Value = serde_json::from_slice(coco).unwrap();
     let annotations = file["annotations"].as_array().unwrap();
@@ -83,9 +83,9 @@ pub fn of_marks(coco: &[u8], scene: &Scene) -> Outcome {
     }
 }
 
-/// Whether a call that gave no grasp says so in one line with a file of these names and one of these words.
+/// Whether a call without a grasp reports it in one line with one of these file names and one of these words.
 pub fn of_refusal(done: &Output, file_names: &[&String], words: &[&str]) -> Outcome {
-    /// It ran, but found nothing to grasp: a result, which is on standard output.
+    /// It ran, but found nothing to grasp: a result, printed on standard output.
     const NOTHING_TO_GRASP: i32 = 3;
     let told = if done.status.code() == Some(NOTHING_TO_GRASP) { &done.stdout } else { &done.stderr };
     let told = String::from_utf8_lossy(told);

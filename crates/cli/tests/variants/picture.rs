@@ -1,4 +1,4 @@
-//! Ways to store one picture: without loss, with loss, damaged.
+//! Ways to store one picture: lossless, lossy, damaged.
 
 use std::io::Cursor;
 
@@ -17,11 +17,11 @@ use crate::picture_kinds::{encoded, stored_for, with_orientation};
 pub struct Photo {
     pub name: String,
     pub bytes: Vec<u8>,
-    /// How it was made.
+    /// Description of the storage.
     pub recipe: String,
 }
 
-/// Names that people and systems give; one of them holds what its ending does not say.
+/// File names of people and systems; one of them has an extension that contradicts the content.
 const STEMS: [&str; 12] = [
     "photo",
     "Schlüssel groß",
@@ -64,7 +64,7 @@ fn orientation(dice: &mut Pcg64Mcg) -> Option<u8> {
     dice.random_bool(0.5).then(|| dice.random_range(1..=8))
 }
 
-/// Samples of a kind: channels, bytes of each, big endian.
+/// Samples with the given number of channels and bytes per sample, big endian.
 fn samples(photo: &RgbImage, num_channels: usize, bytes_per_sample: usize, alpha: u8) -> Vec<u8> {
     let channels = |pixel: &image::Rgb<u8>| {
         let [r, g, b] = pixel.0;
@@ -82,7 +82,7 @@ fn png(dice: &mut Pcg64Mcg, photo: &RgbImage) -> Photo {
     let stored = stored_for(photo, orientation.unwrap_or(1)).to_rgb8();
     let (num_channels, bit_depth) = *pick(dice, &[(1, 8), (3, 8), (4, 8), (3, 16), (4, 16)]);
     let bytes_per_sample = usize::from(bit_depth) / 8;
-    // An alpha of 0 or 1 everywhere is one that nobody set.
+    // An alpha of 0 or 1 everywhere was never set.
     let alpha = if bit_depth == 8 { *pick(dice, &[255, 0, 1]) } else { 255 };
     let is_palette = num_channels == 1;
     let file = Png {
@@ -107,7 +107,7 @@ fn png(dice: &mut Pcg64Mcg, photo: &RgbImage) -> Photo {
     named(dice, &["png", "PNG"], recipe, file.bytes())
 }
 
-/// A plain TIFF of 8-bit RGB, to be changed.
+/// A plain TIFF of 8-bit RGB, the basis of the others.
 fn plain_tiff(photo: &RgbImage) -> Tiff {
     Tiff {
         size: photo.dimensions().into(),
@@ -177,7 +177,7 @@ fn bmp(dice: &mut Pcg64Mcg, photo: &RgbImage) -> Photo {
     let kind = *pick(dice, &["24 bits", "24 bits from the top", "32 bits", "32 bits, alpha 0"]);
     let mut bytes = match kind {
         "24 bits" => encoded(&photo.clone().into(), ImageFormat::Bmp),
-        // The height is negative then, and the rows go down.
+        // Then the height is negative, and the rows are stored top down.
         "24 bits from the top" => encoded(&DynamicImage::from(photo.clone()).flipv(), ImageFormat::Bmp),
         "32 bits" => encoded(&with_alpha(photo, 255).into(), ImageFormat::Bmp),
         _ => encoded(&with_alpha(photo, 0).into(), ImageFormat::Bmp),
@@ -202,7 +202,7 @@ fn ppm(dice: &mut Pcg64Mcg, photo: &RgbImage) -> Photo {
     named(dice, &["ppm", "PPM"], format!("PPM {head:?}"), [head.as_bytes(), photo.as_raw()].concat())
 }
 
-/// The picture with other pixels, damaged, or no picture; and what a refusal may name of it.
+/// The picture with changed pixels, damaged, or not a picture; and the words that a refusal may contain.
 pub fn spoilt(dice: &mut Pcg64Mcg, photo: &RgbImage) -> (Photo, &'static [&'static str]) {
     let whole = DynamicImage::from(photo.clone());
     let jpeg = |quality: u8| {

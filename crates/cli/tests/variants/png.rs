@@ -1,4 +1,4 @@
-//! PNG files by hand, with what an encoder would not write: interlace, palettes, an Exif block, data in pieces.
+//! Hand-made PNG files with features that encoders rarely write: interlace, palettes, an Exif block, split data.
 
 use crate::bad_input::crc32;
 
@@ -6,17 +6,17 @@ use crate::bad_input::crc32;
 #[derive(Debug, Clone)]
 pub struct Png {
     pub size: [u32; 2],
-    /// Row by row, bytes of 16-bit samples big endian.
+    /// Row by row; 16-bit samples are big endian.
     pub samples: Vec<u8>,
     pub bytes_per_pixel: usize,
     pub bit_depth: u8,
     /// 0 grey, 2 RGB, 3 palette, 6 RGBA.
     pub color_type: u8,
     pub palette: Vec<u8>,
-    /// Of the five that PNG has; 5 changes from row to row.
+    /// One of PNG's five filters; 5 changes the filter from row to row.
     pub filter: u8,
     pub is_interlaced: bool,
-    /// Data chunks that the pixels are cut into.
+    /// Number of data chunks.
     pub num_pieces: usize,
     pub orientation: Option<u8>,
 }
@@ -61,7 +61,7 @@ impl Png {
     }
 }
 
-/// An Exif block in big endian with the orientation alone.
+/// A big-endian Exif block that contains only the orientation.
 fn exif(orientation: u8) -> Vec<u8> {
     [b"MM\0\x2a\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0".as_slice(), &[orientation], &[0; 6]].concat()
 }
@@ -101,7 +101,7 @@ fn filtered(row: &[u8], above: &[u8], step: usize, filter: u8) -> Vec<u8> {
     (0..row.len()).map(|at| row[at].wrapping_sub(predicted(at))).collect()
 }
 
-/// A zlib stream whose blocks are stored as they are.
+/// A zlib stream of stored blocks.
 pub fn zlib_stored(bytes: &[u8]) -> Vec<u8> {
     let mut stream = vec![0x78, 0x01];
     let num_blocks = bytes.len().div_ceil(0xffff);

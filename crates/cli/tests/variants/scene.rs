@@ -1,4 +1,4 @@
-//! A small picture of one part with its marks, of 256 colours, so that palettes hold it without loss.
+//! A small picture of one part with its marks, with 256 colours, so that a palette represents it without loss.
 
 use image::{Rgb, RgbImage};
 use nalgebra::{Point2, Rotation2, Vector2};
@@ -7,7 +7,7 @@ use sdg_demonstration::random::scramble;
 pub const WIDTH: u32 = 320;
 pub const HEIGHT: u32 = 240;
 
-/// A bar with a tooth and a head, which no turn brings onto itself; pixels from its pivot.
+/// A bar with a tooth and a head, without rotational symmetry; pixels from its pivot.
 const PART: [[f64; 2]; 12] = [
     [-55.0, -9.0],
     [-20.0, -9.0],
@@ -23,10 +23,10 @@ const PART: [[f64; 2]; 12] = [
     [-55.0, 9.0],
 ];
 const GRASP: [[f64; 2]; 2] = [[-35.0, 0.0], [15.0, 0.0]];
-/// Samples of a pixel across, and down.
+/// Samples per pixel, horizontally and vertically.
 const SUBPIXELS: u32 = 4;
 
-/// A picture and what is marked on it, in its pixels.
+/// A picture and its marks, in pixels.
 #[derive(Debug, Clone)]
 pub struct Scene {
     pub photo: RgbImage,
@@ -38,13 +38,13 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// The part with its pivot at a place, turned by an angle; the same seed gives the same ground.
+    /// The part with its pivot at a position, rotated by an angle; the background depends only on the seed.
     pub fn new(pivot: [f64; 2], angle_deg: f64, seed: u64) -> Self {
         let rotation = Rotation2::new(angle_deg.to_radians());
         let pivot = Vector2::from(pivot);
         let placed = |point: [f64; 2]| {
             let point = rotation * Vector2::from(point) + pivot;
-            // Files hold few digits.
+            // Files contain few digits.
             [point.x, point.y].map(|value| (value * 16.0).round() / 16.0)
         };
         let outline: Vec<[f64; 2]> = PART.map(placed).to_vec();
@@ -88,19 +88,19 @@ impl Scene {
     }
 }
 
-/// The number of the nearest of the 256 colours: three bits of red, three of green, two of blue.
+/// The index of the nearest of the 256 colours: three bits of red, three of green, two of blue.
 fn number_of(color: [f64; 3]) -> u8 {
     let level = |value: f64, largest: f64| (value.clamp(0.0, 255.0) / 255.0 * largest).round() as u8;
     level(color[0], 7.0) << 5 | level(color[1], 7.0) << 2 | level(color[2], 3.0)
 }
 
-/// The colour of a number.
+/// The colour of an index.
 pub fn color_of(number: u8) -> Rgb<u8> {
     let value = |level: u8, largest: u16| (u16::from(level) * 255 / largest) as u8;
     Rgb([value(number >> 5, 7), value(number >> 2 & 7, 7), value(number & 3, 3)])
 }
 
-/// The numbers of a picture's colours, row by row.
+/// The colour indices of a picture, row by row.
 pub fn numbers_of(picture: &RgbImage) -> Vec<u8> {
     picture.pixels().map(|pixel| number_of(pixel.0.map(f64::from))).collect()
 }

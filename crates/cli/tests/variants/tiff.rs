@@ -1,4 +1,5 @@
-//! TIFF files by hand: both byte orders, BigTIFF, four compressions, planes, palettes, floats, an orientation, a thumbnail.
+//! Hand-made TIFF files: both byte orders, BigTIFF, four compressions, planes, palettes, floats, an orientation, a
+//! thumbnail.
 
 use super::png::zlib_stored;
 
@@ -10,11 +11,11 @@ pub enum Compression {
     PackBits = 32773,
 }
 
-/// A page and how it is stored.
+/// A page and its storage format.
 #[derive(Debug, Clone)]
 pub struct Tiff {
     pub size: [u32; 2],
-    /// Row by row and channel by channel; bytes of a sample in the file's order.
+    /// Row by row and channel by channel; a sample's bytes are in the file's byte order.
     pub samples: Vec<u8>,
     pub num_channels: usize,
     pub bytes_per_sample: usize,
@@ -22,18 +23,18 @@ pub struct Tiff {
     pub is_big_tiff: bool,
     pub compression: Compression,
     pub rows_per_strip: usize,
-    /// Each channel by itself.
+    /// Each channel is stored separately.
     pub is_planar: bool,
     /// 16-bit values: reds, greens, blues.
     pub palette: Option<Vec<u16>>,
     pub is_float: bool,
     pub orientation: Option<u8>,
-    /// Pages before it, each of 8×6 pixels: thumbnails, or pictures of their own.
+    /// Number of pages before it, each of 8×6 pixels: thumbnails, or independent pictures.
     pub thumbnails: usize,
     pub other_pages: usize,
 }
 
-/// A tag with its values; those of 16 bits, or of 32.
+/// A tag with its values, of 16 or of 32 bits.
 type Tag = (u16, Vec<u64>, bool);
 
 impl Tiff {
@@ -77,7 +78,7 @@ impl Tiff {
         }
     }
 
-    /// Appends the page, links to it from there, and gives the place of its own link.
+    /// Appends the page, writes its offset at `link_at`, and returns the position of its own link.
     fn append(&self, file: &mut Vec<u8>, link_at: usize, is_thumbnail: bool) -> usize {
         let mut offsets = Vec::new();
         let mut lengths = Vec::new();

@@ -1,4 +1,4 @@
-//! Marks with a fault, each with the words of which a refusal has to have one.
+//! Marks with a fault, each with the words of which a refusal must contain one.
 
 use rand::Rng;
 use rand_pcg::Pcg64Mcg;
@@ -10,7 +10,7 @@ use super::scene::Scene;
 
 type Words = &'static [&'static str];
 
-/// The scene with its marks at other places; the photo stays.
+/// The scene with moved marks; the photo is unchanged.
 fn mapped(scene: &Scene, map: impl Fn([f64; 2]) -> [f64; 2]) -> Scene {
     let [x1, y1, x2, y2] = scene.corners;
     let [[x1, y1], [x2, y2]] = [[x1, y1], [x2, y2]].map(&map);
@@ -22,7 +22,7 @@ fn mapped(scene: &Scene, map: impl Fn([f64; 2]) -> [f64; 2]) -> Scene {
     }
 }
 
-/// Without the size of the image, which would tell a scale.
+/// Removes the image's size, which would reveal a scale.
 fn sizeless(mut file: Value) -> Value {
     let of = |value: &mut Value| {
         for key in ["width", "height", "imageWidth", "imageHeight"] {
@@ -34,12 +34,12 @@ fn sizeless(mut file: Value) -> Value {
     file
 }
 
-/// LabelMe or COCO of the scene with the image's size as it is.
+/// LabelMe or COCO of the scene, with the correct image size.
 fn json_of(dice: &mut Pcg64Mcg, scene: &Scene, photo: &str) -> Value {
     if dice.random_bool(0.5) { labelme(dice, scene, photo) } else { coco(dice, scene, photo).0 }
 }
 
-/// A COCO file of the one annotation and image.
+/// A COCO file with one annotation and one image.
 fn plain_coco(dice: &mut Pcg64Mcg, scene: &Scene, photo: &str) -> Value {
     loop {
         let (file, _) = coco(dice, scene, photo);
@@ -68,7 +68,7 @@ fn in_other_units(dice: &mut Pcg64Mcg, scene: &Scene, photo: &str) -> (Marks, Wo
         4 => [100.0 * x / width, 100.0 * y / height],
         _ => [x, y],
     };
-    // Of a photo that is turned, the marks may fit its stored pixels better than either.
+    // For a rotated photo, the marks may fit its stored pixels better than either.
     let (recipe, words): (&str, Words) = match kind {
         0 => ("shares", &["shares"]),
         1 => ("half scale, size unknown", &["half scale", "Exif"]),
@@ -166,7 +166,7 @@ fn contradictory(dice: &mut Pcg64Mcg, scene: &Scene, photo: &str) -> (Marks, Wor
             ("images of other names", &["images: one.png"])
         }
         _ => {
-            // The photo that stands beside it shows the part there.
+            // The photo beside it shows the part there.
             file = sizeless(coco(dice, super::other_scene(), super::OTHER_PHOTO).0);
             file["images"] = json!([{"id": file["images"][0]["id"], "file_name": super::OTHER_PHOTO}]);
             file["annotations"].as_array_mut().unwrap().retain(|one| one.get("area").is_some());

@@ -1,8 +1,8 @@
-//! A folder of labelled pictures: which label file belongs to which picture, and what each holds.
+//! A folder of labelled pictures: the assignment of label files to pictures, and their contents.
 //!
-//! LabelMe keeps a JSON file of the same name beside each picture, COCO one file for the folder; `sdg annotate` writes COCO
-//! beside the picture. A label file of a picture's name belongs to that picture, whatever name it gives (people rename
-//! files); any other one belongs to the pictures that it names.
+//! LabelMe has a JSON file of the same name beside each picture, COCO one file for the folder; `sdg annotate` writes
+//! COCO beside the picture. A label file with a picture's name belongs to that picture, whatever name it contains
+//! (files get renamed); any other one belongs to the pictures that it names.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -21,29 +21,30 @@ use super::taught::taught_grasps;
 use super::truth_file::{TRUTH_FILE, read_truth};
 use crate::error::EvaluationError;
 
-/// A mark this close to the place that the demonstration was cut from, in lengths of the mark, is the demonstration's own.
+/// Maximum distance, in lengths of the mark, between a mark and the place of the demonstration's cut-out for which both
+/// are the same.
 const MAX_TAUGHT_DISTANCE_LENGTHS: f64 = 0.1;
 
-/// The pictures to test a model on.
+/// The pictures for testing a model.
 #[derive(Debug, Clone)]
 pub struct LabelledFolder {
     pub pictures: Vec<LabelledPicture>,
-    /// What else is there.
+    /// Other files of the folder.
     pub left_out: Vec<LeftOut>,
-    /// Instances of other labels, which are not of the part.
+    /// Number of instances with other labels, which are not the part.
     pub others: usize,
 }
 
 impl LabelledFolder {
-    /// Reads every label and checks it against its picture, before any minute is spent on detection.
+    /// Reads every label and checks it against its picture, before any time is spent on detection.
     ///
-    /// Where the labels are of several names, those of `label` count; without it, those of the model's object. Where there is a
-    /// `truth.json`, no other label is read.
+    /// If there are labels of several names, those of `label` count; without it, those of the model's object. If there
+    /// is a `truth.json`, no other label is read.
     ///
     /// # Errors
-    /// A folder without pictures or without labels, a damaged label file, one that names a picture that is not there,
-    /// marks of a picture of another size or outside the picture, two files that label one picture, an instance
-    /// without a grasp that is not optional, and several labels out of which none is chosen.
+    /// A folder without pictures or labels, a damaged label file, a label file that names a missing picture, marks
+    /// outside the picture or for another picture size, two files that label one picture, an instance without a grasp
+    /// that is not optional, or several labels none of which is selected.
     pub fn read(folder: &Path, detector: &Perception, label: Option<&str>) -> Result<Self> {
         let mut left_out = Vec::new();
         let mut others = 0;
@@ -86,7 +87,7 @@ fn read_labels(folder: &Path, detector: &Perception, left_out: &mut Vec<LeftOut>
     read.collect()
 }
 
-/// Which label file, by its place in the list, labels which picture.
+/// The index of the label file of each picture.
 struct Assigned {
     pictures: BTreeMap<PathBuf, usize>,
     label_files: Vec<(PathBuf, LabelFile)>,
@@ -100,7 +101,7 @@ fn assign(folder: &Path, left_out: &mut Vec<LeftOut>) -> Result<Assigned> {
         let known = IMAGE_EXTENSIONS.join(", ");
         bail!("{}: expected pictures ({known}), found none among {} files", folder.display(), paths.len());
     }
-    // A phone's photos that are not read are listed here, not missed in the result.
+    // Photos from a phone in an unsupported format are listed here, so that the user does not miss them in the result.
     for path in paths.iter().filter(|path| sdg_files::has_extension(path, &UNREADABLE_EXTENSIONS)) {
         let why = sdg_inputs::read_image(path).err().map(|error| one_line(&error)).unwrap_or_default();
         left_out.push(LeftOut { file: file_name(path), why });
@@ -111,7 +112,7 @@ fn assign(folder: &Path, left_out: &mut Vec<LeftOut>) -> Result<Assigned> {
             pictures.iter().copied().filter(|picture| picture.file_stem() == path.file_stem()).collect();
         let bytes = sdg_files::read(path, sdg_inputs::MAX_ANNOTATION_BYTES)?;
         let file = match LabelFile::parse(&bytes) {
-            // Other programs keep JSON beside pictures, too.
+            // Other programs store JSON beside pictures too.
             Err(Error::WrongFile { .. }) if same_name.is_empty() => {
                 let why = "neither LabelMe nor COCO JSON, and no picture has its name".to_owned();
                 left_out.push(LeftOut { file: file_name(path), why });
@@ -147,7 +148,7 @@ fn assign(folder: &Path, left_out: &mut Vec<LeftOut>) -> Result<Assigned> {
     Ok(assigned)
 }
 
-/// The pictures that a label file is about.
+/// The pictures that a label file refers to.
 fn labelled_by(path: &Path, file: &LabelFile, same_name: &[&PathBuf], folder: &Path) -> Result<Vec<PathBuf>> {
     let names = file.picture_names().with_context(|| path.display().to_string())?;
     let is_of_one_picture = file.format() == AnnotationFormat::LabelMe || names.len() == 1;
@@ -174,13 +175,13 @@ fn labelled_by(path: &Path, file: &LabelFile, same_name: &[&PathBuf], folder: &P
     names.iter().map(picture).collect()
 }
 
-/// A picture with every instance that is labelled on it, of whatever label.
+/// A picture with all labelled instances, of any label.
 struct ReadPicture {
     path: PathBuf,
     labels: PathBuf,
     size: [u32; 2],
     instances: Vec<LabelledInstance>,
-    /// Where the model's own demonstrations were cut from it.
+    /// Positions from which the model's own demonstrations were cut.
     taught: Vec<Point2<f64>>,
 }
 
@@ -202,7 +203,7 @@ fn read_picture(path: &Path, labels: &Path, file: &LabelFile, detector: &Percept
 }
 
 impl ReadPicture {
-    /// The picture with the instances that count, and what was taught from it.
+    /// The picture with the instances that count, and the positions of demonstrations.
     fn counted(self, label: Option<&str>) -> Result<(LabelledPicture, Vec<Point2<f64>>)> {
         let counted = self.instances.iter().filter(|instance| is_counted(instance, label));
         let instances = counted.map(|instance| {
@@ -221,7 +222,7 @@ impl ReadPicture {
     }
 }
 
-/// What the model was taught from is no test, so it is optional.
+/// Instances that the model was taught from are no test, so they are optional.
 fn mark_taught(instances: &mut [Instance], taught: &[Point2<f64>]) {
     for instance in instances {
         instance.optional |= instance.grasp.is_some_and(|grasp| {
@@ -235,7 +236,7 @@ fn is_counted(instance: &LabelledInstance, label: Option<&str>) -> bool {
     label.is_none_or(|label| instance.annotation.label == label)
 }
 
-/// The label that counts; `None` where all instances are of one label, whatever the model calls its object.
+/// The label that counts; `None` if all instances have the same label, whatever the name of the model's object.
 fn chosen_label(
     folder: &Path,
     pictures: &[ReadPicture],

@@ -1,4 +1,5 @@
-//! Labels that mark another grasp on the same part: every detection then lies the same way beside its label.
+//! Detects labels that mark another grasp on the same part: every detection then has the same pose relative to its
+//! label.
 //!
 //! ```text
 //! detections that hit nothing ─ the nearest label that was not found ─ offset in the label's frame, in diagonals, and turn
@@ -12,30 +13,30 @@ use serde::Serialize;
 use super::score::{MAX_ANGLE_DEG, MAX_DISTANCE_DIAGONALS, Tested, Totals, TrueGrasp, judge};
 use crate::statistics::Share;
 
-/// A label farther from a detection than this is of another part, in diagonals.
+/// Maximum distance, in diagonals, between a label and a detection of the same part.
 const MAX_OFFSET_DIAGONALS: f64 = 0.75;
-/// Fewer detections that agree say nothing.
+/// Minimum number of agreeing detections.
 const MIN_AGREEING: usize = 3;
-/// At least this share of those that hit nothing agree.
+/// Minimum share of agreeing detections among those that hit nothing.
 const MIN_AGREEING_SHARE: f64 = 0.6;
 
-/// How detections lie beside their labels.
+/// The common pose of detections relative to their labels.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LabelOffset {
-    /// The detections that lie so, of those that hit nothing and lie near a label that was not found.
+    /// Detections with this offset, among those that hit nothing near a label that was not found.
     pub agreeing: Share,
-    /// The mean offset along and across the label's direction, in percent of the part's diagonal.
+    /// Mean offset along and across the label's direction, in percent of the part's diagonal.
     pub along_percent: f64,
     pub across_percent: f64,
-    /// The mean length in pixels.
+    /// Length of the mean offset in pixels.
     pub px: f64,
-    /// From the label's direction to the detection's, in (-180, 180].
+    /// Turn from the label's direction to the detection's, in (-180, 180].
     pub turn_deg: f64,
-    /// The counts with labels that are moved so.
+    /// The counts with labels shifted by this offset.
     pub totals: Totals,
 }
 
-/// A detection beside a label.
+/// A detection relative to a label.
 #[derive(Debug, Clone, Copy)]
 struct Beside {
     /// In the label's frame, in diagonals.
@@ -46,7 +47,7 @@ struct Beside {
 }
 
 impl Beside {
-    /// The same seen from the label turned by a turn that looks alike: from that which is nearest to `other`.
+    /// The same relative to an equivalent turn of the label: the one for which the offset is nearest to `other`.
     fn turned_to(&self, other: &Self) -> Self {
         let count = match self.symmetry {
             RotationalSymmetry::Fold(count) => count,
@@ -68,7 +69,7 @@ impl Beside {
     }
 }
 
-/// The offset between labels and detections, where most of those that hit nothing have the same.
+/// The offset between labels and detections, if most detections that hit nothing have the same one.
 pub fn label_offset(tested: &[Tested], min_score: f64) -> Option<LabelOffset> {
     let beside: Vec<Beside> = tested.iter().flat_map(|tested| beside_labels(tested, min_score)).collect();
     let agreeing = |seed: &Beside| {
@@ -96,7 +97,7 @@ pub fn label_offset(tested: &[Tested], min_score: f64) -> Option<LabelOffset> {
     })
 }
 
-/// Each detection that hits nothing beside the nearest label that was not found, one to one from the best score on.
+/// Each detection that hits nothing, relative to the nearest label that was not found; one to one, best score first.
 fn beside_labels(tested: &Tested, min_score: f64) -> Vec<Beside> {
     let judged = judge(tested, min_score);
     let mut free: Vec<&TrueGrasp> = tested
@@ -134,7 +135,7 @@ fn moved(tested: &Tested, offset: Vector2<f64>, turn: Angle) -> Tested {
 }
 
 impl LabelOffset {
-    /// In words, for people.
+    /// A sentence for the user.
     pub fn in_words(&self) -> String {
         let Self { agreeing, along_percent, across_percent, px, turn_deg, totals } = self;
         format!(
@@ -156,7 +157,8 @@ mod tests {
     use super::super::score::Truth;
     use super::*;
 
-    /// A part of 100 pixels diagonal at a turn, labelled in its middle, with a detection beside it in the label's frame.
+    /// A part with a diagonal of 100 pixels, labelled in its middle at an angle, with a detection at an offset in the
+    /// label's frame.
     fn tested(symmetry: RotationalSymmetry, degrees: f64, along: f64, across: f64, turn: f64) -> Tested {
         let (angle, center) = (Angle::from_degrees(degrees), Point2::new(300.0, 200.0));
         let grasp = TrueGrasp { center, angle, diagonal_px: 100.0, symmetry, pixel_m: None };

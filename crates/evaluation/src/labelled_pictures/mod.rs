@@ -7,9 +7,9 @@
 //!                                                                        └──────────── page, JSON ─────┘
 //! ```
 //!
-//! A **part** is an instance that must be found; an **optional** instance (mostly covered, or seen from another side) is
-//! neither missed nor, when hit, wrong. A **hit** lies within 4 % of the instance's diagonal and 10° of its marks, one
-//! detection to one instance. A picture that the model was taught from is no test and is left out.
+//! A **part** is an instance that must be found; an **optional** instance (mostly covered, or seen from another side)
+//! counts neither as missed nor, when hit, as wrong. A **hit** is a detection within 4 % of the instance's diagonal and
+//! 10° of its marks, one detection per instance. Pictures that the model was taught from are left out.
 
 mod folder;
 mod label_offset;

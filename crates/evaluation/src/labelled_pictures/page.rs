@@ -1,4 +1,4 @@
-//! The evaluation as a page to look through: totals, the choice of the least score, and every picture with its marks and
+//! The page of the evaluation: totals, the choice of the minimum score, and every picture with its marks and
 //! detections, worst first.
 
 use anyhow::Result;
@@ -18,15 +18,15 @@ use crate::footer::FOOTER;
 use crate::machine::machine;
 use crate::statistics::{Share, wilson_interval};
 
-/// Pictures drawn on the page at most; of more, the worst.
+/// Maximum number of pictures drawn on the page; of more, the worst.
 const MAX_DRAWN: usize = 200;
-/// Height of a tag's capitals, in widths of a line: small, since there may be many on a picture.
+/// Height of a tag's capitals, in line widths: small, since a picture may have many tags.
 const TAG_WIDTHS: f64 = 3.4;
 
 /// The page. Pictures are read again from their files.
 ///
 /// # Errors
-/// A picture that has gone since it was tested.
+/// A picture no longer exists.
 pub fn page(evaluated: &Evaluated, command: &str) -> Result<Report> {
     let judged = evaluated.judged();
     let totals = Totals::of(&judged);
@@ -81,7 +81,7 @@ pub fn page(evaluated: &Evaluated, command: &str) -> Result<Report> {
     Ok(report.section(this_run(evaluated, command)).footer(FOOTER))
 }
 
-/// Errors of any kind, then those that would grasp wrongly: the worst picture has most.
+/// The number of errors of any kind, and of those that would cause a wrong grasp: the worst picture has most.
 fn num_errors(judged: &Judged) -> (usize, usize) {
     let all = judged.wrong() + judged.missed() + if judged.is_false_alarm() { judged.hits.len() } else { 0 };
     (all, judged.wrong())
@@ -224,14 +224,14 @@ fn outcome(judged: &Judged) -> Cell {
     Cell::Verdict { tone, text: text.to_owned(), note: None }
 }
 
-/// A picture with marks and detections, and what came of it in words.
+/// A picture with marks and detections, and its result in words.
 fn figure(tested: &Tested, judged: &Judged) -> Result<Figure> {
     let mut image = sdg_inputs::read_image(&tested.picture.path)?;
     draw(&mut image, tested, judged);
     Ok(Figure::photo(image).caption(format!("{}: {}", tested.picture.name(), in_words(tested, judged))))
 }
 
-/// What came of a picture.
+/// The result of a picture in words.
 pub fn in_words(tested: &Tested, judged: &Judged) -> String {
     if !judged.has_part() {
         let best = tested.detections.first().map_or(0.0, |best| best.score);
@@ -255,9 +255,9 @@ pub fn in_words(tested: &Tested, judged: &Judged) -> String {
     words
 }
 
-/// Marks below, detections above them.
+/// Draws the marks, and the detections on top.
 fn draw(image: &mut RgbImage, tested: &Tested, judged: &Judged) {
-    // Three pixels at 640: marks can still be told when two pictures share a row of the page.
+    // Three pixels at a width of 640: marks are distinguishable when two pictures share a row of the page.
     let width = (f64::from(image.width().max(image.height())) / 213.0).clamp(1.0, 8.0);
     for (instance_idx, instance) in tested.picture.instances.iter().enumerate() {
         let missed = !judged.is_found(instance_idx) && !instance.optional;
@@ -306,5 +306,5 @@ fn this_run(evaluated: &Evaluated, command: &str) -> Section {
     if evaluated.tested.len() > MAX_DRAWN {
         facts.push(("drawn", format!("the worst {MAX_DRAWN} of {} pictures", evaluated.tested.len())));
     }
-    Section::new("This run").lead("Everything needed to see the same numbers again.").facts(facts).command(command)
+    Section::new("This run").lead("Settings for reproducing the numbers.").facts(facts).command(command)
 }

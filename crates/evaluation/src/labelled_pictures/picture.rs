@@ -1,48 +1,49 @@
-//! A labelled picture: its file, and the instances of the part on it.
+//! A labelled picture: its file, and the part's instances in it.
 
 use std::path::{Path, PathBuf};
 
 use sdg_geometry::{BoundingBox, GraspLine, RotationalSymmetry};
 use serde::Serialize;
 
-/// An instance of the part on a picture.
+/// An instance of the part in a picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Instance {
     /// The box around it.
     pub bbox: BoundingBox,
     /// The marked grasp; an optional instance may lack it.
     pub grasp: Option<GraspLine>,
-    /// Neither missed nor wrong: flagged so, what the model was taught from, or not wholly in the region that it searches.
+    /// Counts neither as missed nor as wrong: flagged as optional, used for teaching, or not completely in the searched
+    /// region.
     pub optional: bool,
-    /// Where the labels say it.
+    /// Size and symmetry, if the labels state them.
     pub extent: Option<Extent>,
 }
 
-/// What a hit is measured by.
+/// The scale for measuring a hit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Extent {
-    /// The demonstration's box diagonal at the instance's size.
+    /// The diagonal of the demonstration's box, scaled to the instance's size.
     pub diagonal_px: f64,
-    /// The turns that look alike.
+    /// The equivalent turns.
     pub symmetry: RotationalSymmetry,
 }
 
-/// A picture and what is labelled on it.
+/// A picture and its labels.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LabelledPicture {
     pub path: PathBuf,
-    /// The file that labels it.
+    /// Its label file.
     pub labels: PathBuf,
     /// Width and height in pixels.
     pub size: [u32; 2],
-    /// The part's instances; none where it is not on the picture.
+    /// The part's instances; empty if the part is not in the picture.
     pub instances: Vec<Instance>,
-    /// The kind of picture, where the labels name it.
+    /// The kind of picture, if the labels name it.
     pub kind: Option<String>,
 }
 
 impl LabelledPicture {
-    /// Makes optional what does not lie wholly in the part of the picture that is searched.
+    /// Makes instances optional that are not completely in the searched region.
     pub fn mark_outside(&mut self, searched: &BoundingBox) {
         for instance in &mut self.instances {
             let BoundingBox { x1, y1, x2, y2 } = instance.bbox;
@@ -57,11 +58,11 @@ impl LabelledPicture {
     }
 }
 
-/// A file of the folder that does not count, and the reason.
+/// A file of the folder that is not counted, and the reason.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LeftOut {
     pub file: String,
-    /// Why it was left out, for people.
+    /// Why it was left out, for display.
     pub why: String,
 }
 

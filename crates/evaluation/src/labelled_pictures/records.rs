@@ -1,4 +1,4 @@
-//! The evaluation as other programs read it: the one object of `sdg evaluate --pictures --json`.
+//! The JSON object of `sdg evaluate --pictures --json`.
 
 use std::path::Path;
 
@@ -15,26 +15,26 @@ pub struct Evaluated<'a> {
     pub folder: &'a Path,
     pub model_file: &'a Path,
     pub model: &'a GraspModel,
-    /// Whether detections were laid over the demonstration.
+    /// Whether detections were checked against the demonstration.
     pub verification: Verification,
-    /// The least score that counts.
+    /// Minimum score of accepted detections.
     pub min_score: f64,
-    /// The pictures and what was found on them.
+    /// The pictures and their detections.
     pub tested: Vec<Tested>,
-    /// Files of the folder that do not count.
+    /// Files of the folder that are not counted.
     pub left_out: Vec<LeftOut>,
-    /// Instances of other labels, which are not of the part.
+    /// Number of instances with other labels, which are not the part.
     pub others: usize,
 }
 
 impl Evaluated<'_> {
-    /// Every picture judged with the least score that counts.
+    /// Judges every picture with the minimum score.
     pub fn judged(&self) -> Vec<Judged> {
         self.tested.iter().map(|tested| judge(tested, self.min_score)).collect()
     }
 }
 
-/// Everything as one object; pixels, percent of the diagonal, degrees.
+/// All results as one object; pixels, percent of the diagonal, degrees.
 pub fn to_json(evaluated: &Evaluated, report: &Path) -> Value {
     let judged = evaluated.judged();
     let totals = Totals::of(&judged);
@@ -74,7 +74,7 @@ pub fn to_json(evaluated: &Evaluated, report: &Path) -> Value {
     })
 }
 
-/// The counts with other minimum scores.
+/// The counts for other minimum scores.
 pub fn by_min_score(tested: &[&Tested]) -> Vec<Value> {
     let at = |(min_score, totals): (f64, Totals)| {
         json!({
@@ -88,7 +88,7 @@ pub fn by_min_score(tested: &[&Tested]) -> Vec<Value> {
     sweep(tested).into_iter().map(at).collect()
 }
 
-/// The counts of each kind of picture that the labels name.
+/// The counts of each kind of picture named in the labels.
 pub fn by_kind_json(tested: &[&Tested], min_score: f64) -> Vec<Value> {
     let of_kind = |(kind, totals): (&str, Totals)| {
         json!({

@@ -1,6 +1,6 @@
-//! Detections against labels: which is a hit, what was missed, what is wrong.
+//! Compares detections with labels: hits, missed parts, wrong detections.
 //!
-//! Distances are pixels of the picture, angles degrees; a detection's place is the middle of its grasp.
+//! Distances are in pixels of the picture, angles in degrees; the position of a detection is the middle of its grasp.
 
 use std::time::Instant;
 
@@ -15,16 +15,16 @@ use serde::Serialize;
 use super::picture::{Instance, LabelledPicture};
 use crate::statistics::Share;
 
-/// A hit lies at most so far from the instance's marks, in diagonals of the instance.
+/// Maximum distance of a hit from the instance's marks, in diagonals of the instance.
 pub(super) const MAX_DISTANCE_DIAGONALS: f64 = 0.04;
-/// A hit is turned against the instance's marks by at most so much.
+/// Maximum angle between a hit and the instance's marks.
 pub(super) const MAX_ANGLE_DEG: f64 = 10.0;
-/// A detection is on an optional instance without a grasp when their boxes overlap so much.
+/// Minimum overlap (IoU) of a detection with an optional instance that has no grasp.
 const SAME_PART_IOU: f64 = 0.5;
-/// Steps of the least score at which everything is counted again.
+/// Number of steps of the minimum score for which everything is counted again.
 const NUM_SWEEP_STEPS: u32 = 50;
 
-/// Where an instance is, and how close is close enough.
+/// The position of an instance, and the scale of tolerances.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Truth {
     /// The grasp; only an optional instance may lack it.
@@ -34,24 +34,24 @@ pub struct Truth {
     pub optional: bool,
 }
 
-/// Where an instance is grasped.
+/// The true grasp of an instance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrueGrasp {
     /// The middle of the marks.
     pub center: Point2<f64>,
     /// The direction of the marks.
     pub angle: Angle,
-    /// The demonstration's box diagonal at this instance's size.
+    /// The diagonal of the demonstration's box, scaled to this instance's size.
     pub diagonal_px: f64,
-    /// The turns that look alike.
+    /// The equivalent turns.
     pub symmetry: RotationalSymmetry,
-    /// What a pixel covers there in the plane of the marks, in metres, where the camera is known.
+    /// Size of a pixel there in the plane of the marks, in metres, if the camera is known.
     pub pixel_m: Option<f64>,
 }
 
 impl Truth {
-    /// An instance. Unless its labels say them, its size is read off the length of its marks, the mean over several demonstrations,
-    /// and its symmetry is the model's.
+    /// An instance. Unless its labels state them, its size follows from the length of its marks (the mean over several
+    /// demonstrations), and its symmetry is the model's.
     pub fn new(instance: &Instance, detector: &Perception) -> Self {
         let demonstrations = detector.model().demonstrations();
         let diagonal_per_length = |demonstration: &TaughtDemonstration| {
@@ -72,7 +72,7 @@ impl Truth {
 }
 
 impl TrueGrasp {
-    /// How far off a detected grasp is.
+    /// The error of a detected grasp.
     pub fn error_of(&self, grasp: &PlanarGrasp) -> HitError {
         let px = (grasp.center() - self.center).norm();
         HitError {
@@ -84,16 +84,16 @@ impl TrueGrasp {
     }
 }
 
-/// A picture and what the model found on it, best score first.
+/// A picture and the model's detections in it, best score first.
 #[derive(Debug, Clone)]
 pub struct Tested {
     /// The picture and its labels.
     pub picture: LabelledPicture,
-    /// Where each of its instances is.
+    /// The position of each of its instances.
     pub truths: Vec<Truth>,
-    /// Everything that was detected, whatever its score.
+    /// All detections, whatever their score.
     pub detections: Vec<GraspDetection>,
-    /// How long detection took.
+    /// Duration of the detection.
     pub seconds: f64,
 }
 
@@ -101,7 +101,7 @@ impl Tested {
     /// Reads a picture and runs the model on it.
     ///
     /// # Errors
-    /// A picture that cannot be read or detected in.
+    /// The picture cannot be read, or detection fails.
     pub fn detect(mut picture: LabelledPicture, detector: &Perception, verification: Verification) -> Result<Self> {
         if detector.pixel_frame() == PixelFrame::Sensor {
             sdg_inputs::check_is_not_turned(&picture.path)?;
@@ -119,41 +119,41 @@ impl Tested {
     }
 }
 
-/// A detection on an instance.
+/// A detection that hits an instance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hit {
     pub instance_idx: usize,
-    /// How far off it is; `None` on an optional instance without a grasp.
+    /// Its error; `None` for an optional instance without a grasp.
     pub error: Option<HitError>,
 }
 
-/// How far a detection is off the marks.
+/// The error of a detection against the marks.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct HitError {
     /// Between the middles of both grasps, in pixels.
     pub px: f64,
-    /// The same in millimetres of the plane of the marks, where the camera is known.
+    /// The same in millimetres in the plane of the marks, if the camera is known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mm: Option<f64>,
     /// The same in percent of the instance's diagonal.
     pub percent: f64,
-    /// The turn between both, in degrees, 180 at most.
+    /// The angle between both, in degrees, at most 180.
     pub deg: f64,
 }
 
 impl HitError {
-    /// Whether the place is right.
+    /// Whether the position is right.
     pub fn is_in_place(&self) -> bool {
         self.percent <= 100.0 * MAX_DISTANCE_DIAGONALS
     }
 
-    /// Whether place and turn are right.
+    /// Whether position and angle are right.
     pub fn is_hit(&self) -> bool {
         self.is_in_place() && self.deg <= MAX_ANGLE_DEG
     }
 }
 
-/// What a picture comes to.
+/// The result of a picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
@@ -161,7 +161,7 @@ pub enum Outcome {
     Right,
     /// Parts were missed; nothing is wrong.
     Missed,
-    /// A detection on a picture with the part is no hit.
+    /// A detection in a picture with the part is not a hit.
     Wrong,
     /// The part is not there, and nothing was detected.
     Quiet,
@@ -169,33 +169,33 @@ pub enum Outcome {
     FalseAlarm,
 }
 
-/// The detections that count, each a hit or not.
+/// The detections that count, each with its hit or none.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Judged {
-    /// For each of the best detections of [`Tested::detections`], down to the least score, what it hits.
+    /// For each detection of [`Tested::detections`] above the minimum score, its hit.
     pub hits: Vec<Option<Hit>>,
-    /// Which instances were found.
+    /// Whether each instance was found.
     found: Vec<bool>,
     optional: Vec<bool>,
 }
 
 impl Judged {
-    /// Whether the part is on the picture.
+    /// Whether the part is in the picture.
     pub fn has_part(&self) -> bool {
         !self.optional.is_empty()
     }
 
-    /// How many of the instances that must be found were found.
+    /// Found and all instances that must be found.
     pub fn parts(&self) -> Share {
         Share::of(self.found.iter().zip(&self.optional).filter(|(_, optional)| !**optional), |(found, _)| **found)
     }
 
-    /// How many of the optional instances were found.
+    /// Found and all optional instances.
     pub fn optional(&self) -> Share {
         Share::of(self.found.iter().zip(&self.optional).filter(|(_, optional)| **optional), |(found, _)| **found)
     }
 
-    /// How many parts were not found.
+    /// Number of parts that were not found.
     pub fn missed(&self) -> usize {
         let parts = self.parts();
         parts.of - parts.count
@@ -206,22 +206,22 @@ impl Judged {
         self.found[instance_idx]
     }
 
-    /// Detections on a picture with the part that hit nothing.
+    /// Number of detections without a hit in a picture with the part.
     pub fn wrong(&self) -> usize {
         if self.has_part() { self.hits.iter().filter(|hit| hit.is_none()).count() } else { 0 }
     }
 
-    /// Something right and nothing wrong, on a picture with the part.
+    /// Whether a picture with the part has a hit and nothing wrong.
     pub fn is_clean(&self) -> bool {
         self.found.contains(&true) && self.wrong() == 0
     }
 
-    /// Something detected where the part is not.
+    /// Whether a picture without the part has a detection.
     pub fn is_false_alarm(&self) -> bool {
         !self.has_part() && !self.hits.is_empty()
     }
 
-    /// The picture in a word.
+    /// The result of the picture.
     pub fn outcome(&self) -> Outcome {
         match (self.has_part(), self.hits.is_empty()) {
             (false, true) => Outcome::Quiet,
@@ -232,15 +232,16 @@ impl Judged {
         }
     }
 
-    /// How far off the parts are that must be found and were; optional instances do not count.
+    /// Errors of the parts that must be found and were; optional instances do not count.
     pub fn errors(&self) -> impl Iterator<Item = &HitError> {
         let on_parts = self.hits.iter().flatten().filter(|hit| !self.optional[hit.instance_idx]);
         on_parts.filter_map(|hit| hit.error.as_ref())
     }
 }
 
-/// Judges the detections that score at least `min_score`: from the best on, each takes the nearest instance that is still
-/// free and that it hits. A detection takes no instance from a better one, so a higher `min_score` only shortens the list.
+/// Judges the detections with a score of at least `min_score`: in order of decreasing score, each takes the nearest
+/// free instance that it hits. No detection takes an instance from a better one, so a higher `min_score` only shortens
+/// the list.
 pub fn judge(tested: &Tested, min_score: f64) -> Judged {
     let mut found = vec![false; tested.truths.len()];
     let counted = tested.detections.iter().filter(|detection| detection.score >= min_score);
@@ -263,7 +264,7 @@ fn nearest(truths: &[Truth], taken: &[bool], grasp: &PlanarGrasp) -> Option<Hit>
         .map(|(instance_idx, error)| Hit { instance_idx, error: Some(error) })
 }
 
-/// The free instance without a grasp whose box is the detection's.
+/// The free instance without a grasp that has the detection's box.
 fn without_grasp(truths: &[Truth], taken: &[bool], bbox: &BoundingBox) -> Option<Hit> {
     let is_same = |(instance_idx, truth): &(usize, &Truth)| {
         truth.grasp.is_none() && !taken[*instance_idx] && truth.bbox.iou(bbox) >= SAME_PART_IOU
@@ -272,24 +273,24 @@ fn without_grasp(truths: &[Truth], taken: &[bool], bbox: &BoundingBox) -> Option
     Some(Hit { instance_idx, error: None })
 }
 
-/// All pictures together.
+/// Totals of all pictures.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Totals {
-    /// Parts found, of those that must be.
+    /// Parts found, of those that must be found.
     pub found: Share,
     pub missed: usize,
-    /// Detections on pictures with the part that hit nothing.
+    /// Number of detections without a hit in pictures with the part.
     pub wrong: usize,
     pub optional: Share,
-    /// Pictures with the part on which something is right and nothing is wrong.
+    /// Pictures with the part that have a hit and nothing wrong.
     pub clean: Share,
-    /// Pictures without the part on which something was detected.
+    /// Pictures without the part that have a detection.
     pub false_alarms: Share,
-    /// How far off the found parts are; `None` where none was found.
+    /// Errors of the found parts; `None` if none was found.
     pub errors: Option<Errors>,
 }
 
-/// How far off found parts are: the median, and what 95 % do not exceed.
+/// Errors of found parts: the median and the 95th percentile.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[allow(missing_docs, reason = "the names say it")]
 pub struct Errors {
@@ -306,7 +307,7 @@ pub struct Errors {
 }
 
 impl Totals {
-    /// Adds up.
+    /// Sums the results.
     pub fn of<'a>(judged: impl IntoIterator<Item = &'a Judged>) -> Self {
         let judged: Vec<&Judged> = judged.into_iter().collect();
         let (with_part, without_part): (Vec<&Judged>, Vec<&Judged>) =
@@ -341,7 +342,7 @@ impl Errors {
     }
 }
 
-/// The pictures of each kind that the labels name, in the order in which the kinds appear.
+/// The totals for each kind of picture named in the labels, in order of first appearance.
 pub fn by_kind<'a>(tested: &[&'a Tested], min_score: f64) -> Vec<(&'a str, Totals)> {
     let mut kinds: Vec<(&str, Vec<Judged>)> = Vec::new();
     for tested in tested {
@@ -355,7 +356,7 @@ pub fn by_kind<'a>(tested: &[&'a Tested], min_score: f64) -> Vec<(&'a str, Total
     kinds.into_iter().map(|(kind, judged)| (kind, Totals::of(&judged))).collect()
 }
 
-/// Everything counted again with other least scores, from 0 to 1.
+/// The totals for minimum scores from 0 to 1.
 pub fn sweep(tested: &[&Tested]) -> Vec<(f64, Totals)> {
     (0..=NUM_SWEEP_STEPS)
         .map(|step| {
@@ -371,7 +372,7 @@ mod tests {
     use super::*;
     use sdg_grasp::TurnSource;
 
-    /// An instance of 100 pixels diagonal: hits lie within 4 pixels.
+    /// An instance with a diagonal of 100 pixels: hits are within 4 pixels.
     fn truth(x: f64, degrees: f64, optional: bool) -> Truth {
         let grasp = TrueGrasp {
             center: Point2::new(x, 50.0),
@@ -415,7 +416,7 @@ mod tests {
 
     #[test]
     fn a_hit_lies_within_four_percent_and_ten_degrees() {
-        // On the limit is within it; 3.9 and 9.9 leave the last bit out of the question.
+        // The limit is inclusive; 3.9 and 9.9 avoid rounding of the last bit.
         for (dx, turn, is_hit) in
             [(3.9, 9.9, true), (4.1, 0.0, false), (0.0, 10.1, false), (-3.9, -9.9, true), (0.0, 180.0, false)]
         {
@@ -444,7 +445,8 @@ mod tests {
 
     #[test]
     fn one_detection_to_one_instance_from_the_best_score_on() {
-        // Both detections hit both instances. The better one takes the nearer, the other what is left.
+        // Both detections hit both instances. The better one takes the nearer instance, the other takes the remaining
+        // one.
         let found = judged(
             vec![truth(100.0, 0.0, false), truth(103.0, 0.0, false)],
             vec![detection(102.0, 0.0, 0.9), detection(102.5, 0.0, 0.8), detection(102.0, 0.0, 0.7)],
@@ -462,7 +464,8 @@ mod tests {
         assert_eq!((missed.missed(), missed.wrong(), missed.outcome()), (0, 0, Outcome::Right));
         let hit = judged(truths(), vec![detection(200.0, 0.0, 0.9)]);
         assert_eq!((hit.missed(), hit.wrong(), hit.optional()), (1, 0, Share { count: 1, of: 1 }));
-        // Something is right and nothing is wrong, though the part was missed; its error is not counted.
+        // There is a hit and nothing wrong, although the part was missed; the error of the optional instance is not
+        // counted.
         assert!(hit.is_clean() && hit.errors().next().is_none());
         assert_eq!(hit.outcome(), Outcome::Missed);
     }
@@ -470,7 +473,7 @@ mod tests {
     #[test]
     fn an_optional_instance_without_a_grasp_is_hit_by_its_box() {
         let box_alone = Truth { grasp: None, ..truth(200.0, 0.0, true) };
-        // Boxes of 10 pixels that are 3 apart overlap by 7 of 13, at 4 apart by 6 of 14.
+        // Boxes of 10 pixels overlap by 7 of 13 at a distance of 3, by 6 of 14 at a distance of 4.
         for (x, wrong) in [(203.0, 0), (204.0, 1)] {
             let found = judged(vec![truth(100.0, 0.0, false), box_alone], vec![detection(x, 90.0, 0.9)]);
             assert_eq!((found.wrong(), found.optional().count), (wrong, 1 - wrong), "{x}");
@@ -490,10 +493,10 @@ mod tests {
         let totals = at(0.5);
         assert_eq!((totals.found, totals.missed, totals.wrong), (Share { count: 2, of: 4 }, 2, 1));
         assert_eq!((totals.clean, totals.false_alarms), (Share { count: 1, of: 3 }, Share { count: 1, of: 2 }));
-        // Errors of 1 and 3 pixels, of 0 and 4 degrees: the median lies between.
+        // Errors of 1 and 3 pixels, of 0 and 4 degrees: the median is between.
         let errors = totals.errors.unwrap();
         assert!((errors.median_px - 2.0).abs() < 1e-9 && (errors.median_deg - 2.0).abs() < 1e-9, "{errors:?}");
-        // Without the weak detections: one wrong less, one part more is clean.
+        // Without the weak detections: one wrong detection less, and one more clean picture.
         let strict = at(0.65);
         assert_eq!((strict.wrong, strict.clean.count, strict.false_alarms.count), (0, 2, 1));
         let lax = at(0.0);

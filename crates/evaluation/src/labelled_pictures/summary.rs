@@ -1,4 +1,4 @@
-//! Labelled pictures in a few lines, for people.
+//! A summary of labelled pictures in a few lines.
 
 use sdg_grasp::Verification;
 
@@ -6,7 +6,7 @@ use super::label_offset::label_offset;
 use super::records::Evaluated;
 use super::score::{Totals, by_kind};
 
-/// What was found, missed and wrong, and the errors of what was found.
+/// Found, missed and wrong, and the errors of found parts.
 pub fn summary(evaluated: &Evaluated, totals: &Totals) -> String {
     let mut text = String::new();
     let mut line = |line: String| text += &(line + "\n");

@@ -1,10 +1,10 @@
-//! Where a picture shows what a model was taught from: pixel by pixel, or as a copy that was compressed again.
+//! Detects in a picture the demonstrations of a model: pixel by pixel, or as a recompressed copy.
 
 use image::RgbImage;
 use nalgebra::{Point2, Vector2};
 use sdg_grasp::TaughtDemonstration;
 
-/// The middles of the grasps of those demonstrations that were cut from this very picture, in its pixels.
+/// The middles of the grasps of those demonstrations that were cut from this picture, in its pixels.
 pub fn taught_grasps(picture: &RgbImage, demonstrations: &[TaughtDemonstration]) -> Vec<Point2<f64>> {
     let place = |demonstration: &TaughtDemonstration| {
         let exactly = find_exactly(picture, &demonstration.cutout);
@@ -14,7 +14,7 @@ pub fn taught_grasps(picture: &RgbImage, demonstrations: &[TaughtDemonstration])
     demonstrations.iter().filter_map(place).collect()
 }
 
-/// Left and top of the first place at which the picture holds the cut-out without any difference.
+/// Left and top of the first position at which the picture is identical to the cut-out.
 fn find_exactly(picture: &RgbImage, cutout: &RgbImage) -> Option<[u32; 2]> {
     const CHANNELS: usize = 3;
     let (width, height) = cutout.dimensions();
@@ -27,7 +27,7 @@ fn find_exactly(picture: &RgbImage, cutout: &RgbImage) -> Option<[u32; 2]> {
     };
     let same =
         |x: u32, y: u32, dy: u32| picture.as_raw()[row(picture, x, y + dy)] == cutout.as_raw()[row(cutout, 0, dy)];
-    // The part crosses the middle row, so that even on a plain ground few places pass it.
+    // The part crosses the middle row, so even on a plain background few positions pass this test.
     let middle = height / 2;
     for y in 0..=picture.height() - height {
         for x in 0..=picture.width() - width {
@@ -39,10 +39,10 @@ fn find_exactly(picture: &RgbImage, cutout: &RgbImage) -> Option<[u32; 2]> {
     None
 }
 
-/// A copy differs from the photo by at most this much in the mean, in 8-bit levels: JPEG of quality 50 leaves some 4.
+/// Maximum mean difference between a copy and the photo, in 8-bit levels: JPEG of quality 50 causes about 4.
 const MAX_COPY_DIFFERENCE: f64 = 5.0;
 
-/// Left and top of the cut-out in a copy of the whole photo, at the same size; `None` where the picture is another.
+/// Left and top of the cut-out in a copy of the whole photo, at the same size; `None` if it is another picture.
 fn find_copy(picture: &RgbImage, demonstration: &TaughtDemonstration) -> Option<[u32; 2]> {
     let middle = demonstration.marks.photo_middle?;
     let side = |size: u32, middle: f64| {
@@ -70,7 +70,7 @@ mod tests {
     use super::*;
     use image::{Rgb, imageops};
 
-    /// No two places look the same.
+    /// A picture without two equal places.
     fn picture() -> RgbImage {
         RgbImage::from_fn(60, 40, |x, y| Rgb([(x * 4) as u8, (y * 6) as u8, (x * y) as u8]))
     }

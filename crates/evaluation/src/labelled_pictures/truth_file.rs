@@ -1,6 +1,6 @@
-//! `truth.json`: every picture of a folder with the part's instances in it, each with its own size and symmetry.
+//! `truth.json`: all pictures of a folder with the part's instances, each with its own size and symmetry.
 //!
-//! A list with an entry for each picture; docs/file-formats.md has the fields. Other fields are ignored.
+//! A list with an entry for each picture; docs/file-formats.md describes the fields. Other fields are ignored.
 
 use std::path::Path;
 
@@ -17,16 +17,16 @@ use super::taught::taught_grasps;
 
 /// The file's name in a folder of pictures.
 pub const TRUTH_FILE: &str = "truth.json";
-/// What `kind` says of a picture with a look-alike of the part.
+/// Value of `kind` for a picture with a look-alike of the part.
 const LOOK_ALIKE: &str = "neg_look";
-/// What `what` says of a look-alike that is the part's mirror image.
+/// Value of `what` for a look-alike that is the part's mirror image.
 const MIRROR_IMAGE: &str = "mirror image";
 /// The kind of pictures with such a look-alike.
 const MIRRORED_LOOK_ALIKE: &str = "neg_mirror";
-/// Symmetries that are so many degrees off an integer number of turns are rounded.
+/// Maximum deviation, in degrees, of a symmetry from an integer number of turns; smaller deviations are rounded.
 const MAX_ROUNDING_DEG: f64 = 0.01;
 
-/// What the file says of one picture.
+/// The entry of one picture.
 #[derive(Debug)]
 pub struct TruthEntry {
     /// The picture's file name.
@@ -35,7 +35,7 @@ pub struct TruthEntry {
     pub kind: Option<String>,
 }
 
-/// An entry as it stands in the file.
+/// An entry as stored in the file.
 #[derive(Deserialize)]
 struct RawEntry {
     image: String,
@@ -56,10 +56,11 @@ struct RawInstance {
 }
 
 impl TruthEntry {
-    /// Reads a folder's file and checks it, but for the pictures' contents.
+    /// Reads and checks a folder's file, except for the pictures' contents.
     ///
     /// # Errors
-    /// A file that is no such list; an entry that lacks a field or has a wrong one; a picture that is not there or has two entries.
+    /// The file is not such a list, an entry lacks a field or has a wrong value, or a picture is missing or has two
+    /// entries.
     pub fn read_all(folder: &Path) -> Result<Vec<Self>> {
         let path = folder.join(TRUTH_FILE);
         let bytes = sdg_files::read(&path, sdg_inputs::MAX_ANNOTATION_BYTES)?;
@@ -113,10 +114,10 @@ impl RawInstance {
             bail!("expected symmetry_deg to be 360 over an integer of 1 to 360, found {}", self.symmetry_deg);
         }
         let symmetry = if turns == 1.0 { RotationalSymmetry::None } else { RotationalSymmetry::Fold(turns as u32) };
-        // Middle and direction are what counts; the points are rounded once more.
+        // Middle and direction count; the points have been rounded again.
         let (sin, cos) = Angle::from_degrees(self.angle_deg).radians().sin_cos();
         let (center, half) = (Point2::from(self.centre_px), half_length * Vector2::new(cos, sin));
-        // Nothing is said of the box, which is drawn only: a square of the same diagonal.
+        // The file has no box, which is only drawn: a square with the same diagonal is used.
         let side = self.diag_px * std::f64::consts::FRAC_1_SQRT_2;
         let [left, top] = self.centre_px.map(|middle| middle - 0.5 * side);
         Ok(Instance {
@@ -128,10 +129,10 @@ impl RawInstance {
     }
 }
 
-/// Reads what the file says of its pictures, each with the places that the model's own demonstrations were cut from.
+/// The pictures of the file, each with the positions from which the model's own demonstrations were cut.
 ///
 /// # Errors
-/// Those of [`TruthEntry::read_all`]; pictures that cannot be read.
+/// Those of [`TruthEntry::read_all`]; pictures cannot be read.
 pub(super) fn read_truth(
     folder: &Path,
     detector: &Perception,
@@ -164,7 +165,7 @@ mod tests {
     use super::*;
     use std::fs;
 
-    /// A picture with an instance of 100 pixels diagonal that looks the same after half a turn.
+    /// A picture with an instance of diagonal 100 pixels that looks the same after half a turn.
     fn entry() -> Value {
         let instance = serde_json::json!({"points_px": [[10, 20], [40, 60]], "centre_px": [25, 40], "angle_deg": 53.13,
             "diag_px": 100, "symmetry_deg": 180, "optional": false, "how": "by eye"});

@@ -1,4 +1,4 @@
-//! Each model on every part's photo: on its own it must find the part, on others nothing.
+//! Each model on every part's photo: on its own photo it must find the part, on others nothing.
 
 use anyhow::{Context, Result};
 use image::RgbImage;
@@ -11,24 +11,24 @@ use crate::labelled_pictures::DEFAULT_MIN_SCORE;
 /// The best score of each model on each photo.
 #[derive(Debug, Clone)]
 pub struct CrossCheck {
-    /// `scores[model][photo]`, in the order of the parts; zero where nothing was found.
+    /// `scores[model][photo]`, in the order of the parts; zero if nothing was found.
     pub scores: Vec<Vec<f64>>,
 }
 
 /// Two parts of which one's model accepts the other's photo.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LookAlikePair {
-    /// Places of the two parts.
+    /// Indices of the two parts.
     pub parts: [usize; 2],
-    /// The first's model on the second's photo, and the other way round.
+    /// Score of the first's model on the second's photo, and vice versa.
     pub scores: [f64; 2],
 }
 
 impl CrossCheck {
-    /// Runs every model on every photo; `done` is called as each model has ended.
+    /// Runs every model on every photo; `done` is called after each model.
     ///
     /// # Errors
-    /// Models that cannot be read, and errors of detection.
+    /// Models cannot be read, or detection fails.
     pub fn run(store: &PartStore, names: &[&str], photos: &[RgbImage], done: &(dyn Fn(&str) + Sync)) -> Result<Self> {
         let row = |name: &&str| -> Result<Vec<f64>> {
             let model = sdg_inputs::read_model(&store.model_file(name), &Device::flex())?;
@@ -48,7 +48,7 @@ impl CrossCheck {
         self.scores[part][part] >= DEFAULT_MIN_SCORE
     }
 
-    /// The pairs that would be confused, the surest first.
+    /// The pairs that would be confused, highest scores first.
     pub fn look_alikes(&self) -> Vec<LookAlikePair> {
         let num_parts = self.scores.len();
         let pairs = (0..num_parts).flat_map(|a| (a + 1..num_parts).map(move |b| [a, b]));

@@ -1,19 +1,19 @@
-//! What a person has to know of many parts: which look alike, and which need another photo.
+//! The results for many parts: look-alikes, and parts that need another photo.
 
 use serde_json::{Value, json};
 
 use super::cross_check::{CrossCheck, LookAlikePair};
 use super::part_store::PartOutcome;
 
-/// A model that finds less of its held-back samples needs another photo.
+/// Minimum share of found held-back samples; below it, a part needs another photo.
 const MIN_FOUND: f64 = 0.75;
 
-/// Of all parts that were asked for.
+/// The findings on all requested parts.
 #[derive(Debug)]
 pub struct Findings {
-    /// Every part and what became of it.
+    /// Every part and its outcome.
     pub parts: Vec<(String, PartOutcome)>,
-    /// Names of the parts that have a model: rows and columns of the check.
+    /// Names of the parts with a model: rows and columns of the cross-check.
     pub taught: Vec<String>,
     pub check: CrossCheck,
     pub look_alikes: Vec<LookAlikePair>,
@@ -54,7 +54,7 @@ impl Findings {
         pair.parts.map(|part| self.taught[part].as_str())
     }
 
-    /// The same for programs.
+    /// The findings as JSON.
     pub fn to_json(&self) -> Value {
         let listed = |pairs: &[(String, String)]| -> Vec<Value> {
             pairs.iter().map(|(name, why)| json!({ "name": name, "why": why })).collect()

@@ -1,4 +1,4 @@
-//! A folder of demonstrations: which parts it has.
+//! A folder of demonstrations and its parts.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -11,7 +11,7 @@ use sdg_inputs::annotation_files::beside_photo;
 use sdg_inputs::demonstrations;
 use sdg_weights_conversion::sha256_of;
 
-/// How often parts look the same in a whole turn, where it is not as `--symmetry` says: lines of a part's name and 1 to 360 or full.
+/// File with symmetries of parts that differ from `--symmetry`: lines with a part's name and 1 to 360 or full.
 const SYMMETRIES: &str = "symmetries.txt";
 const MAX_SYMMETRIES_BYTES: u64 = 1 << 20;
 
@@ -26,19 +26,20 @@ pub struct DemonstrationFolder {
 /// A part's photos with marks beside them.
 #[derive(Debug, Clone)]
 pub struct PartDemonstrations {
-    /// The photo's name without its ending, or that of the folder that holds several photos.
+    /// The photo's name without its extension, or the name of the folder with several photos.
     pub name: String,
     /// Photos and their marks.
     pub files: Vec<(PathBuf, PathBuf)>,
-    /// Where the folder says so.
+    /// The symmetry, if the folder states it.
     pub symmetry: Option<RotationalSymmetry>,
 }
 
 impl DemonstrationFolder {
-    /// Looks through a folder: each photo with marks beside it is a part, and each folder in it with such photos is one.
+    /// Reads a folder: each photo with marks beside it is a part, and each subfolder with such photos is one.
     ///
     /// # Errors
-    /// A folder that cannot be read or has no marked photo; two parts of one name; symmetries of parts that are not there.
+    /// The folder cannot be read or has no marked photo; two parts have the same name; a symmetry is given for an
+    /// unknown part.
     pub fn read(folder: &Path, symmetry: impl Fn(&str) -> Result<RotationalSymmetry, String>) -> Result<Self> {
         let mut found: BTreeMap<String, PartDemonstrations> = BTreeMap::new();
         let mut left_out = Vec::new();
@@ -110,10 +111,10 @@ impl DemonstrationFolder {
 }
 
 impl PartDemonstrations {
-    /// Reads them.
+    /// Reads the demonstrations.
     ///
     /// # Errors
-    /// Photos or marks that cannot be read.
+    /// Photos or marks cannot be read.
     pub fn read(&self) -> Result<Vec<Demonstration>> {
         self.files.iter().map(|(photo, marks)| demonstrations::read_pair(photo, marks)).collect()
     }
@@ -121,15 +122,15 @@ impl PartDemonstrations {
     /// The first of its photos.
     ///
     /// # Errors
-    /// A photo that cannot be read.
+    /// The photo cannot be read.
     pub fn first_photo(&self) -> Result<RgbImage> {
         sdg_inputs::read_image(&self.files[0].0)
     }
 
-    /// Tells the contents of its files from others.
+    /// A hash of its files' contents.
     ///
     /// # Errors
-    /// Files that cannot be read.
+    /// Files cannot be read.
     pub fn sha256(&self) -> Result<Vec<String>> {
         let paths = self.files.iter().flat_map(|(photo, marks)| [photo, marks]);
         paths.map(|path| sha256_of(path).with_context(|| path.display().to_string())).collect()

@@ -1,4 +1,4 @@
-//! Many parts taught from a folder of demonstrations, each model tried on every other's photo, and one page of it.
+//! Many parts taught from a folder of demonstrations, each model run on every other's photo, and a page of the results.
 //!
 //! ```text
 //! DemonstrationFolder ─ PartDemonstrations ─ teach ─ PartStore ─┬─ CrossCheck: each model on every other's photo
@@ -6,8 +6,8 @@
 //! OUT/models/NAME.sdg   OUT/parts/NAME.json   OUT/index.html
 //! ```
 //!
-//! What was taught from the same files with the same arguments is not taught again, so that an interrupted run goes on, and
-//! so that parts taught by other processes (`--part`) are taken.
+//! Parts already taught from the same files with the same arguments are not taught again, so that an interrupted run
+//! can be continued, and parts taught by other processes (`--part`) are reused.
 
 mod cross_check;
 mod findings;

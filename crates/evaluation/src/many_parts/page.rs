@@ -1,4 +1,4 @@
-//! Many parts on one page.
+//! The page of many parts.
 
 use image::RgbImage;
 use sdg_report::{Cell, Column, Figure, GallerySize, KeyFigure, Report, Section, Table, Tone, contact_sheet};
@@ -8,14 +8,14 @@ use super::part_store::PartOutcome;
 use crate::footer::FOOTER;
 use crate::machine::machine;
 
-/// Pairs of photos that are shown; the table has all.
+/// Maximum number of pairs of photos shown; the table has all.
 const MAX_SHOWN: usize = 24;
-/// Parts whose photos are shown; more would make a page that no browser likes to open.
+/// Maximum number of parts with a photo on the page; more would make the page too large for browsers.
 const MAX_PHOTOS: usize = 200;
-/// Of two photos beside each other, each so wide, px.
+/// Width of each of two adjacent photos, px.
 const PHOTO_WIDTH: u32 = 360;
 
-/// Which parts look alike, which need another photo, and how well each is found. `photos` are those of the taught parts.
+/// Look-alikes, parts that need another photo, and how well each part is found. `photos` are those of the taught parts.
 pub fn page(findings: &Findings, photos: &[RgbImage], command: &str) -> Report {
     let taught = findings.taught.len();
     let mut report = Report::new(format!("{taught} parts taught"))
@@ -124,7 +124,7 @@ fn all_parts(findings: &Findings, photos: &[RgbImage]) -> Section {
         .gallery(GallerySize::Small, photos_of_parts(findings, photos))
 }
 
-/// The photo that each part was taught from, with its name and what its model finds.
+/// The photo that each part was taught from, with its name and its model's result.
 fn photos_of_parts(findings: &Findings, photos: &[RgbImage]) -> Vec<Figure> {
     let figure = |(name, photo): (&String, &RgbImage)| {
         let outcome = findings.parts.iter().find(|(known, _)| known == name).map(|(_, outcome)| outcome);
@@ -137,7 +137,7 @@ fn photos_of_parts(findings: &Findings, photos: &[RgbImage]) -> Vec<Figure> {
     findings.taught.iter().zip(photos).take(MAX_PHOTOS).map(figure).collect()
 }
 
-/// A model's score on its own photo, its best on another, and which that is.
+/// A model's score on its own photo, its best score on another photo, and the name of that photo.
 fn scores(findings: &Findings, name: &str) -> [Cell; 3] {
     let Some(own) = findings.taught.iter().position(|known| known == name) else {
         return [Cell::missing(), Cell::missing(), Cell::missing()];

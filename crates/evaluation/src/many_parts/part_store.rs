@@ -1,4 +1,4 @@
-//! What became of each part: its model's file, and a record that says from what it was taught.
+//! The results of each part: its model's file, and a record of the teaching's inputs.
 
 use std::path::{Path, PathBuf};
 
@@ -9,46 +9,46 @@ use serde_json::Value;
 
 use crate::held_back::HeldBackFigures;
 
-/// Larger than any record.
+/// Maximum size of a record.
 const MAX_RECORD_BYTES: u64 = 1 << 20;
 
 /// The folder of the models.
 #[derive(Debug, Clone)]
 pub struct PartStore(PathBuf);
 
-/// What became of a part.
+/// The record of a part.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PartRecord {
-    /// What it was taught from: files, arguments, version.
+    /// The teaching's inputs: files, arguments, version.
     pub key: Value,
     pub outcome: PartOutcome,
 }
 
-/// How a teaching ended.
+/// Outcome of a teaching.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PartOutcome {
     Taught {
         seconds: f64,
-        /// Parts of held-back samples that it found, and how many there were.
+        /// Number of parts found in held-back samples, and of all parts.
         found: usize,
         parts: usize,
-        /// Detections beside the part.
+        /// Number of detections beside the part.
         wrong: usize,
-        /// Samples without the part in which it found one, and how many there were.
+        /// Number of samples without the part in which it was found, and of all such samples.
         false_alarms: usize,
         without_part: usize,
-        /// Median errors of what it found: in pixels of the photo, and in degrees.
+        /// Median errors of found parts: in pixels of the photo, and in degrees.
         median: Option<[f64; 2]>,
     },
     Failed {
-        /// In one line.
+        /// The reason, on one line.
         why: String,
     },
 }
 
 impl PartOutcome {
-    /// With the figures of held-back samples.
+    /// With the figures on held-back samples.
     pub fn taught(seconds: f64, figures: &HeldBackFigures) -> Self {
         let (found, false_alarms) = (figures.found(), figures.false_alarms());
         Self::Taught {
@@ -62,7 +62,7 @@ impl PartOutcome {
         }
     }
 
-    /// In a few words.
+    /// A short text.
     pub fn in_words(&self) -> String {
         match self {
             Self::Taught { seconds, found, parts, .. } => {
@@ -74,10 +74,10 @@ impl PartOutcome {
 }
 
 impl PartStore {
-    /// Opens a folder or makes it.
+    /// Opens or creates a folder.
     ///
     /// # Errors
-    /// A folder that cannot be written.
+    /// The folder cannot be written.
     pub fn open(folder: &Path) -> Result<Self> {
         for inner in [folder.to_owned(), folder.join("models"), folder.join("parts")] {
             sdg_files::prepare_folder(&inner)?;
@@ -85,7 +85,7 @@ impl PartStore {
         Ok(Self(folder.to_owned()))
     }
 
-    /// Where a part's model lies.
+    /// Path of a part's model.
     pub fn model_file(&self, part: &str) -> PathBuf {
         self.0.join("models").join(format!("{part}.sdg"))
     }
@@ -94,10 +94,10 @@ impl PartStore {
         self.0.join("parts").join(format!("{part}.json"))
     }
 
-    /// What became of a part that was taught with this key; `None` where it was not, or otherwise.
+    /// The outcome of a part taught with this key; `None` if it was not taught, or with another key.
     ///
     /// # Errors
-    /// A record that cannot be read or is damaged.
+    /// The record cannot be read or is damaged.
     pub fn read(&self, part: &str, key: &Value) -> Result<Option<PartOutcome>> {
         let path = self.record_file(part);
         if !path.exists() {
@@ -108,10 +108,10 @@ impl PartStore {
         Ok((record.key == *key).then_some(record.outcome))
     }
 
-    /// Keeps what became of a part. The record last: it says that the model is whole.
+    /// Stores the outcome of a part. The record is written last: it states that the model is complete.
     ///
     /// # Errors
-    /// Files that cannot be written.
+    /// Files cannot be written.
     pub fn write(&self, part: &str, model: Option<&[u8]>, record: &PartRecord) -> Result<()> {
         if let Some(bytes) = model {
             write_atomically(&self.model_file(part), bytes)?;

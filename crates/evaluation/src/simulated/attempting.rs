@@ -1,4 +1,4 @@
-//! Grasp attempts of a model on a part, kept one by one.
+//! Grasp attempts of a model on a part, stored one by one.
 
 use anyhow::Result;
 use sdg_inputs::one_line;
@@ -10,10 +10,10 @@ use super::records::{AttemptRecord, AttemptsRecord};
 use super::store::Store;
 use crate::rehearsal::Rehearsal;
 
-/// Goes on with the attempts in a file of the store, which depend on `settings`; `None` when interrupted.
+/// Continues the attempts in a file of the store, which depend on `settings`; `None` if interrupted.
 ///
 /// # Errors
-/// Files, OpenGL, settings. Physics that give up are a failed attempt.
+/// Errors of files, OpenGL and settings. Failing physics is a failed attempt.
 pub(super) fn go_on(
     rehearsal: &Rehearsal,
     store: &Store,
@@ -38,13 +38,13 @@ pub(super) fn go_on(
     Ok(Some(record.attempts))
 }
 
-/// How often the part was held, as a line.
+/// The number of held parts, as a line.
 pub(super) fn held_of(attempts: &[AttemptRecord]) -> String {
     let held = attempts.iter().filter(|attempt| attempt.success).count();
     format!("held in {held} of {}", attempts.len())
 }
 
-/// Whether the physics gave up, as against files, OpenGL or settings: that is one attempt's misfortune.
+/// Whether the physics failed (not files, OpenGL or settings): then only this attempt fails.
 fn is_of_physics(error: &anyhow::Error) -> bool {
     matches!(
         error.downcast_ref::<SimulationError>(),

@@ -1,4 +1,4 @@
-//! One model on one part: its name, and what the store has of it.
+//! One model on one part: its name, and its files in the store.
 
 use anyhow::{Context, Result, anyhow};
 use sdg_grasp::{CheckConfig, Device, GraspModel, ModelKind, Verification};
@@ -15,12 +15,12 @@ pub struct Cell<'a> {
 }
 
 impl Cell<'_> {
-    /// The cell whose network this one's model reads.
+    /// The cell whose network this cell's model uses.
     pub fn network(self) -> Self {
         Self { model: self.model.taught_as(), ..self }
     }
 
-    /// Whether its teaching has failed: then there is nothing to try.
+    /// Whether its teaching failed: then there is nothing to test.
     pub(super) fn is_without_model(self, marks: Marks, store: &Store) -> Result<bool> {
         Ok(matches!(self.teaching_from(marks, store)?, Some(TeachingRecord::Failed { .. })))
     }
@@ -30,32 +30,32 @@ impl Cell<'_> {
         format!("cells/{self}.{what}.json")
     }
 
-    /// Where its network lies.
+    /// The file of its network.
     pub(super) fn model_file(self, marks: Marks) -> String {
         format!("models/{}{}.sdg", self.network(), marks.suffix())
     }
 
-    /// Where it stands how the teaching of its network ended.
+    /// The file of its teaching's outcome.
     pub(super) fn teaching_file(self, marks: Marks) -> String {
         self.network().file(&format!("teaching{}", marks.suffix()))
     }
 
-    /// Where a picture of its detections lies.
+    /// The file of a picture with its detections.
     pub fn picture_file(self) -> String {
         format!("pictures/{self}.png")
     }
 
-    /// How the teaching of its network from the shipped demonstration ended, if it has.
+    /// The outcome of teaching its network from the shipped demonstration, if available.
     pub fn teaching(self, store: &Store) -> Result<Option<TeachingRecord>> {
         self.teaching_from(Marks::Shipped, store)
     }
 
-    /// How the teaching of its network ended, if it has.
+    /// The outcome of teaching its network from these marks, if available.
     pub fn teaching_from(self, marks: Marks, store: &Store) -> Result<Option<TeachingRecord>> {
         store.read_made_with(&self.teaching_file(marks), &store.settings().teaching())
     }
 
-    /// Its detections in pictures, if it was run on them.
+    /// Its detections in pictures, if available.
     pub fn look(self, store: &Store) -> Result<Option<LookRecord>> {
         store.read(&self.file("look"))
     }
@@ -65,12 +65,12 @@ impl Cell<'_> {
         read_attempts(store, &self.file(&attempts_of(verification)), store.settings())
     }
 
-    /// How fast it is, if that was measured.
+    /// Its speed, if measured.
     pub fn speed(self, store: &Store) -> Result<Option<SpeedRecord>> {
         store.read(&self.file("speed"))
     }
 
-    /// Its model; `None` where teaching led to none.
+    /// Its model; `None` if teaching gave none.
     pub(super) fn read_model(self, marks: Marks, store: &Store) -> Result<Option<GraspModel>> {
         match self.teaching_from(marks, store)? {
             Some(TeachingRecord::Taught { .. }) => {}
@@ -82,7 +82,7 @@ impl Cell<'_> {
         Ok(Some(model.ok_or_else(|| anyhow!("{}: expected model {}", path.display(), self.network().model))?))
     }
 
-    /// The same for a camera that is always as high as it was for the photo: the paper's protocol.
+    /// The same for a camera that always has the height of the photo: the paper's protocol.
     pub(super) fn read_model_at_fixed_height(self, store: &Store) -> Result<Option<GraspModel>> {
         let at_fixed_height = |model: GraspModel| model.with_size_tolerance(CheckConfig::FIXED_HEIGHT_TOLERANCE);
         Ok(self.read_model(Marks::Shipped, store)?.map(at_fixed_height).transpose()?)
@@ -95,19 +95,19 @@ impl std::fmt::Display for Cell<'_> {
     }
 }
 
-/// Which marks a network is taught from.
+/// The marks that a network is taught from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Marks {
     /// Those of the shipped demonstration.
     Shipped,
-    /// Those, each moved by [`MARKS_JITTER_PX`](super::axes::MARKS_JITTER_PX).
+    /// Those of the shipped demonstration, each moved by [`MARKS_JITTER_PX`](super::axes::MARKS_JITTER_PX).
     Jittered,
     /// Those of the shipped demonstration, in the plan view of the camera that took it.
     InPlanView,
 }
 
 impl Marks {
-    /// What file names say of them.
+    /// Suffix in file names.
     fn suffix(self) -> &'static str {
         match self {
             Self::Shipped => "",
@@ -117,7 +117,7 @@ impl Marks {
     }
 }
 
-/// The attempts in a file so far; none where they were recorded by an earlier version, so that they are made again.
+/// The attempts in a file so far; empty if they were recorded by an earlier version, so that they are made again.
 ///
 /// # Errors
 /// Those of [`Store::read_made_with`].

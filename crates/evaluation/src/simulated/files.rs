@@ -1,4 +1,4 @@
-//! The protocol's results as files of the evaluation's folder.
+//! Writes the protocol's results to files in the evaluation's folder.
 
 use std::path::{Path, PathBuf};
 
@@ -13,12 +13,12 @@ use super::tables::markdown;
 use super::units::Evaluation;
 use crate::machine::machine;
 
-/// What was written, and of what.
+/// The written files, with the summaries.
 #[derive(Debug)]
 pub struct WrittenTables {
-    /// One for each group of parts.
+    /// One per group of parts.
     pub summaries: Vec<Summary>,
-    /// Units that are still to do.
+    /// Number of remaining units.
     pub remaining: usize,
     /// All cells as JSON.
     pub cells: PathBuf,
@@ -29,10 +29,11 @@ pub struct WrittenTables {
 }
 
 impl Evaluation<'_> {
-    /// Writes the tables of what there is. `settings` are what the reader is told, and `command` makes the same results again.
+    /// Writes the tables of the finished units. `settings` are those shown to the reader, and `command` reproduces the
+    /// results.
     ///
     /// # Errors
-    /// Records that cannot be read, and files that cannot be written.
+    /// Records cannot be read, or files cannot be written.
     pub fn write_tables(&self, settings: &Settings, command: &str, report_folder: &Path) -> Result<WrittenTables> {
         let store = self.store;
         let summaries = Summary::collect(self)?;
@@ -64,7 +65,7 @@ impl Evaluation<'_> {
 }
 
 impl Summary {
-    /// A line for each model.
+    /// One line per model.
     pub fn lines(&self) -> String {
         let of = if self.group == PartGroup::HeldOut { " (held-out parts)" } else { "" };
         let line = |model: &ModelSummary| {

@@ -1,4 +1,4 @@
-//! The parts in two groups that are never added up: those of the paper, and those on which no constant was ever fitted.
+//! The parts in two groups with separate sums: those of the paper, and those on which no constant was ever fitted.
 
 use sdg_simulation::objects::ObjectSpec;
 use serde::Serialize;
@@ -8,12 +8,12 @@ use serde::Serialize;
 #[serde(rename_all = "snake_case")]
 pub enum PartGroup {
     Paper,
-    /// Four of another kind, held out of every choice.
+    /// Four other parts, held out of every choice.
     HeldOut,
 }
 
 impl PartGroup {
-    /// Both, in the order in which they are reported.
+    /// Both, in the order of the reports.
     pub const ALL: [Self; 2] = [Self::Paper, Self::HeldOut];
 
     /// The group of a shipped part.

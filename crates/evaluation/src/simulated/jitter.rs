@@ -8,15 +8,15 @@ use rand_pcg::Pcg64Mcg;
 use sdg_demonstration::{Annotation, Demonstration};
 use sdg_geometry::{BoundingBox, GraspLine};
 
-/// How far every mark is moved, in pixels of the photo.
+/// Displacement of every mark, in pixels of the photo.
 pub const MARKS_JITTER_PX: f64 = 3.0;
 
-/// Directions that are drawn for a vertex of the outline before it stays where it is.
+/// Number of directions drawn for a vertex of the outline before it is left in place.
 const MAX_VERTEX_TRIES: usize = 40;
 
 /// The demonstration with both grasp marks, two opposite corners of the box and every vertex of the outline moved by
-/// `distance_px`, each into a direction of its own, drawn uniformly from `seed`. A vertex whose move would make the outline
-/// cross itself is drawn again; the outline stays one that the annotation page accepts. The drawn jaw width stays.
+/// `distance_px`, each in its own direction, drawn uniformly from `seed`. A move that would make the outline cross
+/// itself is drawn again, so the outline remains valid on the annotation page. The jaw width is unchanged.
 pub fn with_jittered_marks(demonstration: &Demonstration, distance_px: f64, seed: u64) -> Demonstration {
     const MARKS: u64 = 0x4d41_524b_5300_0000;
     let mut rng = Pcg64Mcg::seed_from_u64(seed ^ MARKS);
@@ -49,7 +49,7 @@ pub fn with_jittered_marks(demonstration: &Demonstration, distance_px: f64, seed
     Demonstration { image: demonstration.image.clone(), annotation }
 }
 
-/// How many vertices of an outline were moved.
+/// Number of vertices of an outline that were moved.
 #[cfg(test)]
 fn num_moved(before: &sdg_geometry::Polygon, after: &sdg_geometry::Polygon) -> usize {
     before.vertices.iter().zip(&after.vertices).filter(|(before, after)| before != after).count()
@@ -73,7 +73,7 @@ mod tests {
             }
             let (before, after) = (shipped.annotation.outline.unwrap(), jittered.annotation.outline.unwrap());
             let (moved, of) = (num_moved(&before, &after), before.vertices.len());
-            // Of vertices a pixel or two apart a few find no place.
+            // If vertices are a pixel or two apart, a few cannot be moved.
             assert!(10 * moved >= 9 * of, "{name}: {moved} of {of} moved");
         }
     }

@@ -1,4 +1,4 @@
-//! The paper's protocol: every model taught on every part, tried on unseen pictures and grasping, and its tables.
+//! The paper's protocol: every model taught on every part, tested on unseen pictures and in grasps, and its tables.
 //!
 //! ```text
 //! Evaluation ─ units ─ Queue ─ workers (a share of the cores each) ─ Store: a file for every unit, as it ends
@@ -7,15 +7,15 @@
 //!                                                                      └─ Summary ─ tables: Markdown, JSON, page
 //! ```
 //!
-//! A **network** is what is taught; models B and C are two readings of one. A **unit** is the least piece of work that is
-//! kept or lost as a whole: one teaching, one attempt, the pictures of one part. A **cell** is one model on one part.
-//! Random choices depend on the seed, the part and the attempt's number alone, so every model meets the same scenes and
-//! `sdg rehearse` with a part's seed (1000 times the evaluation's, plus the part's place in the list) meets them again.
+//! A **network** is taught; models B and C are two readings of one network. A **unit** is a piece of work that is
+//! stored or lost as a whole: one teaching, one attempt, the pictures of one part. A **cell** is one model on one part.
+//! Random choices depend only on the seed, the part and the attempt's number, so every model gets the same scenes, and
+//! `sdg rehearse` with a part's seed (1000 times the evaluation's, plus the part's index in the list) repeats them.
 //!
-//! [`sharing`] has the same units done by many processes, on a cluster's machines.
+//! In [`sharing`], the same units are done by many processes, on the machines of a cluster.
 //!
-//! What is in the store is not done again, so an evaluation that was interrupted goes on where it stopped. A teaching
-//! that led to nothing is a result, too: all attempts of its cell count as failed.
+//! Units in the store are not done again, so an interrupted evaluation can be continued. A teaching without a model is
+//! a result too: all attempts of its cell count as failed.
 
 mod attempting;
 pub mod axes;

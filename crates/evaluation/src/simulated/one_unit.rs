@@ -1,4 +1,4 @@
-//! One unit of work: its panics as errors, its time, and what there is to say of it.
+//! Runs one unit of work: panics become errors, the time is measured, and the result is reported.
 
 use std::fmt::Display;
 use std::ops::ControlFlow;
@@ -9,11 +9,11 @@ use anyhow::{Result, anyhow};
 
 use crate::progress::Progress;
 
-/// What there is to say of a unit whose teaching failed while it waited.
+/// The text for a unit whose teaching failed while it waited.
 pub(super) const NO_MODEL: &str = "there is no model";
 
-/// Does a unit unless the run is interrupted, and says what came of it; `work` gives that in words, or `None` where it
-/// was interrupted.
+/// Runs a unit unless the run is interrupted, and reports its result; `work` returns a description, or `None` if it was
+/// interrupted.
 ///
 /// # Errors
 /// Those of `work`, and its panic.
@@ -32,13 +32,13 @@ pub(super) fn do_unit(
     Ok(ControlFlow::Continue(()))
 }
 
-/// Turns a panic into an error, so that the units beside it are kept.
+/// Turns a panic into an error, so that the other units are kept.
 pub(super) fn caught<T>(body: impl FnOnce() -> Result<T>) -> Result<T> {
-    // Unwind safety: whatever the closure was changing is given up with its unit.
+    // Unwind safety: everything that the closure was changing is discarded with its unit.
     catch_unwind(AssertUnwindSafe(body)).unwrap_or_else(|panic| {
         let message = panic.downcast_ref::<&str>().map(|message| (*message).to_owned());
         let message = message.or_else(|| panic.downcast_ref::<String>().cloned());
-        Err(anyhow!("a mistake in this program: {}", message.unwrap_or_else(|| "it panicked".to_owned())))
+        Err(anyhow!("an error in this program: {}", message.unwrap_or_else(|| "it panicked".to_owned())))
     })
 }
 
@@ -49,7 +49,7 @@ mod tests {
     #[test]
     fn a_panic_becomes_an_error() {
         let error = caught::<()>(|| panic!("index {}", 7)).unwrap_err();
-        assert_eq!(error.to_string(), "a mistake in this program: index 7");
+        assert_eq!(error.to_string(), "an error in this program: index 7");
         assert!(caught(|| Ok(1)).is_ok());
     }
 }

@@ -1,4 +1,4 @@
-//! The evaluation as a page.
+//! The page of the evaluation.
 
 use anyhow::Result;
 use sdg_report::{Axis, Chart, Figure, GallerySize, KeyFigure, Matrix, Report, Section, Series, ShareChart, Tone};
@@ -30,7 +30,7 @@ pub fn page(summaries: &[Summary], store: &Store, facts: &[(&str, String)], comm
             report = report.key_figure(KeyFigure::new(format!("{percent:.0}"), "%", label).tone(tone));
         }
     }
-    // In the first section, whichever that is.
+    // In the first section of the page.
     let mut notice = summaries.first().and_then(notice);
     let mut begun = |section: Section| match notice.take() {
         Some(notice) => section.notice(Tone::Warning, notice),
@@ -49,7 +49,7 @@ pub fn page(summaries: &[Summary], store: &Store, facts: &[(&str, String)], comm
         }
         if let Some(losses) = losses(summary) {
             report = report.section(
-                Section::new(titled("How they learn"))
+                Section::new(titled("Training loss"))
                     .lead("Models B and C are two readings of one network.")
                     .charts(vec![losses]),
             );
@@ -57,8 +57,8 @@ pub fn page(summaries: &[Summary], store: &Store, facts: &[(&str, String)], comm
         let figures = pictures(summary, store)?;
         if !figures.is_empty() {
             report = report.section(
-                Section::new(titled("What they see"))
-                    .lead("The first unseen picture of each part, with what each model says of it.")
+                Section::new(titled("Detections"))
+                    .lead("The first unseen picture of each part, with each model's detections.")
                     .gallery(GallerySize::Small, figures),
             );
         }
@@ -66,7 +66,7 @@ pub fn page(summaries: &[Summary], store: &Store, facts: &[(&str, String)], comm
     Ok(report.section(this_run(facts, command)).footer(FOOTER))
 }
 
-/// Success beside the paper's, and where the attempts of each model and on each part ended.
+/// Success compared with the paper's, and the steps at which attempts ended, by model and by part.
 fn plots(summary: &Summary, section: Section) -> Section {
     let mut shares = ShareChart::new("Attempts that held the part").reference_name("the paper");
     let mut by_model = outcomes("Where attempts end, by model");
@@ -96,7 +96,7 @@ fn outcomes(title: &str) -> Matrix {
     Matrix::new(title, columns).good_column(AttemptRecord::steps().count())
 }
 
-/// How many attempts ended at each step, and how many held.
+/// Number of attempts that ended at each step, and number of held parts.
 fn counts<'a>(figures: impl IntoIterator<Item = &'a Figures>) -> Vec<usize> {
     let mut counts = vec![0; AttemptRecord::steps().count() + 1];
     for figures in figures {
@@ -108,7 +108,7 @@ fn counts<'a>(figures: impl IntoIterator<Item = &'a Figures>) -> Vec<usize> {
     counts
 }
 
-/// The loss of each network, mean of the parts; `None` where no curve was kept.
+/// The loss of each network, averaged over the parts; `None` if no curve was stored.
 fn losses(summary: &Summary) -> Option<Chart> {
     let mut chart = Chart::new("Training loss", Axis::new("step"), Axis::new("loss").logarithmic())
         .caption(format!("Mean of the parts and of {LOSS_STEPS} steps each."));

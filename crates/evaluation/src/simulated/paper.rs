@@ -2,26 +2,26 @@
 
 use sdg_grasp::ModelKind;
 
-/// A row of the paper's Table II, and of its text where the table leaves it out.
+/// A row of the paper's Table II, completed from its text.
 pub struct PaperRow {
     pub samples: &'static str,
     /// From samples to model, on a GTX 1080 Ti, minutes and seconds.
     pub teaching: &'static str,
-    /// Files of weights, in megabytes.
+    /// Size of the weights' files, in megabytes.
     pub size: &'static str,
-    /// Images a second, on a GTX 1080 Ti.
+    /// Images per second, on a GTX 1080 Ti.
     pub frames_per_second: &'static str,
-    /// Attempts that succeeded, of 80 in simulation.
+    /// Share of successful attempts, of 80 in simulation.
     pub success_percent: f64,
 }
 
-/// Speed of model C on a CPU, as its implementation in OpenDR reports it, in images a second.
+/// Speed of model C on a CPU, as reported for its implementation in OpenDR, in images per second.
 pub const CPU_FRAMES_PER_SECOND: f64 = 0.4;
 
-/// The row of a model; `None` for one that the paper does not have.
+/// The row of a model; `None` for a model that is not in the paper.
 ///
 /// # Source
-/// Table II; success with a decimal as its section VI gives it. For A both networks' samples, times and sizes.
+/// Table II; success with a decimal from section VI. For A, samples, times and sizes of both networks.
 pub fn row(model: ModelKind) -> Option<PaperRow> {
     Some(match model {
         ModelKind::A => PaperRow {

@@ -1,4 +1,4 @@
-//! Records of units of work, as the store keeps them.
+//! Records of units of work, as stored.
 
 use sdg_grasp::TeachingFacts;
 use sdg_report::DetectionError;
@@ -8,32 +8,32 @@ use serde::{Deserialize, Serialize};
 use crate::rehearsal::{Looks, RehearsedAttempt, step_name};
 use crate::trial::{RIGHT_DEGREES, RIGHT_MM, Trial};
 
-/// Steps that one value of a teaching's loss stands for.
+/// Number of steps per stored value of a teaching's loss.
 pub const LOSS_STEPS: usize = 10;
 
-/// How a teaching ended.
+/// Outcome of a teaching.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum TeachingRecord {
     /// There is a model.
     Taught {
-        /// Its own description.
+        /// Its description by the model.
         facts: Box<TeachingFacts>,
         /// Size of its file.
         bytes: usize,
-        /// How many units ran side by side meanwhile.
+        /// Number of units that ran in parallel.
         jobs: usize,
-        /// Mean loss of every [`LOSS_STEPS`] steps; none without a network.
+        /// Mean loss of every [`LOSS_STEPS`] steps; empty without a network.
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         losses: Vec<f64>,
     },
     Failed {
-        /// Why, in one line.
+        /// The reason, on one line.
         why: String,
     },
 }
 
-/// One grasp attempt.
+/// A grasp attempt.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct AttemptRecord {
     /// Its number, from 1.
@@ -44,27 +44,27 @@ pub struct AttemptRecord {
     pub step: String,
     /// Why it failed; empty on success.
     pub why: String,
-    /// Place of the last detection beside the truth, in millimetres.
+    /// Position error of the last detection, in millimetres.
     pub error_mm: Option<f64>,
-    /// Turn of the last detection beside the truth, in degrees.
+    /// Angle error of the last detection, in degrees.
     pub error_deg: Option<f64>,
-    /// How often the camera looked.
+    /// Number of looks.
     pub looks: Looks,
     pub seconds: f64,
 }
 
 impl AttemptRecord {
-    /// Where an attempt ends that the simulation itself gave up.
+    /// Step name of an attempt in which the simulation failed.
     pub const SIMULATION: &str = "simulation";
-    /// Where an attempt ends for which there is no model.
+    /// Step name of an attempt without a model.
     pub const TEACH: &str = "teach";
 
-    /// Everything at which an attempt can end, in order.
+    /// All steps at which an attempt can end, in order.
     pub fn steps() -> impl Iterator<Item = &'static str> {
         [Self::TEACH].into_iter().chain(GraspStep::ALL.map(GraspStep::name)).chain([Self::SIMULATION])
     }
 
-    /// As the rehearsal gives it.
+    /// From the result of a rehearsal.
     pub fn new(RehearsedAttempt { attempt, looks, .. }: &RehearsedAttempt) -> Self {
         Self {
             attempt: attempt.number,
@@ -78,7 +78,7 @@ impl AttemptRecord {
         }
     }
 
-    /// An attempt that failed without the robot's doing.
+    /// An attempt that failed without the robot.
     pub fn failed(attempt: usize, step: &str, why: String) -> Self {
         Self {
             attempt,
@@ -92,25 +92,25 @@ impl AttemptRecord {
         }
     }
 
-    /// Whether the part was held and both its detections came of a first look: from the look-out pose and from above.
+    /// Whether the part was held and both detections were from a first look: from the look-out pose and from above.
     pub fn is_held_at_first_look(&self) -> bool {
         self.success && self.looks == Looks { from_afar: 1, from_above: 1 }
     }
 }
 
-/// The attempts of a cell so far, in their order.
+/// The attempts of a cell so far, in order.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct AttemptsRecord {
-    /// How attempts are recorded: [`Self::VERSION`]. Those of another version are made again.
+    /// Version of the records: [`Self::VERSION`]. Attempts of another version are made again.
     pub version: u32,
     pub attempts: Vec<AttemptRecord>,
 }
 
 impl AttemptsRecord {
-    /// The version of what an attempt leaves behind: raised when a field of it comes or goes.
+    /// Current version of an attempt's record, raised when a field is added or removed.
     pub const VERSION: u32 = 2;
 
-    /// Those of this version.
+    /// Attempts of the current version.
     pub fn new(attempts: Vec<AttemptRecord>) -> Self {
         Self { version: Self::VERSION, attempts }
     }
@@ -119,20 +119,20 @@ impl AttemptsRecord {
 /// A model's detections in a picture.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct DetectionRecord {
-    /// Score of the best detection, accepted or not; zero for none.
+    /// Score of the best detection, accepted or not; zero if there is none.
     pub score: f64,
-    /// The network's own score of it.
+    /// Its score by the network.
     pub network_score: f64,
-    /// How well the demonstration agrees there, where it was asked.
+    /// Agreement of the demonstration there, if it was checked.
     pub agreement: Option<f64>,
-    /// Place of the best detection beside the truth, in millimetres; `None` without a part or a detection.
+    /// Position error of the best detection, in millimetres; `None` without a part or a detection.
     pub error_mm: Option<f64>,
-    /// Turn of the best detection beside the truth, in degrees.
+    /// Angle error of the best detection, in degrees.
     pub error_deg: Option<f64>,
 }
 
 impl DetectionRecord {
-    /// As the trial gives it.
+    /// From a trial.
     pub fn new(trial: &Trial) -> Self {
         Self {
             score: trial.best_score,
@@ -148,13 +148,13 @@ impl DetectionRecord {
         self.score >= 0.5
     }
 
-    /// The error against the truth, where the part was detected.
+    /// The error, if the part was detected.
     pub fn error(&self) -> Option<DetectionError> {
         let (distance_mm, angle_deg) = self.error_mm.zip(self.error_deg)?;
         self.is_accepted().then_some(DetectionError { distance_mm, angle_deg })
     }
 
-    /// Whether that is near enough to the truth.
+    /// Whether the error is small enough.
     pub fn is_right(&self) -> bool {
         self.error().is_some_and(|e| e.distance_mm <= RIGHT_MM && e.angle_deg <= RIGHT_DEGREES)
     }
@@ -165,30 +165,30 @@ impl DetectionRecord {
 pub struct PictureRecord {
     /// Seed of its scene.
     pub seed: u64,
-    /// Another shipped part that lies there, where the taught one does not.
+    /// Another shipped part in a picture without the taught one.
     pub other_part: Option<String>,
     /// With the check against the demonstration.
     pub verified: DetectionRecord,
-    /// Without it; `None` for a model that is nothing but the demonstration.
+    /// Without it; `None` for a model that consists only of the demonstration.
     pub alone: Option<DetectionRecord>,
 }
 
 /// A model's detections in a part's pictures.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct LookRecord {
-    /// The part is there.
+    /// Pictures with the part.
     pub present: Vec<PictureRecord>,
-    /// It is not, but other things are.
+    /// Pictures without the part but with other objects.
     pub absent: Vec<PictureRecord>,
 }
 
-/// How long a detection takes with the machine to itself.
+/// Duration of a detection without other load on the machine.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct SpeedRecord {
-    /// Cores that it had.
+    /// Number of cores.
     pub cores: usize,
-    /// Seconds an image, with the check against the demonstration.
+    /// Seconds per image, with the check against the demonstration.
     pub verified_secs: Vec<f64>,
-    /// Seconds an image without it.
+    /// Seconds per image without it.
     pub alone_secs: Vec<f64>,
 }

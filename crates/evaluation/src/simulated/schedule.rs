@@ -1,15 +1,15 @@
-//! Units of work that wait for each other, done by as many workers as there is room for.
+//! Runs units of work with dependencies on several workers.
 
 use std::ops::ControlFlow;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
 use anyhow::Result;
 
-/// A unit of work and those that must be done before it.
+/// A unit of work and its dependencies.
 #[derive(Debug, Clone)]
 pub struct Task<U> {
     pub unit: U,
-    /// Indices of the tasks that it waits for; all smaller than its own, so that no circle can be.
+    /// Indices of the tasks that it waits for; all smaller than its own, so that there are no cycles.
     pub after: Vec<usize>,
 }
 
@@ -26,23 +26,23 @@ struct State {
     error: Option<anyhow::Error>,
 }
 
-/// Runs tasks on `workers` threads: always the first that waits for nothing. `work` breaks to end the run after what is
-/// under way; its first error ends it, too, and is returned.
+/// Runs tasks on `workers` threads: always the first task that is ready. If `work` breaks, no further task is begun;
+/// its first error also ends the run, and is returned.
 ///
-/// Each thread has a rayon pool of `threads_per_worker` of its own, so that units share the cores evenly.
+/// Each thread has its own rayon pool of `threads_per_worker`, so that units share the cores evenly.
 ///
 /// # Errors
-/// The first error of `work`; threads that the system refuses.
+/// The first error of `work`; the system refuses threads.
 ///
 /// # Panics
-/// When a task waits for a later one, or `work` panics.
+/// If a task waits for a later one, or `work` panics.
 pub fn run_all<U: Sync>(
     tasks: &[Task<U>],
     workers: usize,
     threads_per_worker: usize,
     work: &(dyn Fn(&U) -> Result<ControlFlow<()>> + Sync),
 ) -> Result<()> {
-    /// As the main thread has it.
+    /// As for the main thread.
     const STACK_BYTES: usize = 8 << 20;
     for (i, task) in tasks.iter().enumerate() {
         assert!(task.after.iter().all(|&before| before < i), "task {i} waits for a later one");
@@ -79,7 +79,7 @@ impl Queue {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The first task that waits for nothing; waits for one while others may still make it ready.
+    /// The first task that is ready; waits while running tasks may make one ready.
     fn take<U>(&self, tasks: &[Task<U>]) -> Option<usize> {
         let mut state = self.lock();
         loop {

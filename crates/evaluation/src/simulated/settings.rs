@@ -4,37 +4,37 @@ use anyhow::Result;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-/// Everything that results of the paper's protocol depend on, apart from which models and parts they are of. Kept in every
-/// file of a [`Store`](super::Store), so that results of different settings never meet in one table.
+/// The settings on which results of the paper's protocol depend, besides models and parts. They are stored in every
+/// file of a [`Store`](super::Store), so that results of different settings are never combined in a table.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Settings {
-    /// Which protocol: raised when scenes, seeds or what is counted change.
+    /// Version of the protocol, raised when scenes, seeds or counts change.
     pub protocol: u32,
     /// Network, training and augmentation.
     pub preset: String,
-    /// Optimiser steps other than the preset's.
+    /// Number of optimiser steps, if not the preset's.
     pub steps: Option<u32>,
-    /// Seconds that a network's training may take at most; a result then depends on the machine.
+    /// Maximum seconds of training; a result then depends on the machine.
     pub time_budget: Option<u32>,
-    /// Decides every random choice.
+    /// Seed of all random choices.
     pub seed: u64,
-    /// Grasp attempts of each cell.
+    /// Number of grasp attempts of each cell.
     pub attempts: u32,
-    /// Unseen pictures of each part.
+    /// Number of unseen pictures of each part.
     pub views: u32,
-    /// Pictures for each part in which it is not.
+    /// Number of pictures without the part for each part.
     pub scenes: u32,
-    /// SHA-256 of the program, where many processes share the folder: then no result of another program is taken.
+    /// SHA-256 of the program if many processes share the folder: results of other programs are then rejected.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub program: Option<String>,
 }
 
 impl Settings {
-    /// The protocol of this version.
+    /// The current version of the protocol.
     pub const PROTOCOL: u32 = 2;
 
-    /// Settings of preset `edge`, with as many pictures with the part as without it.
+    /// Settings of preset `edge`, with equal numbers of pictures with and without the part.
     #[cfg(test)]
     pub(super) fn for_test(seed: u64, attempts: u32, pictures: u32) -> Self {
         Self {
@@ -50,7 +50,7 @@ impl Settings {
         }
     }
 
-    /// Those of them that decide a teaching.
+    /// The settings on which a teaching depends.
     pub fn teaching(&self) -> TeachingSettings {
         TeachingSettings {
             preset: self.preset.clone(),
@@ -62,27 +62,27 @@ impl Settings {
     }
 }
 
-/// What a teaching depends on, apart from model, part and marks: the protocol and the axes share teachings.
+/// The settings on which a teaching depends, besides model, part and marks: the protocol and the axes share teachings.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct TeachingSettings {
     /// Network, training and augmentation.
     pub preset: String,
-    /// Optimiser steps other than the preset's.
+    /// Number of optimiser steps, if not the preset's.
     pub steps: Option<u32>,
-    /// Seconds that a network's training may take at most; a result then depends on the machine.
+    /// Maximum seconds of training; a result then depends on the machine.
     pub time_budget: Option<u32>,
-    /// Decides every random choice.
+    /// Seed of all random choices.
     pub seed: u64,
     /// As in [`Settings`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub program: Option<String>,
 }
 
-/// How the settings that a reader asks for differ from those that a file was made with, in words; `None` when each that is
-/// asked for is as in the file. What the file says beyond them does not concern the reader.
+/// The differences between the requested settings and those of a file, in words; `None` if every requested setting
+/// equals the file's. Additional settings in the file are ignored.
 ///
 /// # Errors
-/// Settings that cannot be written as JSON.
+/// Settings cannot be serialised as JSON.
 pub(super) fn difference(expected: &impl Serialize, found: &Value) -> Result<Option<String>> {
     let expected = serde_json::to_value(expected)?;
     let told = |value: &Value| match value {
@@ -130,7 +130,7 @@ mod tests {
             program: None,
         };
         assert_eq!(told(&settings(), &each).unwrap().matches("expected").count(), 8);
-        // The program counts for whoever asks for one, and for nobody else.
+        // The program is compared only if it is requested.
         let of_program = |name: &str| Settings { program: Some(name.into()), ..settings() };
         assert_eq!(told(&of_program("a1"), &of_program("b2")).unwrap(), "program: expected a1, found b2");
         assert_eq!(told(&of_program("a1"), &settings()).unwrap(), "program: expected a1, found none");

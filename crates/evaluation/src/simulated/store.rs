@@ -1,4 +1,4 @@
-//! The folder of an evaluation: a file for every unit of work that has ended.
+//! The folder of an evaluation: a file for every finished unit of work.
 //!
 //! ```text
 //! DIR/settings.json
@@ -11,8 +11,8 @@
 //! DIR/axes/C-pendulum.attempts-shake.json     attempts under an error
 //! ```
 //!
-//! Each JSON file carries the settings that it was made with and is there whole or not at all. A teaching carries those of
-//! teachings alone, so that the protocol and the axes share it, with whatever number of attempts or pictures.
+//! Each JSON file contains the settings with which it was made, and is written atomically. A teaching contains only the
+//! settings of teachings, so that the protocol and the axes share it, for any number of attempts or pictures.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -26,15 +26,15 @@ use serde_json::Value;
 use super::settings::{Settings, difference};
 use crate::error::EvaluationError;
 
-/// Larger than any record.
+/// Maximum size of a record.
 const MAX_RECORD_BYTES: u64 = 64 << 20;
 
-/// An evaluation's folder, held by this process.
+/// An evaluation's folder, locked by this process.
 #[derive(Debug)]
 pub struct Store {
     folder: PathBuf,
     settings: Settings,
-    /// Locked while the store lives.
+    /// Held while the store exists.
     _lock: Lock,
 }
 
@@ -46,18 +46,18 @@ struct Stored<S, T> {
 }
 
 impl Store {
-    /// Opens the folder of an evaluation or begins one.
+    /// Opens or creates the folder of an evaluation.
     ///
     /// # Errors
-    /// A folder that cannot be written, that another process works in, or whose models were taught with other settings.
+    /// The folder cannot be written, is used by another process, or has models taught with other settings.
     pub fn open(folder: &Path, settings: &Settings) -> Result<Self> {
         Self::open_with(folder, settings, Access::Alone)
     }
 
-    /// The same for one of many processes, which divide the units among themselves by other means.
+    /// The same for one of several processes, which divide the units among themselves by other means.
     ///
     /// # Errors
-    /// As [`Self::open`], where one process works in the folder alone.
+    /// As [`Self::open`], if a process has exclusive use of the folder.
     pub fn open_shared(folder: &Path, settings: &Settings) -> Result<Self> {
         Self::open_with(folder, settings, Access::Shared)
     }
@@ -69,7 +69,7 @@ impl Store {
             fs::create_dir_all(&inner).with_context(|| format!("{}: cannot make this folder", inner.display()))?;
         }
         let Some(lock) = Lock::take(&folder.join(".lock"), access)? else {
-            bail!("{}: another evaluation is at work in this folder", folder.display());
+            bail!("{}: another evaluation is running in this folder", folder.display());
         };
         let store = Self { folder: folder.to_owned(), settings: settings.clone(), _lock: lock };
         let teaching = settings.teaching();
@@ -84,20 +84,20 @@ impl Store {
         &self.folder
     }
 
-    /// What results of the paper's protocol are made with.
+    /// The settings of the paper's protocol's results.
     pub fn settings(&self) -> &Settings {
         &self.settings
     }
 
-    /// A record of the paper's protocol, if there is one yet. `name` is that of its file.
+    /// A record of the paper's protocol, if available. `name` is the name of its file.
     ///
     /// # Errors
-    /// A file that cannot be read, is damaged, or was made with other settings.
+    /// The file cannot be read, is damaged, or was made with other settings.
     pub fn read<T: DeserializeOwned>(&self, name: &str) -> Result<Option<T>> {
         self.read_made_with(name, &self.settings)
     }
 
-    /// A record, if there is one yet, that depends on `settings`.
+    /// A record that depends on `settings`, if available.
     ///
     /// # Errors
     /// As [`Self::read`].
@@ -110,12 +110,12 @@ impl Store {
         Ok(Some(serde_json::from_value(record).with_context(|| not_a_record(&path))?))
     }
 
-    /// Writes a record of the paper's protocol, whole or not at all.
+    /// Writes a record of the paper's protocol atomically.
     pub fn write<T: Serialize>(&self, name: &str, record: &T) -> Result<()> {
         self.write_made_with(name, &self.settings, record)
     }
 
-    /// Writes a record that depends on `settings`, whole or not at all.
+    /// Writes a record that depends on `settings` atomically.
     pub fn write_made_with(&self, name: &str, settings: &impl Serialize, record: &impl Serialize) -> Result<()> {
         let stored = Stored { settings, record };
         let mut bytes = serde_json::to_vec_pretty(&stored)?;
@@ -123,17 +123,17 @@ impl Store {
         self.write_bytes(name, &bytes)
     }
 
-    /// Writes any file of the folder, whole or not at all.
+    /// Writes any file of the folder atomically.
     pub fn write_bytes(&self, name: &str, bytes: &[u8]) -> Result<()> {
         Ok(write_atomically(&self.folder.join(name), bytes)?)
     }
 
-    /// Where a file of the folder lies.
+    /// Path of a file in the folder.
     pub fn path(&self, name: &str) -> PathBuf {
         self.folder.join(name)
     }
 
-    /// Removes a file that stands for nothing any more; none is no error.
+    /// Removes an obsolete file; a missing one is not an error.
     pub fn remove(&self, name: &str) -> Result<()> {
         let path = self.folder.join(name);
         match fs::remove_file(&path) {
@@ -145,10 +145,10 @@ impl Store {
     }
 }
 
-/// The settings and the record of any store's file; `None` where there is no such file.
+/// The settings and the record in any store's file; `None` if there is no such file.
 ///
 /// # Errors
-/// A file that cannot be read or is damaged.
+/// The file cannot be read or is damaged.
 pub(super) fn read_stored(path: &Path) -> Result<Option<(Value, Value)>> {
     if !path.exists() {
         return Ok(None);
@@ -189,7 +189,7 @@ mod tests {
         drop(Store::open(folder.path(), &settings(1)).unwrap());
         let refused = one_line(&Store::open(folder.path(), &settings(2)).unwrap_err());
         assert!(refused.contains("settings.json: made with other settings (seed: expected 2, found 1)"), "{refused}");
-        // A file that was carried in from another evaluation, too.
+        // The same for a file copied from another evaluation.
         let elsewhere = tempfile::tempdir().unwrap();
         Store::open(elsewhere.path(), &settings(3)).unwrap().write("cells/a.json", &7u32).unwrap();
         fs::copy(elsewhere.path().join("cells/a.json"), folder.path().join("cells/a.json")).unwrap();
@@ -211,7 +211,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let _first = Store::open(folder.path(), &settings(1)).unwrap();
         let refused = Store::open(folder.path(), &settings(1)).unwrap_err().to_string();
-        assert!(refused.contains("another evaluation is at work"), "{refused}");
+        assert!(refused.contains("another evaluation is running"), "{refused}");
     }
 
     #[test]
@@ -219,7 +219,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let shared = [1, 2].map(|_| Store::open_shared(folder.path(), &settings(1)).unwrap());
         let refused = Store::open(folder.path(), &settings(1)).unwrap_err().to_string();
-        assert!(refused.contains("another evaluation is at work"), "{refused}");
+        assert!(refused.contains("another evaluation is running"), "{refused}");
         drop(shared);
         let _alone = Store::open(folder.path(), &settings(1)).unwrap();
         assert!(Store::open_shared(folder.path(), &settings(1)).is_err());

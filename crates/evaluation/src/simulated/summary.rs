@@ -1,4 +1,4 @@
-//! The store's records added up, by cell and by model.
+//! Sums of the store's records, by cell and by model.
 
 use std::collections::BTreeMap;
 
@@ -15,18 +15,18 @@ use super::store::Store;
 use super::units::Evaluation;
 use crate::statistics::{Share, wilson_interval};
 
-/// All there is to report of a group of parts. What has not been done yet is missing from the sums, and `remaining` says how
-/// much that is, of all groups.
+/// All results of a group of parts. Remaining units are missing in the sums; `remaining` is their number, for all
+/// groups.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
     pub group: PartGroup,
-    /// What decides the results.
+    /// Settings of the results.
     pub settings: Settings,
-    /// Units of work that are still to do.
+    /// Number of remaining units.
     pub remaining: usize,
-    /// Whether grasps without the check against the demonstration were asked for.
+    /// Whether grasps without the check against the demonstration were requested.
     pub unverified: bool,
-    /// One for each model, in the order asked for.
+    /// One per model, in the order requested.
     pub models: Vec<ModelSummary>,
     /// One for each model on each part.
     pub cells: Vec<CellSummary>,
@@ -36,22 +36,22 @@ pub struct Summary {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ModelSummary {
     pub model: ModelKind,
-    /// The model whose network it reads; itself unless it shares one.
+    /// The model whose network it uses; itself unless it shares one.
     pub network: ModelKind,
-    /// Teachings, and how many led to a model.
+    /// Teachings that gave a model, of all.
     pub taught: Share,
-    /// Samples that the detector saw; median over the parts.
+    /// Number of samples for the detector; median over the parts.
     pub samples: Option<f64>,
-    /// Crops that the orientation CNN saw; `None` for models without.
+    /// Number of crops for the orientation CNN; `None` for models without one.
     pub crops: Option<f64>,
-    /// Median over the parts, wall clock, from the photo to the model.
+    /// Wall-clock time from photo to model; median over the parts.
     pub teaching_secs: Option<f64>,
-    /// The longest of them.
+    /// Maximum over the parts.
     pub longest_teaching_secs: Option<f64>,
     pub largest_bytes: Option<usize>,
     /// With the check against the demonstration.
     pub verified: Figures,
-    /// Without it; `None` for a model that is nothing but the demonstration.
+    /// Without it; `None` for a model that consists only of the demonstration.
     pub alone: Option<Figures>,
 }
 
@@ -60,46 +60,46 @@ pub struct ModelSummary {
 pub struct CellSummary {
     pub model: ModelKind,
     pub object: String,
-    /// How its teaching ended; `None` before it has.
+    /// Outcome of its teaching; `None` before its end.
     pub teaching: Option<TeachingRecord>,
     /// With the check against the demonstration.
     pub verified: Figures,
     pub alone: Option<Figures>,
-    /// Attempts that failed with the check.
+    /// Failed attempts with the check.
     pub failures: Vec<AttemptRecord>,
-    /// Attempts that failed without it.
+    /// Failed attempts without it.
     pub failures_alone: Vec<AttemptRecord>,
 }
 
-/// What was counted and measured.
+/// Counts and measurements.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Figures {
     /// Attempts that held the part.
     pub held: Share,
-    /// Within which shares the true one lies with 95 % confidence (Wilson).
+    /// Its 95 % confidence interval (Wilson).
     pub held_interval: [f64; 2],
-    /// Of all attempts, those held in which both detections came of a first look.
+    /// Attempts held with both detections from a first look, of all attempts.
     pub held_at_first_look: Share,
     /// Failed attempts by the step at which they ended.
     pub failures_by_step: BTreeMap<String, usize>,
-    /// Unseen pictures on which the part was found within 10 mm and 10°.
+    /// Unseen pictures with the part found within 10 mm and 10°.
     pub right: Share,
-    /// Median of the detections' distances to the truth, in millimetres.
+    /// Median of the detections' position errors, in millimetres.
     pub median_mm: Option<f64>,
-    /// What nine in ten do not exceed.
+    /// 90th percentile.
     pub p90_mm: Option<f64>,
-    /// Median of their turns against the truth, in degrees, modulo the part's symmetry.
+    /// Median of their angle errors, in degrees, modulo the part's symmetry.
     pub median_deg: Option<f64>,
-    /// What nine in ten do not exceed.
+    /// 90th percentile.
     pub p90_deg: Option<f64>,
-    /// Pictures without the part on which it was seen all the same.
+    /// Pictures without the part in which something was accepted.
     pub false_alarms: Share,
-    /// Images a second, with the machine to itself.
+    /// Images per second without other load on the machine.
     pub frames_per_second: Option<f64>,
 }
 
 impl Figures {
-    /// Of all attempts, those held in which the camera looked again at least once.
+    /// Attempts held after at least one further look, of all attempts.
     pub fn held_after_further_looks(&self) -> Share {
         Share { count: self.held.count - self.held_at_first_look.count, of: self.held.of }
     }
@@ -109,7 +109,7 @@ impl Figures {
 #[derive(Default)]
 struct Gathered {
     attempts: Vec<AttemptRecord>,
-    /// `None` where there was no model to ask.
+    /// `None` if there was no model.
     present: Vec<Option<DetectionRecord>>,
     absent: Vec<DetectionRecord>,
     secs: Vec<f64>,
@@ -153,10 +153,11 @@ impl Gathered {
 }
 
 impl Summary {
-    /// Adds up what is in the store, the paper's parts and the held-out ones apart; a group without parts is missing.
+    /// Sums the results in the store, separately for the paper's parts and the held-out ones; groups without parts are
+    /// missing.
     ///
     /// # Errors
-    /// Records that cannot be read.
+    /// Records cannot be read.
     pub fn collect(evaluation: &Evaluation) -> Result<Vec<Self>> {
         let has_part = |group: &PartGroup| evaluation.objects.iter().any(|part| PartGroup::of(&part.name) == *group);
         PartGroup::ALL.into_iter().filter(has_part).map(|group| Self::of_group(evaluation, group)).collect()
@@ -231,7 +232,7 @@ fn model_summary(model: ModelKind, teachings: &[TeachingRecord], [verified, alon
     }
 }
 
-/// What a cell did in one way. Where teaching failed, every attempt failed at it and every part was missed.
+/// Results of a cell in one way. If teaching failed, every attempt counts as failed and every part as missed.
 fn gather(cell: Cell, verification: Verification, attempted: bool, store: &Store) -> Result<Gathered> {
     let settings = store.settings();
     let attempts = if attempted { settings.attempts as usize } else { 0 };
@@ -339,7 +340,7 @@ mod tests {
         assert_eq!(model.verified.right, Share { count: 1, of: 4 });
         assert_eq!(model.verified.median_mm, Some(15.5));
         assert_eq!(model.verified.false_alarms, Share { count: 0, of: 2 });
-        // Alone, the first is refused, so that only the second's error counts.
+        // Without the check, the first is refused, so only the second's error counts.
         let alone = model.alone.as_ref().unwrap();
         assert_eq!((alone.right, alone.median_deg), (Share { count: 1, of: 4 }, Some(9.0)));
         assert_eq!(alone.false_alarms, Share { count: 1, of: 2 });

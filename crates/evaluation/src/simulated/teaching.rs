@@ -1,4 +1,4 @@
-//! A network is taught on a part and kept.
+//! Teaches a network on a part and stores it.
 
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -20,21 +20,21 @@ use super::records::{LOSS_STEPS, TeachingRecord};
 use super::store::Store;
 use crate::shipped;
 
-/// Where and how networks are taught.
+/// Settings for teaching networks.
 pub(super) struct Teaching<'a> {
-    /// What is taught is kept here.
+    /// The store for the networks.
     pub store: &'a Store,
-    /// Network, training and augmentation: what the store's settings name.
+    /// Network, training and augmentation, as named in the store's settings.
     pub preset: Preset,
-    /// How many units run side by side.
+    /// Number of units that run in parallel.
     pub jobs: usize,
 }
 
 impl Teaching<'_> {
-    /// Teaches a cell's network and keeps it; in words what came of it, `None` when it was interrupted.
+    /// Teaches a cell's network and stores it; returns the result in words, `None` if interrupted.
     ///
     /// # Errors
-    /// Files that cannot be written. A teaching that leads to no model is a result.
+    /// Files cannot be written. A teaching without a model is a result.
     pub(super) fn teach(
         &self,
         cell: Cell,
@@ -61,7 +61,7 @@ impl Teaching<'_> {
         options.steps = settings.steps.map(|steps| steps as usize);
         options.time_budget = settings.time_budget.map(|secs| Duration::from_secs(secs.into()));
         options.lengths = lengths;
-        // An interrupted teaching keeps the best network so far, which would not be the one of an uninterrupted run.
+        // An interrupted teaching keeps the best network so far, which would differ from that of an uninterrupted run.
         let mut interrupted = false;
         let mut observe = |_: &TeachingEvent| {
             interrupted |= is_interrupted();
@@ -74,7 +74,7 @@ impl Teaching<'_> {
         let (record, summary) = match taught {
             Ok(taught) => {
                 let bytes = taught.model.to_bytes()?;
-                // The record last: it says that the model is whole.
+                // The record is written last: it states that the model is complete.
                 self.store.write_bytes(&cell.model_file(marks), &bytes)?;
                 let facts = taught.model.facts().clone();
                 let summary = facts.validation.map_or("nothing to train".to_owned(), |validation| {
@@ -106,7 +106,7 @@ fn in_plan_view(object: &ObjectSpec, shipped: Demonstration) -> Result<(Demonstr
     Ok((seen.remove(0), lengths))
 }
 
-/// The curve of a teaching, coarse enough to keep.
+/// The loss curve of a teaching, reduced for storage.
 fn mean_losses(history: &History) -> Vec<f64> {
     let mean = |steps: &[StepRecord]| steps.iter().map(|step| step.losses.total()).sum::<f64>() / steps.len() as f64;
     history.steps.chunks(LOSS_STEPS).map(mean).collect()

@@ -1,4 +1,4 @@
-//! The units of work of the protocol: which there are and what each waits for. `work.rs` does them.
+//! The work units of the protocol and their dependencies. `work.rs` runs them.
 
 use anyhow::Result;
 use sdg_grasp::{ModelKind, Preset, Verification};
@@ -8,37 +8,37 @@ use super::cell::{Cell, Marks};
 use super::schedule::Task;
 use super::store::Store;
 
-/// What is kept or lost as a whole.
+/// A piece of work that is stored or lost as a whole.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Unit<'a> {
     /// A network is taught on a part.
     Teach(Cell<'a>),
-    /// All models look at a part's pictures: each picture is drawn once.
+    /// All models search a part's pictures: each picture is rendered once.
     Look(&'a ObjectSpec),
-    /// A model grasps a part; kept attempt by attempt.
+    /// A model grasps a part; stored attempt by attempt.
     Attempts(Cell<'a>, &'a ObjectSpec, Verification),
 }
 
-/// Models, parts, and the folder for what becomes of them.
+/// Models, parts, and the folder for the results.
 pub struct Evaluation<'a> {
     pub models: &'a [ModelKind],
     pub objects: &'a [ObjectSpec],
-    /// Network, training and augmentation: what the store's settings name.
+    /// Network, training and augmentation, as named in the store's settings.
     pub preset: Preset,
     pub store: &'a Store,
     /// Whether every grasp is also tried without the check against the demonstration.
     pub unverified: bool,
-    /// Units side by side.
+    /// Number of parallel units.
     pub jobs: usize,
 }
 
 impl Evaluation<'_> {
-    /// How many units are not in the store yet.
+    /// Number of units that are not in the store yet.
     pub fn remaining(&self) -> Result<usize> {
         Ok(self.tasks()?.len() + self.without_speed()?.len())
     }
 
-    /// With the check against the demonstration; and without it where that is asked for.
+    /// With the check against the demonstration; and without it if requested.
     fn ways(&self, model: ModelKind) -> impl Iterator<Item = Verification> {
         let alone = self.unverified && model.has_network();
         std::iter::once(Verification::ByShape).chain(alone.then_some(Verification::Off))
@@ -48,8 +48,8 @@ impl Evaluation<'_> {
         self.models.iter().map(|&model| Cell { model, object: &object.name })
     }
 
-    /// What is not in the store yet, part by part, so that an interrupted evaluation has whole parts to show. Attempts
-    /// without the check come last of all.
+    /// The remaining units, part by part, so that an interrupted evaluation has results of complete parts. Attempts
+    /// without the check come last.
     pub(super) fn tasks(&self) -> Result<Vec<Task<Unit<'_>>>> {
         let (store, mut tasks, mut last) = (self.store, Vec::<Task<Unit>>::new(), Vec::new());
         for object in self.objects {
@@ -90,7 +90,7 @@ impl Evaluation<'_> {
         Ok(tasks)
     }
 
-    /// Not so once its teaching has failed: then there is nothing left to do for it.
+    /// False once its teaching has failed: no work is left for it.
     fn is_usable(&self, cell: Cell) -> Result<bool> {
         Ok(!cell.is_without_model(Marks::Shipped, self.store)?)
     }
@@ -156,7 +156,7 @@ mod tests {
             ]
         );
 
-        // What is there is not done again; a part whose teaching failed needs nothing more.
+        // Finished units are not done again; a part whose teaching failed needs no more work.
         let failed = TeachingRecord::Failed { why: "nothing learnt".into() };
         store.write("cells/C-pendulum.teaching.json", &failed).unwrap();
         let attempt = |number| AttemptRecord::failed(number, "detect", "not found".into());

@@ -1,4 +1,4 @@
-//! An evaluation in small, and some axes of pictures and errors in small, in the simulator: model S, which is taught at once,
+//! A small evaluation, and some small axes of pictures and errors, in the simulator: model S, which is taught at once,
 //! on one part.
 
 use std::fs;
@@ -38,7 +38,7 @@ fn settings() -> Settings {
     }
 }
 
-/// Opens the folder as a process of its own would, goes on until it is interrupted, and adds up what there is.
+/// Opens the folder like a separate process, continues until it is interrupted, and sums the results.
 fn go_on(folder: &Path, is_interrupted: &(dyn Fn() -> bool + Sync)) -> Summary {
     let store = Store::open(folder, &settings()).unwrap();
     let evaluation = Evaluation {
@@ -58,7 +58,7 @@ fn go_on(folder: &Path, is_interrupted: &(dyn Fn() -> bool + Sync)) -> Summary {
     summary
 }
 
-/// Without what differs from run to run.
+/// Without values that differ between runs.
 fn timeless(mut summary: Summary) -> Summary {
     for model in &mut summary.models {
         (model.teaching_secs, model.longest_teaching_secs) = (None, None);
@@ -83,7 +83,7 @@ fn an_interrupted_evaluation_goes_on_to_the_same_tables() {
     assert_eq!((model.taught.count, model.verified.held.of, model.verified.right.of), (1, 2, 2));
     assert_eq!(model.verified.false_alarms.of, 2);
     assert!(model.alone.is_none() && model.verified.frames_per_second.unwrap() > 0.0);
-    // A search or a robot that breaks shows here.
+    // A broken search or robot shows here.
     assert!(model.verified.held.count > 0 && model.verified.right.count > 0, "{model:?}");
     assert_eq!(model.verified.false_alarms.count, 0);
 
@@ -99,15 +99,15 @@ fn an_interrupted_evaluation_goes_on_to_the_same_tables() {
 
     let resumed = go_on(broken.path(), &|| false);
     assert_eq!(timeless(resumed.clone()), timeless(whole));
-    // What was there was kept, its times too: nothing was done twice.
+    // Existing results were kept, with their times: nothing was done twice.
     let record: serde_json::Value = serde_json::from_slice(&read(ATTEMPTS)).unwrap();
     assert_eq!(&record["record"]["attempts"][0], first_attempt);
     assert_eq!(read(MODEL), model_file);
-    // Once more there is nothing to do, and every number stands.
+    // A further run has nothing to do, and every number is unchanged.
     assert_eq!(go_on(broken.path(), &|| panic!("asked of work that there is none of")), resumed);
 }
 
-/// Goes on with some axes as a process of its own would, and adds up what there is.
+/// Continues with some axes like a separate process, and sums the results.
 fn go_on_with_axes(folder: &Path, names: &[&str], is_interrupted: &(dyn Fn() -> bool + Sync)) -> AxesSummary {
     let store = Store::open(folder, &settings()).unwrap();
     let names: Vec<String> = names.iter().map(|name| (*name).to_owned()).collect();
@@ -157,11 +157,11 @@ fn interrupted_axes_go_on_and_share_the_teaching() {
     );
     assert_eq!((grasps[0].condition, grasps[0].held.of), (GraspCondition::MarkHeight, 2));
     assert!(whole.seconds.pictures > 0.0 && whole.seconds.grasps > 0.0);
-    // Once more there is nothing to do.
+    // A further run has nothing to do.
     assert_eq!(go_on_with_axes(folder.path(), &NAMES, &|| panic!("asked of work that there is none of")), whole);
 }
 
-/// Goes on with some sets of the cameras' pictures, and adds up what there is.
+/// Continues with some sets of the cameras' pictures, and sums the results.
 fn go_on_with_cameras(folder: &Path, is_interrupted: &(dyn Fn() -> bool + Sync)) -> CamerasSummary {
     let store = Store::open(folder, &settings()).unwrap();
     let sets: Vec<PictureSet> = PictureSet::all()
@@ -195,7 +195,7 @@ fn interrupted_cameras_go_on_and_are_exact() {
     assert!(of("webcam").errors.unwrap().p95_mm < 3.0, "{:?}", of("webcam"));
     assert_eq!((of("other-sizes").accepted, of("other-sizes").found.of), (Share { count: 0, of: 2 }, 0));
     assert!(cameras::page(&whole, &[], "sdg evaluate --cameras").to_html().is_ok());
-    // What is there is not done again.
+    // Finished units are not done again.
     let again = go_on_with_cameras(folder.path(), &|| panic!("asked of work that there is none of"));
     assert_eq!(again.sets, whole.sets);
 }

@@ -1,4 +1,4 @@
-//! How the units of work of the protocol are done.
+//! Runs the work units of the protocol.
 
 use std::ops::ControlFlow;
 
@@ -19,14 +19,14 @@ use crate::progress::Progress;
 use crate::rehearsal::{Rehearsal, RehearsalErrors};
 use crate::trial::try_view;
 
-/// Pictures on which speed is measured, for each part.
+/// Number of pictures on which speed is measured, for each part.
 const SPEED_VIEWS: usize = 3;
 
 impl Evaluation<'_> {
-    /// Does what is not in the store yet; breaks when `is_interrupted` says so, with everything kept that has ended.
+    /// Runs the remaining units; breaks if `is_interrupted` returns true, and keeps all finished units.
     ///
     /// # Errors
-    /// Files that cannot be read or written, and errors of the simulator itself. A teaching that fails is a result.
+    /// Files cannot be read or written, or the simulator fails. A failed teaching is a result.
     pub fn run(&self, is_interrupted: &(dyn Fn() -> bool + Sync), progress: &dyn Progress) -> Result<ControlFlow<()>> {
         let tasks = self.tasks()?;
         let without_speed = self.without_speed()?;
@@ -58,7 +58,7 @@ impl Evaluation<'_> {
         }
     }
 
-    /// Shows every model of a part that has not seen them the same pictures.
+    /// Runs all models that have not been run yet on the same pictures of a part.
     fn look(&self, object: &ObjectSpec, is_interrupted: &(dyn Fn() -> bool + Sync)) -> Result<Option<String>> {
         let settings = self.store.settings();
         let mut looks = Vec::new();
@@ -106,7 +106,7 @@ impl Evaluation<'_> {
         Ok(Some(if summary.is_empty() { NO_MODEL.to_owned() } else { summary.join("; ") }))
     }
 
-    /// Goes on with a cell's attempts.
+    /// Continues a cell's attempts.
     fn attempt(
         &self,
         cell: Cell,
@@ -131,7 +131,7 @@ impl Evaluation<'_> {
         Ok(attempts.map(|attempts| held_of(&attempts)))
     }
 
-    /// Times detections with nothing of ours beside them, on all cores.
+    /// Measures the time of detections on all cores, without other work of this process.
     pub(super) fn measure_speed(&self, object: &ObjectSpec, cores: usize) -> Result<()> {
         let seed = picture_seed(self.store.settings().seed, object, 0);
         let pictures: Vec<TestView> = test_views(object, true, SPEED_VIEWS, seed).collect::<Result<_, _>>()?;
@@ -141,7 +141,7 @@ impl Evaluation<'_> {
             }
             let Some(model) = cell.read_model(Marks::Shipped, self.store)? else { continue };
             let timed = |verification: Verification| -> Result<Vec<f64>> {
-                // The first one packs weights and fills caches.
+                // The first detection packs weights and fills caches.
                 model.detect(&pictures[0].view.image, verification)?;
                 pictures.iter().map(|seen| Ok(try_view(&model, object, seen, verification)?.seconds)).collect()
             };

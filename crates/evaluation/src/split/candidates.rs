@@ -1,4 +1,4 @@
-//! Every candidate with what it is by the truth, a JSON line each: to study what accepts and refuses.
+//! Every candidate with its class by the ground truth, as JSON lines, for the analysis of acceptance.
 
 use anyhow::Result;
 use sdg_grasp::{DetectionRecord, GraspDetection, ModelKind};
@@ -8,11 +8,12 @@ use super::file::Side;
 use super::run::{Measured, SetRun, kind_of};
 use crate::labelled_pictures::{HitError, Tested, judge};
 
-/// A candidate farther from every instance than this is not on the part, in diagonals of the instance. Chosen by hand: a part
-/// does not reach farther from the middle of its grasp than a diagonal, and few reach half as far.
+/// Maximum distance of a candidate from an instance on which it is, in diagonals of the instance. Chosen by hand: no
+/// part extends farther from the middle of its grasp than a diagonal, and few extend half as far.
 const MAX_ON_PART_DIAGONALS: f64 = 0.5;
 
-/// Where a candidate is by the nearest instance, optional or not, whether or not another candidate hits it, too.
+/// The class of a candidate relative to the nearest instance, optional or not, whether or not another candidate hits it
+/// too.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 enum Place {
@@ -22,11 +23,11 @@ enum Place {
     WrongTurn,
     /// On the part, but not within the distance of a hit.
     Misplaced,
-    /// On anything else.
+    /// Elsewhere.
     Wrong,
 }
 
-/// What a candidate takes from the others.
+/// The instance that a candidate takes from later ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 enum Hit {
@@ -34,7 +35,7 @@ enum Hit {
     Optional,
 }
 
-/// A line.
+/// One line of the output.
 #[derive(Serialize)]
 struct Candidate<'a> {
     set: &'a str,
@@ -44,9 +45,9 @@ struct Candidate<'a> {
     image: String,
     kind: &'a str,
     place: Place,
-    /// One to one, the best score first; null for a second candidate on an instance.
+    /// Matched one to one, best score first; null for a second candidate on an instance.
     hit: Option<Hit>,
-    /// From the nearest instance, in percent of its diagonal; null on pictures without.
+    /// Distance from the nearest instance, in percent of its diagonal; null in pictures without one.
     distance_percent: Option<f64>,
     turn_deg: Option<f64>,
     #[serde(flatten)]
@@ -56,7 +57,7 @@ struct Candidate<'a> {
 /// The lines of all candidates of a model.
 ///
 /// # Errors
-/// None in practice: every record can be written.
+/// None in practice: every record can be serialised.
 pub fn candidates(measured: &Measured) -> Result<String> {
     let mut lines = String::new();
     for run in &measured.runs {

@@ -5,21 +5,21 @@ use serde::Serialize;
 use crate::labelled_pictures::{DEFAULT_MIN_SCORE, Judged, Tested, Totals, judge};
 use crate::statistics::Share;
 
-/// Found, wrong and false alarms with the score of `sdg detect`.
+/// Found, wrong and false alarms at the minimum score of `sdg detect`.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct Counts {
-    /// Parts found, of those that must be.
+    /// Parts found, of those that must be found.
     pub found: Share,
-    /// Detections that hit nothing, of those accepted on pictures with the part.
+    /// Detections without a hit, of those accepted in pictures with the part.
     pub wrong: Share,
-    /// Pictures without the part on which something is accepted.
+    /// Pictures without the part in which something is accepted.
     pub false_alarms: Share,
 }
 
 /// A figure of the counts.
 pub(super) type Figure = fn(&Counts) -> Share;
 
-/// The figures that sides are compared by.
+/// The figures for comparing sides.
 pub(super) const FIGURES: [(&str, Figure); 3] = [
     ("parts found", |counts| counts.found),
     ("wrong, of accepted detections", |counts| counts.wrong),
@@ -38,7 +38,7 @@ impl Counts {
         }
     }
 
-    /// As one line; a dash where nothing was counted.
+    /// On one line; a dash if nothing was counted.
     pub fn in_words(&self) -> String {
         let found = format!("{} found, {} wrong", self.found, self.wrong.count);
         let false_alarms = format!("{} false alarms", self.false_alarms);
@@ -47,7 +47,7 @@ impl Counts {
         if told.is_empty() { "–".to_owned() } else { told.join("; ") }
     }
 
-    /// The lower of found and the higher of wrong and false alarms, each by itself.
+    /// The lower of found and the higher of wrong and false alarms, each separately.
     pub fn worse_of(self, other: Self) -> Self {
         let count = |share: &Share| share.count;
         Self {

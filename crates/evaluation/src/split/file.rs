@@ -6,18 +6,18 @@ use anyhow::{Result, anyhow, bail};
 use sdg_geometry::RotationalSymmetry;
 use serde::{Deserialize, Serialize};
 
-/// Larger files are no lists of sets.
+/// Maximum size of a split's file.
 const MAX_SPLIT_BYTES: u64 = 1 << 20;
 
-/// What a set's results may be used for.
+/// The permitted use of a set's results.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Side {
     /// Constants may be fitted on it.
     Tuned,
-    /// Its results were known when earlier constants were chosen; nothing may be fitted on it any more.
+    /// Its results were known when earlier constants were chosen; it may no longer be used for fitting.
     Used,
-    /// It is reported, and nothing is fitted on it.
+    /// It is reported, and no constant is fitted on it.
     Reported,
 }
 
@@ -41,11 +41,11 @@ impl Side {
 pub struct SplitSet {
     pub name: String,
     pub side: Side,
-    /// Its folder, below the one of `--sets`.
+    /// Its folder, relative to that of `--sets`.
     pub folder: PathBuf,
-    /// The photo in it to teach from, with the marks beside it.
+    /// The photo in it for teaching, with marks beside it.
     pub demo: String,
-    /// The part's turns that look alike.
+    /// The part's equivalent turns.
     #[serde(default)]
     pub symmetry: RotationalSymmetry,
 }
@@ -59,7 +59,8 @@ struct SplitFile {
 /// Reads the sets of a split's file.
 ///
 /// # Errors
-/// A file that cannot be read, an unknown side or field, two sets of one name, a symmetry of fewer than two turns.
+/// The file cannot be read, has an unknown side or field, two sets with one name, or a symmetry of fewer than two
+/// turns.
 pub fn read_split(path: &Path) -> Result<Vec<SplitSet>> {
     let bytes = sdg_files::read(path, MAX_SPLIT_BYTES)?;
     let text = String::from_utf8(bytes).map_err(|error| anyhow!("{}: expected UTF-8: {error}", path.display()))?;

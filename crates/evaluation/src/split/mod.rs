@@ -1,4 +1,5 @@
-//! A split of test sets into those that constants may be fitted on and those that are only reported, both measured alike.
+//! A split of test sets into those on which constants may be fitted and those that are only reported, all measured in
+//! the same way.
 //!
 //! ```text
 //! split file ─ SplitSet ─ ReadySet: demonstration, truth ─ teach, detect ─ SetRun ─ Measured: of one model, all seeds
@@ -6,8 +7,8 @@
 //!                                                    tables, JSON, a line a candidate ─┘
 //! ```
 //!
-//! A **side** is one of tuned, used and reported. **Wrong** is a detection on a picture with the part that hits nothing, out of all
-//! that are accepted there; a **false alarm** is a picture without the part on which anything is accepted.
+//! A **side** is one of tuned, used and reported. **Wrong** is the share of detections without a hit among those
+//! accepted in pictures with the part; a **false alarm** is a picture without the part in which something is accepted.
 
 mod candidates;
 mod counts;

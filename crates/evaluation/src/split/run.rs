@@ -1,4 +1,4 @@
-//! A set taught from its demonstration, and the model run on its pictures.
+//! Teaches a set from its demonstration, and runs the model on its pictures.
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -22,11 +22,11 @@ pub struct ReadySet {
     demonstration: Demonstration,
 }
 
-/// What a model made of a set.
+/// Results of a model on a set.
 pub struct SetRun {
     pub set: SplitSet,
     pub seed: u64,
-    /// How long the teaching took.
+    /// Duration of the teaching.
     pub teach_secs: f64,
     pub tested: Vec<Tested>,
 }
@@ -38,17 +38,17 @@ pub struct Measured {
     pub runs: Vec<SetRun>,
 }
 
-/// The kind of a picture: the labels' or, where they name none, whether the part is on it.
+/// The kind of a picture: from the labels or, if they name none, whether the part is in it.
 pub(super) fn kind_of(tested: &Tested) -> &str {
     let unnamed = if tested.truths.is_empty() { "without part" } else { "with part" };
     tested.picture.kind.as_deref().unwrap_or(unnamed)
 }
 
 impl ReadySet {
-    /// Reads what can be wrong with a set, before any minute is spent on teaching.
+    /// Reads and checks the files of a set, before any time is spent on teaching.
     ///
     /// # Errors
-    /// A folder that is not there; a demonstration or a `truth.json` that cannot be used.
+    /// The folder does not exist, or the demonstration or the `truth.json` is invalid.
     pub fn open(set: SplitSet, sets: &Path) -> Result<Self> {
         let folder = sets.join(&set.folder);
         if !folder.is_dir() {
@@ -72,10 +72,10 @@ impl ReadySet {
         &self.demonstration
     }
 
-    /// Teaches a model as `sdg teach` does by default, and runs it on the set's pictures as `sdg detect` does.
+    /// Teaches a model with the defaults of `sdg teach`, and runs it on the set's pictures like `sdg detect`.
     ///
     /// # Errors
-    /// Errors of teaching and of detection; pictures and labels that cannot be read.
+    /// Teaching or detection fails; pictures or labels cannot be read.
     pub fn run(&self, model: ModelKind, seed: u64) -> Result<SetRun> {
         let named = || format!("{}, model {model}, seed {seed}", self.set.name);
         let mut options = TeachOptions::new(seed);
@@ -94,14 +94,14 @@ impl ReadySet {
 }
 
 impl SetRun {
-    /// What came of it, as one line.
+    /// The result on one line.
     pub fn in_words(&self) -> String {
         Counts::of(&self.tested).in_words()
     }
 }
 
 impl Measured {
-    /// The worst figures of all seeds, each by itself, on the pictures that the filter takes.
+    /// The worst figures of all seeds, each separately, on the pictures selected by the filter.
     pub fn worst(&self, takes: impl Fn(&SetRun, &Tested) -> bool) -> Counts {
         let of_seed = |seed: &u64| {
             let runs = self.runs.iter().filter(|run| run.seed == *seed);
@@ -110,7 +110,7 @@ impl Measured {
         self.seeds.iter().map(of_seed).reduce(Counts::worse_of).unwrap_or_default()
     }
 
-    /// Pictures that the detector took a second for; `None` without pictures.
+    /// Pictures per second; `None` without pictures.
     pub fn pictures_per_second(&self) -> Option<f64> {
         let tested = || self.runs.iter().flat_map(|run| &run.tested);
         let seconds: f64 = tested().map(|tested| tested.seconds).sum();

@@ -1,4 +1,4 @@
-//! The figures for other programs.
+//! The figures as JSON.
 
 use serde_json::{Value, json};
 
@@ -8,7 +8,8 @@ use super::run::{Measured, SetRun};
 use crate::labelled_pictures::{DEFAULT_MIN_SCORE, Tested, by_kind_json, by_min_score};
 use crate::statistics::{newcombe_interval, wilson_interval};
 
-/// A model as one object: each seed with its sets and sides, the worst of all seeds, and tuned less reported of it.
+/// A model as one object: each seed with its sets and sides, the worst of all seeds, and the difference of tuned and
+/// reported.
 pub fn summary(measured: &Measured, sides: &[Side]) -> Value {
     let worst = |side: Side| measured.worst(|run, _| run.set.side == side);
     let of_seed = |seed: &u64| {

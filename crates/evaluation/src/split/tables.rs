@@ -1,4 +1,4 @@
-//! The figures as tables in Markdown: sets, kinds of pictures, and the sides beside each other.
+//! The figures as tables in Markdown: sets, kinds of pictures, and the sides.
 
 use sdg_report::{Cell, Column, Table};
 
@@ -7,7 +7,7 @@ use super::file::Side;
 use super::run::{Measured, kind_of};
 use crate::statistics::{Share, newcombe_interval, wilson_interval};
 
-/// The kinds of all pictures, in the order in which they appear.
+/// The kinds of all pictures, in order of first appearance.
 fn kinds(measured: &Measured) -> Vec<&str> {
     let mut kinds = Vec::new();
     for kind in measured.runs.iter().flat_map(|run| run.tested.iter().map(kind_of)) {
@@ -18,7 +18,7 @@ fn kinds(measured: &Measured) -> Vec<&str> {
     kinds
 }
 
-/// Everything about a model; of several seeds the worst of each figure.
+/// All tables of a model; with several seeds, the worst of each figure.
 pub fn tables(measured: &Measured, sides: &[Side]) -> String {
     let seeds: Vec<String> = measured.seeds.iter().map(u64::to_string).collect();
     let seeds = match seeds.as_slice() {
@@ -65,7 +65,7 @@ fn of_kinds(measured: &Measured, sides: &[Side]) -> Table {
     table
 }
 
-/// Each side with Wilson's intervals, and where both are measured the difference of tuned and reported with Newcombe's.
+/// Each side with Wilson's intervals, and if both are measured, the difference of tuned and reported with Newcombe's.
 fn of_sides(measured: &Measured, sides: &[Side]) -> Table {
     let has_both = [Side::Tuned, Side::Reported].iter().all(|side| sides.contains(side));
     let mut table = with_sides("95 % intervals", sides, has_both.then_some("tuned − reported"));
@@ -91,7 +91,7 @@ fn with_interval(share: Share) -> String {
     share.percent().map_or("–".to_owned(), |percent| format!("{share}: {percent:.1} % ({low:.1} to {high:.1})"))
 }
 
-/// In percentage points; beyond chance where the interval does not hold zero.
+/// In percentage points; significant if the interval does not contain zero.
 fn difference(tuned: Share, reported: Share) -> String {
     let (Some(one), Some(other)) = (tuned.percent(), reported.percent()) else { return "–".to_owned() };
     let [low, high] = newcombe_interval(tuned, reported);

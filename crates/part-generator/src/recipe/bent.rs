@@ -11,7 +11,7 @@ use super::material::Material;
 use super::shape::Shape;
 use crate::random::Draw;
 
-/// Thinnest wire: its radius over the part's size. In a photo thinner ones fall apart into pieces.
+/// Minimum radius of a wire as a share of the part's size: in a photo, thinner ones break into pieces.
 const MIN_WIRE_SHARE: f32 = 0.018;
 
 /// Draws a bent wire or tube with straight legs, eyes, sleeves and fittings, or a coil.
@@ -101,7 +101,7 @@ fn bends(size: f32, radius: f32, rng: &mut Pcg64Mcg) -> Vec<[f32; 3]> {
     points
 }
 
-/// Where the line comes near an earlier strand it climbs over it.
+/// Where the line approaches an earlier strand, it is raised over it.
 fn lift_crossings(points: &mut [[f32; 3]], radius: f32) {
     for i in 2..points.len() {
         let clash = (0..i - 1).any(|j| {
@@ -131,7 +131,7 @@ fn coil(size: f32, radius: f32, rng: &mut Pcg64Mcg) -> Vec<[f32; 3]> {
     points
 }
 
-/// Centres the line and limits its size.
+/// Centres the line and bounds its size.
 fn fit(points: &mut [[f32; 3]], size: f32) {
     let (mut low, mut high) = ([f32::MAX; 2], [f32::MIN; 2]);
     for p in points.iter() {

@@ -1,4 +1,4 @@
-//! Puts features together and finds room for the next one.
+//! Collects features, and finds free space for the next one.
 
 use rand_pcg::Pcg64Mcg;
 
@@ -8,17 +8,17 @@ use super::material::Material;
 use super::shape::Shape;
 use crate::random::Draw;
 
-/// A recipe in the making.
+/// A recipe under construction.
 pub(super) struct Builder {
     materials: Vec<Material>,
     features: Vec<Feature>,
-    /// Circles that later features keep clear of: x, y, radius.
+    /// Circles that later features must avoid: x, y, radius.
     taken: Vec<[f32; 3]>,
     group: u16,
 }
 
 impl Builder {
-    /// A recipe whose body is of `material`.
+    /// A recipe with a body of `material`.
     pub fn new(material: Material) -> Self {
         Self { materials: vec![material], features: Vec::new(), taken: Vec::new(), group: 0 }
     }
@@ -29,12 +29,12 @@ impl Builder {
         (self.materials.len() - 1) as u8
     }
 
-    /// Features from here on belong to a group of their own, which can move.
+    /// Starts a new group of features that can be moved together.
     pub fn next_group(&mut self) {
         self.group += 1;
     }
 
-    /// Adds a feature to the present group.
+    /// Adds a feature to the current group.
     pub fn push(&mut self, shape: Shape, center: [f32; 2], turn: f32, operation: Operation, material: u8) {
         self.features.push(Feature { shape, center, turn, operation, material, group: self.group });
     }
@@ -49,25 +49,25 @@ impl Builder {
         self.push(shape, center, turn, Operation::Cut { floor, chamfer, machined: false }, material);
     }
 
-    /// The surface above a point as it stands.
+    /// The current surface above a point.
     pub fn state_at(&self, x: f32, y: f32) -> State {
         let mut state = State::EMPTY;
         self.features.iter().for_each(|feature| feature.prepare().apply(x, y, &mut state));
         state
     }
 
-    /// Keeps later features out of a circle.
+    /// Reserves a circle, which later features avoid.
     pub fn take(&mut self, center: [f32; 2], radius: f32) {
         self.taken.push([center[0], center[1], radius]);
     }
 
-    /// The box around what was added.
+    /// The bounding box of everything added.
     pub fn bounds(&self) -> [f32; 4] {
         let whole = Recipe { materials: Vec::new(), features: self.features.clone(), grain_seed: 0 };
         whole.bounds()
     }
 
-    /// A random place with level ground of `radius` around it that no other feature has taken; it is taken then.
+    /// A random free place on level ground of `radius`, which is reserved.
     pub fn room(&mut self, radius: f32, rng: &mut Pcg64Mcg) -> Option<[f32; 2]> {
         let b = self.bounds();
         for _ in 0..40 {
@@ -80,7 +80,7 @@ impl Builder {
         None
     }
 
-    /// Whether a circle lies on level ground that no feature has taken.
+    /// Whether a circle is on level ground and free.
     pub fn is_free(&self, center: [f32; 2], radius: f32) -> bool {
         let clear = self.taken.iter().all(|&[x, y, taken]| (x - center[0]).hypot(y - center[1]) > taken + radius + 0.3);
         if !clear {
@@ -97,7 +97,7 @@ impl Builder {
             })
     }
 
-    /// A few lines of marks that look like print, in a frame of `half` around `center`.
+    /// A few lines of marks that look like print, in a frame with half size `half` around `center`.
     pub fn print(&mut self, center: [f32; 2], turn: f32, half: [f32; 2], material: u8, rng: &mut Pcg64Mcg) {
         let (sin, cos) = turn.sin_cos();
         let lines = rng.whole(1, 3);

@@ -26,7 +26,7 @@ pub(super) fn draw_cast(rng: &mut Pcg64Mcg) -> Recipe {
     let fillet = size * rng.uniform(0.02, 0.05);
     let blend = |top: f32, edge: Edge| Operation::Blend { top, edge, fillet };
 
-    // The body: two to four masses along a crooked spine.
+    // The body: two to four masses along a bent spine.
     let masses = rng.whole(2, 4);
     let mut centers: Vec<[f32; 2]> = Vec::new();
     for k in 0..masses {
@@ -125,7 +125,7 @@ pub(super) fn draw_moulded(rng: &mut Pcg64Mcg) -> Recipe {
             builder.add(Shape::Rectangle { half: [half_x, half_y], corner }, [0.0; 2], 0.0, top, round, 0);
         }
         1 => {
-            // A grip that widens.
+            // A handle that widens.
             let wide = half_y * rng.uniform(0.4, 0.9);
             let waist = rng.uniform(-0.3, 0.3) * half_x;
             let vertices = vec![
@@ -139,7 +139,7 @@ pub(super) fn draw_moulded(rng: &mut Pcg64Mcg) -> Recipe {
             builder.add(Shape::Polygon { vertices, corner: 0.12 * half_y }, [0.0; 2], 0.0, top, round, 0);
         }
         2 => {
-            // A bent arm: a thick round-edged path.
+            // A bent arm: a thick path with rounded edges.
             let knee = [rng.uniform(-0.3, 0.3) * half_x, rng.uniform(-1.0, 1.0) * half_y, 0.0];
             let points = vec![[-half_x, 0.0, 0.0], knee, [half_x, rng.uniform(-1.0, 1.0) * half_y, 0.0]];
             let radius = size * rng.uniform(0.06, 0.13);
@@ -157,7 +157,7 @@ pub(super) fn draw_moulded(rng: &mut Pcg64Mcg) -> Recipe {
         }
     }
     if rng.chance(0.45) {
-        // A tray: the middle is recessed, with ribs left standing.
+        // A tray: the middle is recessed, except for ribs.
         builder.next_group();
         let floor = top * rng.uniform(0.2, 0.7);
         let half = [half_x * rng.uniform(0.3, 0.6), half_y * rng.uniform(0.4, 0.7)];

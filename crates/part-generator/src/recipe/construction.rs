@@ -3,7 +3,7 @@
 use super::feature::{Feature, Prepared};
 use super::material::Material;
 
-/// The construction tree of a part: what it is made of and how, in millimetres.
+/// The construction tree of a part: its materials and features, in millimetres.
 ///
 /// The part's frame has x right, y down as seen from above, z up from the table.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,12 +17,12 @@ pub(crate) struct Recipe {
 }
 
 impl Recipe {
-    /// The features, ready to be applied to many points.
+    /// The features, prepared for application to many points.
     pub fn prepare(&self) -> Vec<Prepared<'_>> {
         self.features.iter().map(Feature::prepare).collect()
     }
 
-    /// Smallest box around everything that features add: [min x, min y, max x, max y].
+    /// Bounding box of everything that features add: [min x, min y, max x, max y].
     pub fn bounds(&self) -> [f32; 4] {
         self.features.iter().filter(|feature| feature.operation.adds()).fold(
             [f32::MAX, f32::MAX, f32::MIN, f32::MIN],

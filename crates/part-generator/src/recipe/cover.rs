@@ -1,4 +1,4 @@
-//! Things that lie over parts: slips of paper, cables, fingers, cloth, tape.
+//! Objects that cover parts: slips of paper, cables, fingers, cloth, tape.
 
 use rand_pcg::Pcg64Mcg;
 
@@ -9,12 +9,12 @@ use super::material::Material;
 use super::shape::Shape;
 use crate::random::Draw;
 
-/// Draws something of about `size` millimetres that can lie over a part.
+/// Draws an object of about `size` millimetres that can cover a part.
 pub(crate) fn cover(size: f32, rng: &mut Pcg64Mcg) -> Recipe {
     let half = 0.5 * size;
     match rng.whole(0, 3) {
         0 => {
-            // A slip of paper, card or tape, printed at times.
+            // A slip of paper, card or tape, sometimes printed.
             let mut builder = Builder::new(Material { grain: 0.03, ..Material::print(rng) });
             let shape = Shape::Rectangle { half: [half, half * rng.uniform(0.3, 0.8)], corner: 0.0 };
             builder.add(shape, [0.0; 2], 0.0, 0.4, Edge::SHARP, 0);

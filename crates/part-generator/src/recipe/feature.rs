@@ -1,11 +1,11 @@
-//! What a feature does to the surface above the points of its shape.
+//! The effect of a feature on the surface above the points of its shape.
 
 use super::shape::Shape;
 
-/// The surface above one point of the table: material fills `bottom` to `top`.
+/// The surface above a point of the table: material between `bottom` and `top`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct State {
-    /// Highest point in millimetres; not positive where there is nothing.
+    /// Highest point in millimetres; not positive if there is no material.
     pub top: f32,
     /// Lowest point.
     pub bottom: f32,
@@ -14,10 +14,10 @@ pub(crate) struct State {
 }
 
 impl State {
-    /// No material: nothing stands above the table.
+    /// No material.
     pub const EMPTY: Self = Self { top: 0.0, bottom: 0.0, material: 0 };
 
-    /// Whether anything is there.
+    /// Whether there is material.
     pub fn is_covered(&self) -> bool {
         self.top > 0.0
     }
@@ -31,10 +31,10 @@ impl State {
     }
 }
 
-/// How a surface falls off towards the edge of its shape.
+/// The profile of a surface towards the edge of its shape.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Edge {
-    /// How far from the edge the fall begins.
+    /// Width of the profile, from the edge inwards.
     pub width: f32,
     /// Height difference.
     pub drop: f32,
@@ -56,7 +56,7 @@ impl Edge {
         Self { width: radius, drop: radius, round: true }
     }
 
-    /// The fall at `depth` inside the shape.
+    /// The height difference at `depth` inside the shape.
     fn fall(&self, depth: f32) -> f32 {
         if depth >= self.width {
             return 0.0;
@@ -66,22 +66,22 @@ impl Edge {
     }
 }
 
-/// A section of a turned part where the radius is not constant.
+/// A section of a turned part with varying radius.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Ripple {
-    /// Where it begins on the axis.
+    /// Its start on the axis.
     pub from: f32,
-    /// Where it ends.
+    /// Its end on the axis.
     pub to: f32,
     /// Length of one period: a thread's pitch.
     pub pitch: f32,
     /// Depth of the valleys.
     pub depth: f32,
-    /// A thread runs round the axis, a knurl along it.
+    /// Kind of the variation.
     pub kind: RippleKind,
 }
 
-/// How a turned section departs from a cylinder.
+/// How a turned section differs from a cylinder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum RippleKind {
     /// A helix of the pitch, right-handed.
@@ -90,11 +90,11 @@ pub(crate) enum RippleKind {
     LeftThread,
     /// Valleys along the axis.
     Knurl,
-    /// Six flats; `depth` and `pitch` say nothing.
+    /// Six flats; `depth` and `pitch` are ignored.
     Hexagon,
 }
 
-/// What happens where the feature's shape is.
+/// The operation within the feature's shape.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Operation {
     /// Material from `bottom` to `top`.
@@ -103,19 +103,19 @@ pub(crate) enum Operation {
         bottom: f32,
         /// Upper side.
         top: f32,
-        /// How the upper side ends.
+        /// Profile of the upper side's edge.
         edge: Edge,
     },
-    /// As `Add` from the table, with a fillet of this radius onto lower material around it.
+    /// Like `Add` from the table, with a fillet of this radius onto lower material around it.
     Blend {
         /// Upper side.
         top: f32,
-        /// How the upper side ends.
+        /// Profile of the upper side's edge.
         edge: Edge,
         /// Radius of the fillet.
         fillet: f32,
     },
-    /// A sheet of this thickness whose upper side rises along x, from one end of the shape to the other.
+    /// A sheet of this thickness whose upper side rises along x, across the shape.
     Slope {
         /// Upper side at the smallest x.
         from: f32,
@@ -137,61 +137,61 @@ pub(crate) enum Operation {
         /// Threads, knurls and hexagons.
         ripples: Vec<Ripple>,
     },
-    /// Everything above `floor` is removed; all of it where `floor` is not positive.
+    /// Removes everything above `floor`; everything if `floor` is not positive.
     Cut {
-        /// What remains.
+        /// Height of the remaining material.
         floor: f32,
         /// Chamfer around the cut, in the material of the feature.
         chamfer: f32,
-        /// Whether the floor takes the feature's material: a machined seat.
+        /// Whether the floor gets the feature's material: a machined seat.
         machined: bool,
     },
-    /// The surface is raised by this, or lowered where negative, with slopes of this width.
+    /// Raises the surface by this, or lowers it if negative, with slopes of this width.
     Emboss {
         /// Height of the step.
         by: f32,
         /// Width of the slope.
         width: f32,
     },
-    /// The material changes, the height does not: print, label, paint, a ground face.
+    /// Changes the material but not the height: print, label, paint, a ground face.
     Paint,
 }
 
 impl Operation {
-    /// Whether it puts material where none was.
+    /// Whether it adds material to empty points.
     pub fn adds(&self) -> bool {
         matches!(self, Self::Add { .. } | Self::Blend { .. } | Self::Slope { .. } | Self::Tube | Self::Turned { .. })
     }
 }
 
-/// A shape at a place and what it does there.
+/// A shape at a position, and its operation.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Feature {
     /// The shape in the feature's own frame.
     pub shape: Shape,
-    /// Where its origin lies in the part's frame.
+    /// Position of its origin in the part's frame.
     pub center: [f32; 2],
-    /// How it is turned, in radians from x to y.
+    /// Its rotation, in radians from x to y.
     pub turn: f32,
-    /// What it does.
+    /// The operation.
     pub operation: Operation,
-    /// Index of the material that it brings.
+    /// Index of its material.
     pub material: u8,
     /// Features of one group move together; group 0 is the body and does not move.
     pub group: u16,
 }
 
-/// A feature with what is the same for all points worked out.
+/// A feature with values precomputed for all points.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Prepared<'a> {
     feature: &'a Feature,
     sin_cos: [f32; 2],
-    /// Square of the distance beyond which nothing changes.
+    /// Square of the distance beyond which it has no effect.
     reach_squared: f32,
 }
 
 impl Prepared<'_> {
-    /// Changes the surface above a point of the part's frame.
+    /// Applies the feature to the surface above a point in the part's frame.
     pub fn apply(&self, x: f32, y: f32, state: &mut State) {
         let (px, py) = (x - self.feature.center[0], y - self.feature.center[1]);
         if px * px + py * py <= self.reach_squared {
@@ -202,7 +202,7 @@ impl Prepared<'_> {
 }
 
 impl Feature {
-    /// Works out what is the same for all points.
+    /// Precomputes the values that are equal for all points.
     pub fn prepare(&self) -> Prepared<'_> {
         let (sin, cos) = self.turn.sin_cos();
         let reach = match &self.operation {
@@ -214,7 +214,7 @@ impl Feature {
         Prepared { feature: self, sin_cos: [sin, cos], reach_squared: reach * reach }
     }
 
-    /// Changes the surface above a point of the feature's own frame.
+    /// Applies the feature to the surface above a point in its own frame.
     fn apply_local(&self, lx: f32, ly: f32, state: &mut State) {
         if let Operation::Turned { profile, axis_z, ripples } = &self.operation {
             turned(profile, *axis_z, ripples, lx, ly, self.material, state);
@@ -244,8 +244,8 @@ impl Feature {
                 if let Shape::Path { radius, .. } = &self.shape {
                     let across = distance + radius;
                     let rise = (radius * radius - across * across).max(0.0).sqrt();
-                    // One layer is kept above a point: a raised strand is filled down to the table, or what lies
-                    // below it would be lost and the part would fall apart.
+                    // Only one layer is stored above a point: a raised strand is filled down to the table, otherwise
+                    // the material below it would be lost and the part would fall apart.
                     let bottom = if z > 1.6 * radius { 0.0 } else { (z - rise).max(0.0) };
                     state.fill(bottom, z + rise, self.material);
                 }
@@ -273,7 +273,7 @@ impl Feature {
         }
     }
 
-    /// A box around what the feature can add: [min x, min y, max x, max y].
+    /// Bounding box of the material that the feature can add: [min x, min y, max x, max y].
     pub fn bounds(&self) -> [f32; 4] {
         let (sin, cos) = self.turn.sin_cos();
         let corners: Vec<[f32; 2]> = match (&self.operation, &self.shape) {

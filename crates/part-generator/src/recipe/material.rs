@@ -1,4 +1,4 @@
-//! What parts are made of: colours in linear light, gloss, grain.
+//! Materials of parts: colours in linear light, gloss, grain.
 
 use rand_pcg::Pcg64Mcg;
 
@@ -12,18 +12,18 @@ pub(crate) type Color = [f32; 3];
 pub(crate) enum Brushing {
     /// Along a direction in the part's frame, in radians.
     Along(f32),
-    /// Around the part's origin, as a lathe leaves them.
+    /// Around the part's origin, as on a lathe.
     Around,
 }
 
 /// The look of a surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Material {
-    /// Share of the light that it scatters, by channel.
+    /// Diffuse reflectance of each channel.
     pub albedo: Color,
-    /// What it reflects when seen straight on.
+    /// Specular reflectance at normal incidence.
     pub reflectance: Color,
-    /// 0 is a mirror, 1 has no gloss.
+    /// 0 is a mirror, 1 is without gloss.
     pub roughness: f32,
     /// Scratches, if any.
     pub brushing: Option<Brushing>,
@@ -36,7 +36,7 @@ pub(crate) struct Material {
 }
 
 impl Material {
-    /// Any material of a part.
+    /// A random material of a part.
     pub fn draw(rng: &mut Pcg64Mcg) -> Self {
         match rng.whole(0, 9) {
             0..=2 => Self::metal(rng),
@@ -56,7 +56,7 @@ impl Material {
         }
     }
 
-    /// Bare metal as it leaves the mill.
+    /// Bare metal with mill finish.
     pub fn metal(rng: &mut Pcg64Mcg) -> Self {
         let reflectance = metal_color(rng);
         let roughness = rng.uniform(0.25, 0.6);
@@ -96,7 +96,7 @@ impl Material {
         }
     }
 
-    /// Cast metal as it leaves the mould.
+    /// As-cast metal.
     pub fn cast(rng: &mut Pcg64Mcg) -> Self {
         let level = rng.log_uniform(0.12, 0.55);
         let warm = rng.uniform(-0.06, 0.08);
@@ -202,14 +202,14 @@ fn metal_color(rng: &mut Pcg64Mcg) -> Color {
     color.map(|c: f32| (c * shade * rng.uniform(0.97, 1.03)).min(0.95))
 }
 
-/// Colours as painted and moulded parts have them: greys, whites and dull colours more than bright ones.
+/// Colours of painted and moulded parts: more greys, whites and dull colours than bright ones.
 pub(crate) fn paint_color(rng: &mut Pcg64Mcg) -> Color {
     let (saturation, value) = match rng.whole(0, 9) {
         0..=3 => (rng.uniform(0.0, 0.12), rng.log_uniform(0.06, 0.75)),
         4..=6 => (rng.uniform(0.15, 0.6), rng.log_uniform(0.06, 0.5)),
         _ => (rng.uniform(0.6, 0.92), rng.log_uniform(0.12, 0.6)),
     };
-    // Blue, red, yellow, orange and green are the usual ones; any hue may happen.
+    // Mostly blue, red, yellow, orange or green; sometimes any hue.
     let hue = match rng.whole(0, 7) {
         0 | 1 => rng.uniform(0.56, 0.66),
         2 => rng.uniform(-0.03, 0.02),

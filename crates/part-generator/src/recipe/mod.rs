@@ -1,4 +1,4 @@
-//! The construction of a part: features, applied in order, that raise, cut and paint a surface above the table.
+//! The construction of a part: a sequence of features that raise, cut and paint a surface above the table.
 
 mod bent;
 mod builder;

@@ -17,7 +17,7 @@ pub(crate) enum Shape {
     },
     /// A closed polygon with rounded corners.
     Polygon {
-        /// The corners, before rounding widens it by `corner`.
+        /// The corners, before the polygon is widened by `corner`.
         vertices: Vec<[f32; 2]>,
         /// Radius by which it is widened.
         corner: f32,
@@ -30,7 +30,7 @@ pub(crate) enum Shape {
         lobes: u32,
         /// Half of the difference between largest and smallest radius.
         depth: f32,
-        /// How square the lobes are: 1 is a sine, larger is steeper.
+        /// Shape of the lobes: 1 is a sine, larger is steeper.
         steepness: f32,
     },
     /// All points within `radius` of a line through points (x, y, z of the centre line).
@@ -43,7 +43,7 @@ pub(crate) enum Shape {
 }
 
 impl Shape {
-    /// Signed distance of a point, and the height of the centre line there (0 but for paths).
+    /// Signed distance of a point, and the height of the centre line there (0 for shapes other than paths).
     pub fn locate(&self, x: f32, y: f32) -> (f32, f32) {
         match self {
             Self::Disc { radius } => ((x * x + y * y).sqrt() - radius, 0.0),
@@ -63,7 +63,7 @@ impl Shape {
         }
     }
 
-    /// The radius of a circle around the origin that holds the shape.
+    /// The radius of a circle around the origin that contains the shape.
     pub fn reach(&self) -> f32 {
         match self {
             Self::Disc { radius } => *radius,
@@ -81,8 +81,8 @@ impl Shape {
         match self {
             Self::Polygon { vertices, .. } => vertices.iter_mut().for_each(|v| v[0] = -v[0]),
             Self::Path { points, .. } => points.iter_mut().for_each(|p| p[0] = -p[0]),
-            // A lobe points along x, so these are their own mirror images for an even number of lobes and turned by
-            // half a turn for an odd one, which the feature's turn makes up for.
+            // A lobe points along x. With an even number of lobes the shape is its own mirror image; with an odd number
+            // it is turned by half a turn, which the feature's turn compensates.
             Self::Disc { .. } | Self::Rectangle { .. } | Self::Lobed { .. } => {}
         }
     }
@@ -106,8 +106,8 @@ fn polygon_distance(vertices: &[[f32; 2]], x: f32, y: f32) -> f32 {
     if inside { -nearest.sqrt() } else { nearest.sqrt() }
 }
 
-/// Distance to an open line, and the height of its surface's centre at the nearest of all places within `radius`:
-/// where a line crosses itself, the upper strand counts.
+/// Distance to an open line, and the height of its centre at the nearest point within `radius`: where the line crosses
+/// itself, the upper strand counts.
 fn path_distance(points: &[[f32; 3]], radius: f32, x: f32, y: f32) -> (f32, f32) {
     let (mut best, mut best_z, mut best_top) = (f32::MAX, 0.0, f32::MIN);
     for ends in points.windows(2) {

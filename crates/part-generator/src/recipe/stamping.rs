@@ -56,7 +56,7 @@ pub(super) fn draw(rng: &mut Pcg64Mcg) -> Recipe {
     builder.finish(rng)
 }
 
-/// The blank that everything else is cut from.
+/// The blank, from which the rest is cut.
 fn outline(builder: &mut Builder, size: f32, top: f32, edge: Edge, rng: &mut Pcg64Mcg) {
     let mut add = |shape: Shape, center: [f32; 2], turn: f32| builder.add(shape, center, turn, top, edge, 0);
     let half = 0.5 * size;

@@ -88,7 +88,7 @@ pub(super) fn draw_lying(rng: &mut Pcg64Mcg) -> Recipe {
     builder.finish(rng)
 }
 
-/// One cylinder or cone with what is cut into it.
+/// A cylinder or cone with its cuts.
 fn section(builder: &mut Builder, from: f32, to: f32, radius: f32, axis_z: f32, moves: bool, rng: &mut Pcg64Mcg) {
     let material = match rng.whole(0, 5) {
         0 => builder.material(Material::draw(rng)),

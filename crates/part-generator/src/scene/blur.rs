@@ -1,6 +1,6 @@
-//! A normal blur of pictures in linear light, and rows that go on beyond the picture.
+//! Gaussian blur of pictures in linear light, and rows extended beyond the picture.
 
-/// Copies a row of pixels, three values each, with `reach` pixels more at both ends: the first and the last pixel again.
+/// Copies a row of pixels, three values each, extended at both ends by `reach` copies of the first and the last pixel.
 pub(crate) fn pad_row(row: &[f32], reach: usize, padded: &mut [f32]) {
     let (start, end) = (3 * reach, 3 * reach + row.len());
     padded[start..end].copy_from_slice(row);
@@ -10,14 +10,14 @@ pub(crate) fn pad_row(row: &[f32], reach: usize, padded: &mut [f32]) {
     }
 }
 
-/// A normal blur, one axis after the other; `spare` is as long as the picture.
+/// A Gaussian blur, along one axis after the other; `spare` has the length of the picture.
 pub(crate) fn blur(light: &mut [[f32; 3]], spare: &mut [[f32; 3]], width: usize, sigma: f32) {
     let height = light.len() / width;
     let reach = ((2.3 * sigma).ceil() as usize).clamp(1, 12);
     let weights: Vec<f32> = (0..=reach).map(|d| (-0.5 * (d as f32 / sigma).powi(2)).exp()).collect();
     let total = weights[0] + 2.0 * weights[1..].iter().sum::<f32>();
     let weights: Vec<f32> = weights.iter().map(|w| w / total).collect();
-    // Channels of neighbouring pixels stand side by side: the loops below take several values at once.
+    // Channels of neighbouring pixels are adjacent in memory: the loops below are vectorised.
     let (light, spare, row_len) = (light.as_flattened_mut(), spare.as_flattened_mut(), 3 * width);
     let mut padded = vec![0.0f32; row_len + 6 * reach];
     let start = 3 * reach;

@@ -1,11 +1,12 @@
-//! Bilinear interpolation in a grid of four values a cell.
+//! Bilinear interpolation in a grid with four values per cell.
 
 use crate::tiles::floor;
 
-/// The values of `cells`, `width` a row, at `(x, y)`, in cells from the first cell's centre. Beyond the outermost centres the
-/// outermost values go on.
+/// The values of `cells`, with `width` cells per row, at `(x, y)`, in cells from the first cell's centre. Beyond the
+/// outermost centres, the outermost values are used.
 ///
-/// A loop of its own beside that of `sdg-shape`: four floats a cell, which compilers compute at once, and no failure outside.
+/// Separate from the interpolation of `sdg-shape`: four floats per cell, which compilers vectorise, and no failure
+/// outside.
 #[inline(always)]
 pub(super) fn bilinear(cells: &[[f32; 4]], [width, height]: [usize; 2], x: f32, y: f32) -> [f32; 4] {
     let x = x.max(0.01).min(width as f32 - 1.01);

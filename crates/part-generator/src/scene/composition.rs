@@ -18,14 +18,14 @@ use super::view::View;
 use crate::Part;
 use crate::random::Draw;
 
-/// Other parts are at most so many times as large or as small as the part, where a few draws find such a one.
+/// Maximum size ratio, in both directions, between other parts and the part, if a few draws find such a part.
 pub(super) const SIZE_RATIO: f64 = 1.8;
 
-/// How many those draws are.
+/// The number of these draws.
 const MAX_SIZE_DRAWS: usize = 6;
 
 impl Scenes {
-    /// Draws camera, light, table, and what lies where: instances first, then others with their kinds.
+    /// Draws camera, light, table, and positions: first of the instances, then of the others with their kinds.
     pub(super) fn compose(&self, part_idx: usize, rng: &mut Pcg64Mcg) -> (Scene, Vec<OtherKind>, usize, Conditions) {
         let (config, subject) = (&self.config, &self.subjects[part_idx]);
         let (view, conditions) = self.draw_view(subject, rng);
@@ -36,7 +36,7 @@ impl Scenes {
             layout.lay(&subject.part, config.min_inside_share as f32, rng);
         }
         if present && layout.bodies.is_empty() {
-            // The part is too large for a free place: its middle is wherever it fits best.
+            // The part is too large for a free position: its centre is put where it fits best.
             for least in [0.9, 0.7, 0.0] {
                 if layout.lay(&subject.part, least, rng) {
                     break;
@@ -49,7 +49,7 @@ impl Scenes {
         (finish(view, bodies, conditions.glare, rng), kinds, num_instances, conditions)
     }
 
-    /// Draws the camera and what is difficult about the picture.
+    /// Draws the camera and the picture's difficulties.
     pub(super) fn draw_view(&self, subject: &Subject, rng: &mut Pcg64Mcg) -> (View, Conditions) {
         let config = &self.config;
         let chance = |rng: &mut Pcg64Mcg, p: f64| rng.chance(p as f32);
@@ -79,7 +79,7 @@ impl Scenes {
         (view, conditions)
     }
 
-    /// Lays other parts beside the instances and covers over them; gives their kinds.
+    /// Places other parts beside the instances and covers over them; returns their kinds.
     pub(super) fn lay_others(
         &self,
         subject: &Subject,
@@ -127,7 +127,7 @@ impl Scenes {
             return (OtherKind::LookAlike(*kind), part.clone());
         }
         let pool = if self.others.is_empty() { std::slice::from_ref(&subject.part) } else { &self.others[..] };
-        // Things that lie about are about as large as the part, or the picture would show little else.
+        // Other objects are about as large as the part, otherwise the picture would show little else.
         let mut best = &pool[rng.whole(0, pool.len() - 1)];
         let ratio = |other: &Arc<Part>| (other.diagonal_mm() / subject.part.diagonal_mm()).ln().abs();
         for _ in 0..MAX_SIZE_DRAWS {
@@ -171,7 +171,7 @@ impl Scenes {
     }
 }
 
-/// Draws light and table for what lies there.
+/// Draws light and table for the placed bodies.
 pub(super) fn finish(view: View, bodies: Vec<Placement>, glare: bool, rng: &mut Pcg64Mcg) -> Scene {
     let far_shadow = (glare && rng.chance(0.5) || rng.chance(0.12)).then(|| {
         let (sin, cos) = rng.angle().sin_cos();

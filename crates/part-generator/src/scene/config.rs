@@ -2,17 +2,17 @@
 
 use crate::{GeneratorError, PhotoConfig, Result};
 
-/// One difficulty, apart from the others.
+/// A single difficulty.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Condition {
-    /// One part, straight down, soft light, any table, few other parts.
+    /// One part, vertical view, soft light, any table, few other parts.
     Nominal,
     /// The camera nearer or farther: 0.75 to 1.3 of the demonstration's distance.
     Distance,
     /// The camera tilted by 5 to 20 degrees.
     Tilt,
-    /// Something lies over 10 to 40 % of the part.
+    /// An object covers 10 to 40 % of the part.
     Cover,
     /// Little light and much noise.
     Dark,
@@ -22,13 +22,13 @@ pub enum Condition {
     MotionBlur,
     /// Coloured light.
     Tint,
-    /// Narrow lamps: hard shadows, highlights, shadows of things outside the picture.
+    /// Narrow lamps: hard shadows, highlights, shadows of objects outside the picture.
     Glare,
     /// Other parts all around, some touching the part.
     Clutter,
-    /// Two to five of the part.
+    /// Two to five instances of the part.
     Instances,
-    /// Look-alikes beside the part, or in its place.
+    /// Look-alikes beside the part, or in place of it.
     LookAlikes,
 }
 
@@ -68,7 +68,7 @@ impl Condition {
     }
 }
 
-/// What scenes are like: probabilities and ranges. Every picture is drawn from all of them independently.
+/// Properties of scenes: probabilities and ranges. Every picture is drawn from all of them independently.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SceneConfig {
     /// Width, in pixels.
@@ -81,23 +81,23 @@ pub struct SceneConfig {
     pub photo_seed: u64,
     /// Share of pictures without the part.
     pub absent_share: f64,
-    /// Fewest and most of the part, where it is present.
+    /// Minimum and maximum number of instances, if the part is present.
     pub instances: [usize; 2],
-    /// Fewest and most other parts.
+    /// Minimum and maximum number of other parts.
     pub others: [usize; 2],
     /// Share of the other parts that are look-alikes.
     pub look_alike_share: f64,
-    /// Probability that an other part touches one of the part.
+    /// Probability that another part touches an instance.
     pub touch_probability: f64,
-    /// Range of the camera's distance over the demonstration's.
+    /// Range of the camera's distance divided by the demonstration's.
     pub distance: [f64; 2],
     /// Range of the camera's tilt in radians.
     pub tilt_rad: [f64; 2],
-    /// Probability that the camera is tilted within that range, else it looks straight down.
+    /// Probability that the camera is tilted within that range; otherwise it looks straight down.
     pub tilt_probability: f64,
     /// Probability that a part is covered.
     pub cover_probability: f64,
-    /// Range of the share of the part that is covered.
+    /// Range of the covered share of the part.
     pub cover_share: [f64; 2],
     /// Probability of little light and much noise.
     pub dark_probability: f64,
@@ -109,16 +109,16 @@ pub struct SceneConfig {
     pub tint_probability: f64,
     /// Probability of narrow lamps with hard shadows and highlights.
     pub glare_probability: f64,
-    /// Probability that the picture goes through a JPEG file.
+    /// Probability that the picture is compressed as JPEG.
     pub jpeg_probability: f64,
-    /// Least share of a part's silhouette that lies inside the picture when it is placed.
+    /// Minimum share of a part's silhouette inside the picture when it is placed.
     pub min_inside_share: f64,
-    /// How many other parts there are to choose from.
+    /// Number of other parts to choose from.
     pub num_other_parts: usize,
 }
 
 impl Default for SceneConfig {
-    /// Everything at once, each in a part of the pictures.
+    /// All difficulties at once, each in some of the pictures.
     fn default() -> Self {
         Self {
             width: 320,
@@ -148,7 +148,7 @@ impl Default for SceneConfig {
 }
 
 impl SceneConfig {
-    /// One difficulty and nothing else: every picture has it.
+    /// A single difficulty, in every picture.
     pub fn only(condition: Condition) -> Self {
         let nominal = Self {
             absent_share: 0.0,
@@ -190,7 +190,7 @@ impl SceneConfig {
     /// Checks every value.
     ///
     /// # Errors
-    /// A value outside its range, named.
+    /// A value is outside its range; the error names it.
     pub fn check(&self) -> Result<()> {
         for (width, height) in [(self.width, self.height), (self.photo.width, self.photo.height)] {
             if !(32..=4096).contains(&width) || !(32..=4096).contains(&height) {

@@ -1,21 +1,21 @@
-//! Pixels on edges, drawn from several samples.
+//! Antialiasing: pixels on edges are drawn from several samples.
 
 use super::contents::{Scene, TABLE};
 use super::placement::Contact;
 use super::shading::{Shading, TableRow};
 
-/// Samples of a pixel on an edge.
+/// Sample positions in a pixel on an edge.
 const EDGE_SAMPLES: [[f32; 2]; 4] = [[0.375, 0.125], [0.875, 0.375], [0.125, 0.625], [0.625, 0.875]];
 
-/// Neighbouring pixels whose heights differ by more than this many pixels' width lie on an edge.
+/// Height difference between neighbouring pixels, in pixel widths, above which they are on an edge.
 const EDGE_STEP_PX: f32 = 0.9;
 
-/// What the middles of the pixels show.
+/// The contacts of the pixels' centres.
 pub(crate) struct Seen<'a> {
     pub ids: &'a [u8],
-    /// Only those are read whose pixel shows a body.
+    /// Valid only for pixels that show a body.
     pub contacts: &'a [Contact],
-    /// For each row the columns [first, end) outside of which there is only table.
+    /// For each row, the columns [first, end) outside of which there is only table.
     pub spans: &'a [[usize; 2]],
 }
 
@@ -26,14 +26,14 @@ impl Seen<'_> {
     }
 }
 
-/// Whether two contacts with the same body are on one smooth piece of it.
+/// Whether two contacts with the same body are on the same smooth piece of it.
 #[inline(always)]
 fn is_like(a: &Contact, b: &Contact, step: f32) -> bool {
     (a.z - b.z).abs() <= step && a.texel.material == b.texel.material && a.is_on_wall() == b.is_on_wall()
 }
 
-/// Draws pixels on edges anew: what each sample meets is followed, its light is that of the neighbouring pixel that shows
-/// the same piece, where there is one.
+/// Redraws pixels on edges: the contact of each sample is computed; its light is taken from a neighbouring pixel that
+/// shows the same piece, if there is one.
 pub(crate) fn smooth_edges(
     scene: &Scene,
     seen: &Seen,
@@ -57,11 +57,11 @@ pub(crate) fn smooth_edges(
     }
     let mut table_row = TableRow::default();
     let mut drawn: Vec<(usize, [f32; 3])> = Vec::new();
-    // The row of the picture that they belong to, and for each body its lines of sight at the samples' heights.
+    // Their row in the picture, and for each body its lines of sight at the samples' heights.
     let (mut rows_at, mut rows) = (usize::MAX, Vec::new());
     for (idx, _) in on_edge.iter().enumerate().filter(|(_, on_edge)| **on_edge) {
         let (x, y) = (idx % width, idx / width);
-        // The pixel itself and its neighbours, as far as there are any.
+        // The pixel and its existing neighbours.
         let around = [
             idx,
             if x > 0 { idx - 1 } else { idx },
@@ -71,7 +71,7 @@ pub(crate) fn smooth_edges(
         ];
         let mut bodies = around.map(|other| seen.ids[other]);
         if bodies[1..].iter().all(|&body| body == bodies[0]) {
-            // Within a body the mean of the neighbourhood shows no visible difference and takes a tenth of the time.
+            // Within a body, the mean of the neighbourhood makes no visible difference and takes a tenth of the time.
             let sum = |k: usize| around[1..].iter().map(|&other| light[other][k]).sum::<f32>();
             drawn.push((idx, [0, 1, 2].map(|k| 0.5 * light[idx][k] + 0.125 * sum(k))));
             continue;

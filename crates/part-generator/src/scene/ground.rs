@@ -1,4 +1,4 @@
-//! Heights of everything on the table as one grid; shadows and contact darkening from it.
+//! The heights of all bodies on the table as a grid; shadows and contact darkening computed from it.
 
 use super::color_grid::bilinear;
 use super::placement::Placement;
@@ -12,27 +12,27 @@ pub(crate) struct Ground {
     width: usize,
     height: usize,
     tops: Vec<f32>,
-    /// Heights blurred over some millimetres: how much stands around a place.
+    /// Heights blurred over some millimetres: the amount of material around a place.
     blurred: Vec<f32>,
-    /// Light on the table: red, green, blue, and a factor for reflections.
+    /// Light on the table: red, green, blue, and a factor of reflections.
     table_light: Vec<[f32; 4]>,
 }
 
-/// Height below which a place is in the shadow of a direction of light, for several directions of one lamp.
+/// Height below which a place is in shadow, for several directions of one lamp.
 pub(crate) struct Shadow {
-    /// For each cell the heights of the lamp's directions.
+    /// For each cell, the heights for the lamp's directions.
     heights: Vec<[f32; SWEEPS]>,
     inverse_softness: f32,
 }
 
-/// Directions that stand for a lamp's width: shares of its radius aside and up.
+/// Directions that sample a lamp's width: shares of its radius sideways and upwards.
 const LAMP_DIRECTIONS: [[f32; 2]; SWEEPS] = [[0.7, 0.5], [-0.7, 0.5], [0.0, -0.9], [0.0, 0.0]];
 
 /// Number of sweeps.
 const SWEEPS: usize = 4;
 
 impl Ground {
-    /// A grid over a box of the table, without anything on it.
+    /// An empty grid over a box of the table.
     pub fn new(bounds: [f32; 4], cell: f32) -> Self {
         let min = [bounds[0] - 8.0 * cell, bounds[1] - 8.0 * cell];
         let count = |low: f32, high: f32| ((high - low) / cell).ceil().clamp(1.0, 1024.0) as usize + 16;
@@ -49,7 +49,7 @@ impl Ground {
         }
     }
 
-    /// The cell of a place; none outside.
+    /// The cell of a place; `None` outside.
     #[inline(always)]
     pub fn index(&self, [x, y]: [f32; 2]) -> Option<usize> {
         let (gx, gy) = ((x - self.min[0]) * self.inverse_cell, (y - self.min[1]) * self.inverse_cell);
@@ -57,7 +57,7 @@ impl Ground {
         inside.then(|| floor(gy).max(0) as usize * self.width + floor(gx).max(0) as usize)
     }
 
-    /// Calls `visit` with (index of the cell, top of the body there) for the cells that a body covers.
+    /// Calls `visit` with (index of the cell, top of the body there) for the cells covered by a body.
     fn cells(&self, body: &Placement, cell: f32, mut visit: impl FnMut(usize, f32)) {
         let relief = &body.part.relief;
         let level = relief.level_for(cell);
@@ -73,7 +73,7 @@ impl Ground {
         }
     }
 
-    /// Puts a body on the grid.
+    /// Adds a body to the grid.
     pub fn put(&mut self, body: &Placement) {
         let mut tops = std::mem::take(&mut self.tops);
         let base = body.base;
@@ -81,7 +81,7 @@ impl Ground {
         self.tops = tops;
     }
 
-    /// The highest point under a body, and the share of its cells under which something stands.
+    /// The highest point under a body, and the share of its cells above other bodies.
     pub fn under(&self, body: &Placement) -> (f32, f32) {
         let (mut highest, mut shared, mut count) = (0.0f32, 0usize, 0usize);
         self.cells(body, 2.0 * self.cell, |idx, _| {
@@ -92,7 +92,7 @@ impl Ground {
         (highest, shared as f32 / count.max(1) as f32)
     }
 
-    /// Prepares contact darkening: means of heights over `radius` millimetres.
+    /// Prepares contact darkening: mean heights over `radius` millimetres.
     pub fn blur(&mut self, radius: f32) {
         let reach = ((radius / self.cell).round() as usize).clamp(1, 24);
         let (width, height) = (self.width, self.height);
@@ -123,13 +123,13 @@ impl Ground {
         self.blurred = blurred;
     }
 
-    /// Share of the light from all around that reaches height `z` above a cell: less beside and between bodies.
+    /// Share of the ambient light that reaches height `z` above a cell: less beside and between bodies.
     #[inline(always)]
     pub fn openness(&self, cell: Option<usize>, z: f32, radius: f32) -> f32 {
         open_share(cell.map_or(0.0, |idx| self.blurred[idx]), z, radius)
     }
 
-    /// The shadows of a lamp in a direction (x, y, z up, a unit vector) that appears `radius` radians wide.
+    /// The shadows of a lamp with an angular radius of `radius` radians in a direction (x, y, z up, a unit vector).
     pub fn shadow(&self, direction: [f32; 3], radius: f32) -> Shadow {
         let level = direction[0].hypot(direction[1]);
         let azimuth = direction[1].atan2(direction[0]);
@@ -142,7 +142,7 @@ impl Ground {
         Shadow { heights, inverse_softness: self.inverse_cell / elevation.tan().min(4.0) }
     }
 
-    /// Carries heights away from the light, falling by `slope` for each millimetre, into component `k` of `shade`.
+    /// Propagates heights away from the light, falling by `slope` per millimetre, into component `k` of `shade`.
     fn sweep(&self, azimuth: f32, slope: f32, k: usize, shade: &mut [[f32; SWEEPS]]) {
         let (sin, cos) = azimuth.sin_cos();
         let along_x = cos.abs() >= sin.abs();
@@ -151,13 +151,13 @@ impl Ground {
         let (stride, stride_across) = if along_x { (1, self.width) } else { (self.width, 1) };
         let lean = minor / major.abs();
         let fall = self.cell / major.abs() * slope;
-        // A line of cells across the way: the higher of what stands there and what shades it. Two cells more at both
-        // ends, since the lean of -1 to 1 reads beyond.
+        // A line of cells across the direction of propagation: the maximum of the height there and of the shadow. Two
+        // extra cells at both ends, since the lean of -1 to 1 reads beyond.
         let (mut before, mut line) = (vec![0.0f32; across + 4], vec![0.0f32; across]);
         let shift = lean.floor();
         let share = lean - shift;
         let first = (2 + shift as i32) as usize;
-        // From the side of the light to the other.
+        // From the lit side to the other.
         for step in 0..count {
             let at = if major > 0.0 { count - 1 - step } else { step };
             for ((carried, a), b) in line.iter_mut().zip(&before[first..]).zip(&before[first + 1..]) {
@@ -188,8 +188,8 @@ impl Ground {
         cell.map_or(1.0, |idx| shadow.light_at(idx, z))
     }
 
-    /// Prepares the light on the table itself: `light` is given the place, the share of light from all around and that of
-    /// each lamp, and returns red, green, blue and a factor for reflections.
+    /// Prepares the light on the table: `light` gets the place and the shares of ambient light and of each lamp, and
+    /// returns red, green, blue and a factor of reflections.
     pub fn light_table(&mut self, radius: f32, shadows: &[Shadow], light: impl Fn([f32; 2], f32, &[f32]) -> [f32; 4]) {
         let mut reached = vec![1.0; shadows.len()];
         let mut made = Vec::with_capacity(self.tops.len());
@@ -204,7 +204,7 @@ impl Ground {
         self.table_light = made;
     }
 
-    /// What [`light_table`](Self::light_table) prepared, between cells.
+    /// The values prepared by [`light_table`](Self::light_table), interpolated between cells.
     #[inline(always)]
     pub fn on_table(&self, [x, y]: [f32; 2]) -> [f32; 4] {
         let x = (x - self.min[0]) * self.inverse_cell - 0.5;
@@ -213,7 +213,7 @@ impl Ground {
     }
 }
 
-/// Share of the light from all around that reaches height `z` where the surroundings stand `around` high.
+/// Share of the ambient light that reaches height `z` if the surroundings have the height `around`.
 #[inline(always)]
 fn open_share(around: f32, z: f32, radius: f32) -> f32 {
     1.0 - 0.55 * ((around - z) / (0.7 * radius)).clamp(0.0, 1.0)

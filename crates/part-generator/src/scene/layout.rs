@@ -1,4 +1,4 @@
-//! Where things lie: room for parts, neighbours that touch, covers.
+//! Positions of objects: space for parts, touching neighbours, covers.
 
 use std::sync::Arc;
 
@@ -10,17 +10,17 @@ use super::view::View;
 use crate::Part;
 use crate::random::Draw;
 
-/// Places that are tried for each part.
+/// Number of positions tried for each part.
 const MAX_TRIES: usize = 24;
 
-/// Share of a part's cells that may stand over another part.
+/// Maximum share of a part's cells over another part.
 const MAX_OVERLAP: f32 = 0.0;
 
-/// The table while things are being laid on it.
+/// The table while objects are placed on it.
 pub(crate) struct Layout<'a> {
     view: &'a View,
     ground: Ground,
-    /// In the order in which they were laid.
+    /// In the order of placement.
     pub bodies: Vec<Placement>,
 }
 
@@ -32,7 +32,7 @@ impl<'a> Layout<'a> {
         Self { view, ground: Ground::new(bounds, 2.0 * view.mm_per_px()), bodies: Vec::new() }
     }
 
-    /// Lays a part on free table with at least a share of its box inside the picture.
+    /// Places a part on a free position with at least a share of its box inside the picture.
     pub fn lay(&mut self, part: &Arc<Part>, min_inside: f32, rng: &mut Pcg64Mcg) -> bool {
         let (w, h) = (self.view.width as f32, self.view.height as f32);
         for _ in 0..MAX_TRIES {
@@ -71,7 +71,7 @@ impl<'a> Layout<'a> {
         false
     }
 
-    /// Lays something over a body so that about `share` of it is covered.
+    /// Places a cover over a body so that about `share` of it is covered.
     pub fn cover(&mut self, cover: &Arc<Part>, covered: usize, share: f32, rng: &mut Pcg64Mcg) -> bool {
         let points = self.cells_of(covered);
         let middle = self.middle(covered);
@@ -81,7 +81,7 @@ impl<'a> Layout<'a> {
             let angle = rng.angle();
             let distance = reach * rng.uniform(0.0, 0.9);
             let at = [middle[0] + angle.cos() * distance, middle[1] + angle.sin() * distance];
-            // The near end of long covers lies on the part, the far end outside.
+            // The near end of a long cover is on the part, the far end outside.
             let body = self.centered(cover, at, rng.angle(), 0.0);
             let hidden = points.iter().filter(|&&place| is_over(&body, place)).count() as f32 / points.len() as f32;
             let error = (hidden - share).abs();
@@ -105,7 +105,7 @@ impl<'a> Layout<'a> {
         self.bodies.push(body);
     }
 
-    /// A part whose box's middle lies at a place.
+    /// A part with the centre of its box at a position.
     fn centered(&self, part: &Arc<Part>, middle: [f32; 2], turn: f32, base: f32) -> Placement {
         let mm_per_px = self.view.mm_per_px();
         let bounds = part.outline.bounds().center();
@@ -119,7 +119,7 @@ impl<'a> Layout<'a> {
         self.bodies[body].to_table([center.x as f32, center.y as f32])
     }
 
-    /// Places of a body's coarsest cells.
+    /// Positions of a body's coarsest cells.
     fn cells_of(&self, body: usize) -> Vec<[f32; 2]> {
         let body = &self.bodies[body];
         let relief = &body.part.relief;
@@ -135,7 +135,7 @@ impl<'a> Layout<'a> {
         places
     }
 
-    /// Share of a body's outline that appears inside the picture.
+    /// Share of a body's outline inside the picture.
     fn inside(&self, body: &Placement) -> f32 {
         let vertices = &body.part.outline.vertices;
         let (w, h) = (self.view.width as f32, self.view.height as f32);
@@ -154,7 +154,7 @@ impl<'a> Layout<'a> {
     }
 }
 
-/// Whether a body stands over a place of the table.
+/// Whether a body is above a position of the table.
 fn is_over(body: &Placement, place: [f32; 2]) -> bool {
     let relief = &body.part.relief;
     let level = &relief.levels[relief.levels.len() - 1];

@@ -1,4 +1,4 @@
-//! Lamps, light from all around, and what shiny parts reflect.
+//! Lamps, ambient light, and reflections in shiny parts.
 
 use rand_pcg::Pcg64Mcg;
 
@@ -9,37 +9,37 @@ use crate::recipe::Material;
 /// Side of the map of reflections.
 const SIDE: usize = 32;
 
-/// Blur of the maps, in texels: a mirror first, a matt surface last.
+/// Blur of the maps, in texels: from a mirror to a matt surface.
 const BLURS: [f32; 4] = [0.0, 1.0, 2.7, 6.0];
 
-/// A lamp far away.
+/// A lamp at infinite distance.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Lamp {
-    /// Towards the lamp, a unit vector, z up.
+    /// Unit vector towards the lamp, z up.
     pub direction: [f32; 3],
-    /// What a white surface that faces it scatters.
+    /// Light scattered by a white surface that faces it.
     pub color: [f32; 3],
-    /// How wide it appears, in radians.
+    /// Its angular radius, in radians.
     pub radius: f32,
-    /// Strength of what glossy surfaces reflect of it.
+    /// Strength of its reflection in glossy surfaces.
     pub glare: f32,
 }
 
 /// All light of a scene.
 pub(crate) struct Lighting {
     pub lamps: Vec<Lamp>,
-    /// Light from all around.
+    /// Ambient light.
     pub ambient: [f32; 3],
-    /// Change of the light across the picture, a share for a picture's width: x, y.
+    /// Change of the light across the picture, as a share per picture width: x, y.
     pub gradient: [f32; 2],
-    /// What is reflected in a direction, by roughness; the fourth channel is unused.
+    /// Reflected light by direction, for each roughness; the fourth channel is unused.
     maps: Vec<Vec<[f32; 4]>>,
 }
 
-/// What kind of light is drawn.
+/// The style of lighting.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct LightStyle {
-    /// Even light, as for a photo that teaches.
+    /// Even light, as in the demonstration's photo.
     pub even: bool,
     /// Strong narrow lamps with highlights.
     pub glare: bool,
@@ -95,7 +95,7 @@ impl Lighting {
         Self { lamps, ambient, gradient, maps }
     }
 
-    /// What a surface of a roughness reflects from a direction, the mean over its lobe.
+    /// Light reflected from a direction by a surface of this roughness: the mean over its lobe.
     #[inline(always)]
     pub fn reflected(&self, direction: [f32; 3], level: usize) -> [f32; 4] {
         let half = 0.5 * SIDE as f32;
@@ -114,13 +114,14 @@ impl Lighting {
     }
 }
 
-/// White, warmer or colder by up to a share.
+/// White, warmer or colder by at most a share.
 fn tint(rng: &mut Pcg64Mcg, share: f32) -> [f32; 3] {
     let warmth = rng.uniform(-1.0, 1.0) * share;
     [1.0 + warmth, 1.0, 1.0 - 1.2 * warmth]
 }
 
-/// The upper half of the surroundings seen in a level mirror: walls, ceiling, windows, the dark camera above.
+/// The upper hemisphere of the surroundings as seen in a horizontal mirror: walls, ceiling, windows, the dark camera
+/// above.
 fn reflections(lamps: &[Lamp], ambient: [f32; 3], style: LightStyle, rng: &mut Pcg64Mcg) -> Vec<Vec<[f32; 4]>> {
     let (ceiling, wall) = (rng.uniform(0.7, 1.5), rng.uniform(0.25, 1.0));
     let lean = [rng.uniform(-0.6, 0.6), rng.uniform(-0.6, 0.6)];
@@ -172,9 +173,9 @@ fn reflections(lamps: &[Lamp], ambient: [f32; 3], style: LightStyle, rng: &mut P
         .collect()
 }
 
-/// A highlight: as wide as the lamp and the blur together, as bright as its energy allows.
+/// A highlight: as wide as lamp and blur together, with a brightness that conserves energy.
 fn add_lamp(map: &mut [[f32; 3]], lamp: &Lamp, blur: f32) {
-    // A perfect half-vector lobe: the reflected direction spreads twice as far as the normal.
+    // A half-vector lobe: the reflected direction spreads twice as far as the normal.
     let texels = 0.5 * SIDE as f32;
     let width = (lamp.radius * texels).hypot(1.1 * blur).max(0.7);
     let energy = 6.2 * lamp.glare * (1.0 + (lamp.radius * texels).powi(2) * 0.3);

@@ -1,4 +1,4 @@
-//! Pictures that show several of the parts, each labelled.
+//! Pictures of several parts, each labelled.
 
 use image::RgbImage;
 use rand_pcg::Pcg64Mcg;
@@ -11,39 +11,40 @@ use super::scenes::{CANVAS, Scenes, instance};
 use super::sensor;
 use crate::random::{Draw, Stream, generator};
 
-/// Parts that are drawn before one of the wanted size must have come up.
+/// Number of draws for a part of the wanted size.
 const MAX_DRAWS: usize = 12;
 
-/// A picture of several parts, and where each lies.
+/// A picture of several parts with their poses.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MixedSample {
     /// The picture.
     pub image: RgbImage,
-    /// Every labelled part in the picture. What else lies there is none of the parts.
+    /// Every labelled part in the picture. Other objects are none of the parts.
     pub instances: Vec<MixedInstance>,
 }
 
 /// A part in a [`MixedSample`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct MixedInstance {
-    /// Which of the parts of [`Scenes`] it is.
+    /// Its index among the parts of [`Scenes`].
     pub part_idx: usize,
     /// Its marks and pose in the picture.
     pub instance: Instance,
 }
 
 impl Scenes {
-    /// Draws sample `index` of several parts: as many as [`SceneConfig::instances`](crate::SceneConfig::instances) says,
-    /// all of about one size, with other parts and covers as in [`Self::sample`]. Which parts is drawn too.
+    /// Draws sample `index` of several parts: their number follows
+    /// [`SceneConfig::instances`](crate::SceneConfig::instances), all have about the same size, and other parts and
+    /// covers are as in [`Self::sample`]. The parts are chosen at random.
     pub fn mixed_sample(&self, index: u64) -> MixedSample {
         let all: Vec<usize> = (0..self.subjects.len()).collect();
         self.mixed_sample_of(&all, index)
     }
 
-    /// The same of some of the parts, given by their indices.
+    /// The same for a subset of the parts, given by their indices.
     ///
     /// # Panics
-    /// Without a part.
+    /// If `of` is empty.
     pub fn mixed_sample_of(&self, of: &[usize], index: u64) -> MixedSample {
         let mut rng = generator(self.seed, Stream::MixedSample, index);
         let first = of[rng.whole(0, of.len() - 1)];
@@ -78,7 +79,7 @@ impl Scenes {
         MixedSample { image, instances }
     }
 
-    /// A part of about the size of another one, where a few draws find it.
+    /// A part of about the size of another one, if a few draws find it.
     fn draw_of_size(&self, of: &[usize], part_idx: usize, rng: &mut Pcg64Mcg) -> usize {
         let diagonal = |idx: usize| self.subjects[idx].part.diagonal_mm();
         let ratio = |idx: usize| (diagonal(idx) / diagonal(part_idx)).ln().abs();

@@ -1,4 +1,4 @@
-//! Pictures of parts on tables, with the truth.
+//! Pictures of parts on tables, with ground truth.
 
 mod blur;
 mod color_grid;

@@ -1,4 +1,4 @@
-//! The photo that teaches: one part, straight down, even light, and its marks.
+//! The demonstration's photo: one part, vertical view, even light, and its marks.
 
 use std::sync::Arc;
 
@@ -16,21 +16,21 @@ use super::view::View;
 use crate::Part;
 use crate::random::{Draw, Stream, generator};
 
-/// Focal length over the picture's width: that of the project's wrist camera.
+/// Focal length divided by the picture's width: that of the project's wrist camera.
 pub(crate) const FOCAL_OVER_WIDTH: f32 = 0.86;
 
-/// A table that differs less from the part than this (sum over channels of square roots of linear values) is changed for
-/// another, if there is a better one.
+/// Minimum difference between table and part (sum over channels of square roots of linear values); a table below it is
+/// replaced if there is a better one.
 const MIN_CONTRAST: f32 = 0.5;
 
-/// How the photo is taken.
+/// Settings of the photo.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PhotoConfig {
     /// Width, in pixels.
     pub width: u32,
     /// Height, in pixels.
     pub height: u32,
-    /// Range of the part's diagonal over the picture's shorter side.
+    /// Range of the part's diagonal divided by the picture's shorter side.
     pub fill: [f64; 2],
 }
 
@@ -40,20 +40,20 @@ impl Default for PhotoConfig {
     }
 }
 
-/// A photo that teaches, with what is known of it.
+/// A demonstration's photo with its ground truth.
 #[derive(Debug, Clone)]
 pub struct DemonstrationPhoto {
     /// The photo and its marks.
     pub demonstration: Demonstration,
-    /// Takes the part's frame at the marks' height (millimetres) to the photo's pixels.
+    /// Maps the part's frame at the marks' height (millimetres) to the photo's pixels.
     pub photo_from_part: PlanarSimilarity,
     /// The camera's distance from the table, in millimetres.
     pub distance_mm: f64,
-    /// The camera that took it, in metres over the table.
+    /// The camera, in metres over the table.
     pub camera: PosedCamera,
 }
 
-/// A photo of a part as a user would take and mark it. Another seed gives another place, light and table.
+/// A photo of a part as a user would take and mark it. Another seed gives another position, light and table.
 pub fn demonstration(part: &Part, config: &PhotoConfig, seed: u64) -> Demonstration {
     DemonstrationPhoto::take(part, config, seed).demonstration
 }
@@ -66,7 +66,7 @@ impl DemonstrationPhoto {
         let shorter = config.width.min(config.height) as f32;
         let fill = rng.uniform(config.fill[0] as f32, config.fill[1] as f32);
         let diagonal = part.diagonal_mm() as f32;
-        // High parts come nearer to the camera.
+        // Tall parts are nearer to the camera.
         let distance = diagonal * focal / (fill * shorter) + part.relief.top_mm;
         let view = View::new(config.width, config.height, focal, distance, 0.0, 0.0);
         let mm_per_px = view.mm_per_px();
@@ -110,7 +110,7 @@ impl DemonstrationPhoto {
     }
 }
 
-/// A plain table that differs from the part in brightness, as users are told to choose it: the best of a few.
+/// A plain table that differs from the part in brightness, as users are advised: the best of a few.
 fn contrasting_table(part: &Part, rng: &mut rand_pcg::Pcg64Mcg) -> Table {
     let look: Vec<f32> = {
         let level = &part.relief.levels[2];
@@ -136,8 +136,8 @@ fn contrasting_table(part: &Part, rng: &mut rand_pcg::Pcg64Mcg) -> Table {
     best
 }
 
-/// The similarity that takes a part's frame, at its marks' height, to the picture: exact where the camera looks
-/// straight down, else the best over the part's box and its marks.
+/// The similarity that maps a part's frame, at its marks' height, to the picture: exact for a vertical view, otherwise
+/// the best fit over the part's box and its marks.
 pub(crate) fn pose(scene: &Scene, body: usize) -> PlanarSimilarity {
     let placement = &scene.bodies[body];
     let part = &placement.part;
@@ -162,10 +162,10 @@ pub(crate) fn grasp_line(part: &Part, picture_from_part: &PlanarSimilarity) -> G
     GraspLine::new(mark(part.grasp.start), mark(part.grasp.end))
 }
 
-/// The pixels of a body as if nothing covered it, inside the picture and outside.
+/// The pixels of a body without occlusion, inside the picture and outside.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Silhouette {
-    /// Where the first pixel lies.
+    /// Position of the first pixel.
     pub origin: [i32; 2],
     pub mask: Mask,
 }
@@ -182,14 +182,14 @@ impl Silhouette {
         Point2::new(p.x + f64::from(self.origin[0]), p.y + f64::from(self.origin[1]))
     }
 
-    /// The box around it, in pixels of the picture; may reach outside.
+    /// Its bounding box, in pixels of the picture; may extend outside.
     pub fn bbox(&self) -> BoundingBox {
         let b = self.mask.bounds().unwrap_or(BoundingBox { x1: 0.0, y1: 0.0, x2: 1.0, y2: 1.0 });
         let (a, c) = (self.shift(Point2::new(b.x1, b.y1)), self.shift(Point2::new(b.x2, b.y2)));
         BoundingBox { x1: a.x, y1: a.y, x2: c.x, y2: c.y }
     }
 
-    /// Its outer outline, in pixels of the picture; may reach outside.
+    /// Its outer outline, in pixels of the picture; may extend outside.
     pub fn outline(&self) -> Option<Polygon> {
         let outline = outer_outline(&self.mask)?;
         Some(Polygon { vertices: outline.vertices.into_iter().map(|v| self.shift(v)).collect() })

@@ -1,4 +1,4 @@
-//! Bodies at places on the table, and what a line of sight meets of them.
+//! Bodies at positions on the table, and their intersections with lines of sight.
 
 use std::sync::Arc;
 
@@ -10,35 +10,35 @@ use crate::tiles::floor;
 
 use super::view::{Sight, SightRow, View};
 
-/// A wall is what a sight meets this far below the upper side, in millimetres.
+/// Depth below the upper side from which a contact counts as on a wall, in millimetres.
 const MIN_WALL_MM: f32 = 0.4;
 
-/// The most steps along a line of sight.
+/// Maximum number of steps along a line of sight.
 const MAX_STEPS: usize = 64;
 
-/// A part at a place.
+/// A part at a position.
 #[derive(Debug, Clone)]
 pub(crate) struct Placement {
     pub part: Arc<Part>,
-    /// Where the part's origin lies on the table, in millimetres.
+    /// Position of the part's origin on the table, in millimetres.
     pub at: [f32; 2],
     /// Turn from x to y, in radians.
     pub turn: f32,
     /// Height of the part's underside above the table.
     pub base: f32,
     sin_cos: [f32; 2],
-    /// Which of the relief's grids is read.
+    /// Index of the relief's grid that is used.
     level: usize,
 }
 
-/// What a line of sight meets.
+/// The intersection of a line of sight with a body.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Contact {
     /// Height above the table.
     pub z: f32,
     /// The grid's texel there.
     pub texel: Texel,
-    /// Horizontal outward normal in the table's frame where the contact is on a wall, else zero.
+    /// Horizontal outward normal in the table's frame if the contact is on a wall, else zero.
     pub wall: [f32; 2],
 }
 
@@ -51,7 +51,7 @@ impl Contact {
 }
 
 impl Placement {
-    /// Places a part; `mm_per_px` chooses how finely it is read.
+    /// Places a part; `mm_per_px` determines the grid that is used.
     pub fn new(part: Arc<Part>, at: [f32; 2], turn: f32, base: f32, mm_per_px: f32) -> Self {
         let cell = 0.75 * mm_per_px;
         let level = part.relief.levels.iter().rposition(|level| level.cell <= cell).unwrap_or(0);
@@ -63,7 +63,7 @@ impl Placement {
         &self.part.relief.levels[self.level]
     }
 
-    /// A place in the part's frame, on the table.
+    /// Converts a point from the part's frame to the table.
     #[inline(always)]
     pub fn to_table(&self, [x, y]: [f32; 2]) -> [f32; 2] {
         let [sin, cos] = self.sin_cos;
@@ -79,21 +79,21 @@ impl Placement {
         })
     }
 
-    /// A direction in the part's frame, in the table's.
+    /// Converts a direction from the part's frame to the table's.
     #[inline(always)]
     pub fn direction_to_table(&self, [x, y]: [f32; 2]) -> [f32; 2] {
         let [sin, cos] = self.sin_cos;
         [cos * x - sin * y, sin * x + cos * y]
     }
 
-    /// A direction in the table's frame, in the part's.
+    /// Converts a direction from the table's frame to the part's.
     #[inline(always)]
     pub fn direction_to_part(&self, [x, y]: [f32; 2]) -> [f32; 2] {
         let [sin, cos] = self.sin_cos;
         [cos * x + sin * y, cos * y - sin * x]
     }
 
-    /// Where the corners of the box around the part appear.
+    /// Positions in the picture of the corners of the part's bounding box.
     fn picture_corners(&self, view: &View) -> Vec<[f32; 2]> {
         let level = self.level();
         let min = self.part.relief.min;
@@ -109,8 +109,8 @@ impl Placement {
             .collect()
     }
 
-    /// The box in the picture that the part cannot leave: whole pixels [x0, y0, x1, y1]; reaches at most a picture's size
-    /// beyond the picture.
+    /// A box of whole pixels [x0, y0, x1, y1] in the picture that contains the part; it extends at most a picture's
+    /// size beyond the picture.
     pub fn picture_box(&self, view: &View) -> [i32; 4] {
         let b = self.picture_corners(view).into_iter().fold([f32::MAX, f32::MAX, f32::MIN, f32::MIN], |b, [x, y]| {
             [b[0].min(x), b[1].min(y), b[2].max(x), b[3].max(y)]
@@ -121,8 +121,8 @@ impl Placement {
         [x0 as i32, y0 as i32, (x1 as i32).max(x0 as i32), (y1 as i32).max(y0 as i32)]
     }
 
-    /// For each row of a box of pixels the columns [first, end) that the part cannot leave: those between the corners of
-    /// the box around it.
+    /// For each row of a box of pixels, the columns [first, end) that contain the part: those between the corners of
+    /// its bounding box.
     pub fn row_spans(&self, view: &View, bounds: [i32; 4]) -> Vec<[i32; 2]> {
         let corners = self.picture_corners(view);
         (bounds[1]..bounds[3])
@@ -135,7 +135,7 @@ impl Placement {
                         if high[1] > lower || low[1] < upper {
                             continue;
                         }
-                        // The piece of the line within the row.
+                        // The segment of the line within the row.
                         let fall = (low[1] - high[1]).max(1e-6);
                         for y in [high[1].max(upper), low[1].min(lower)] {
                             let x = high[0] + (low[0] - high[0]) * ((y - high[1]) / fall).clamp(0.0, 1.0);
@@ -149,8 +149,8 @@ impl Placement {
             .collect()
     }
 
-    /// The lines of sight of a row of the picture in the part's grid: in cells, heights from the part's underside in
-    /// millimetres.
+    /// The lines of sight of a row of the picture in the part's grid: positions in cells, heights in millimetres from
+    /// the part's underside.
     #[inline]
     pub fn grid_row(&self, row: &SightRow) -> SightRow {
         let (min, inverse) = (self.part.relief.min, 1.0 / self.level().cell);
@@ -158,9 +158,9 @@ impl Placement {
         row.in_frame(turned, self.at, min.map(|v| v * inverse), self.base)
     }
 
-    /// The most cells of the part's grid between neighbouring pixels of a row, within a box of pixels.
+    /// Maximum number of cells of the part's grid between neighbouring pixels of a row, within a box of pixels.
     pub fn cells_per_px(&self, view: &View, [x0, y0, x1, y1]: [i32; 4]) -> f32 {
-        // The corners of the box are farthest and nearest to the camera.
+        // The extreme distances to the camera are at the corners of the box.
         let apart = |x: i32, y: i32| {
             let row = self.grid_row(&view.row(y as f32));
             let ([ax, ay], [bx, by]) = (row.at(x as f32).foot, row.at(x as f32 + 1.0).foot);
@@ -169,7 +169,7 @@ impl Placement {
         [apart(x0, y0), apart(x1, y0), apart(x0, y1), apart(x1, y1)].into_iter().fold(0.0, f32::max)
     }
 
-    /// Whether no line of sight within `reach` cells of one in the part's grid meets the part.
+    /// Whether all lines of sight within `reach` cells of the given one miss the part.
     #[inline]
     pub fn is_clear_around(&self, sight: &Sight, reach: f32) -> bool {
         let (level, top_mm) = (self.level(), self.part.relief.top_mm);
@@ -184,13 +184,13 @@ impl Placement {
         on_grid && reach < BLOCK_CELLS as f32 && level.top_around(x, y) == 0
     }
 
-    /// The first point of the part along a line of sight in the part's grid.
+    /// The first intersection of a line of sight in the part's grid with the part.
     #[inline]
     pub fn meet(&self, sight: &Sight) -> Option<Contact> {
         let relief = &self.part.relief;
         let level = self.level();
         let Sight { foot: start, drift } = *sight;
-        // The heights between which the sight is above the grid.
+        // The heights between which the line of sight is above the grid.
         let (mut high, mut low) = (relief.top_mm, 0.0f32);
         for (s, d, size) in [(start[0], drift[0], level.width as f32), (start[1], drift[1], level.height as f32)] {
             let upper = s + d * relief.top_mm;
@@ -210,7 +210,7 @@ impl Placement {
         }
         let slant = (drift[0] * drift[0] + drift[1] * drift[1]).sqrt();
         if slant * (high - low) < 2.0 * BLOCK_CELLS as f32 {
-            // The whole piece of the sight lies within a block of its middle.
+            // The whole segment is within a block around its middle.
             let middle = 0.5 * (high + low);
             let (gx, gy) = (start[0] + drift[0] * middle, start[1] + drift[1] * middle);
             high = high.min(level.top_around(gx, gy) as f32 * relief.step);
@@ -233,7 +233,7 @@ impl Placement {
                     let wall = self.wall_normal(level, column, row, drift);
                     return Some(Contact { z: z + self.base, texel, wall });
                 }
-                // Where the sight passes the upper side.
+                // The intersection with the upper side.
                 let exact = level.get(floor(start[0] + drift[0] * top), floor(start[1] + drift[1] * top));
                 let texel = if exact.top > 0 && exact.top.abs_diff(texel.top) < 100 { exact } else { texel };
                 return Some(Contact { z: top + self.base, texel, wall: [0.0; 2] });
@@ -243,7 +243,7 @@ impl Placement {
         None
     }
 
-    /// The direction in which heights fall, horizontal, in the table's frame.
+    /// The horizontal direction in which heights fall, in the table's frame.
     fn wall_normal(&self, level: &Level, gx: i32, gy: i32, drift: [f32; 2]) -> [f32; 2] {
         let top = |dx: i32, dy: i32| f32::from(level.get(gx + dx, gy + dy).top);
         let mut fall = [0.0f32; 2];
@@ -263,7 +263,7 @@ impl Placement {
 mod tests {
     use super::*;
 
-    /// Whether small steps along a line of sight in the grid get below the part's upper side.
+    /// Whether small steps along a line of sight in the grid reach below the part's upper side.
     fn is_met_in_small_steps(body: &Placement, sight: &Sight) -> bool {
         let (relief, level) = (&body.part.relief, body.level());
         (0..=400).any(|k| {

@@ -1,46 +1,46 @@
-//! Draws a scene: what each pixel meets first, and its light.
+//! Renders a scene: the first contact of each pixel's line of sight, and its light.
 
 use super::contents::{Scene, TABLE};
 use super::edges::{Seen, smooth_edges};
 use super::placement::Contact;
 use super::shading::{Shading, TableRow};
 
-/// Cells of the grid of heights that shadows are made from, in pixels.
+/// Cell size of the height grid for shadows, in pixels.
 const GROUND_CELL_PX: f32 = 2.0;
 
-/// So many neighbouring pixels of a row are first looked at together.
+/// Number of neighbouring pixels of a row that are first tested together.
 const GROUP_PX: i32 = 4;
 
-/// The pixels of a body as if nothing covered it.
+/// The pixels of a body without occlusion.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Footprint {
-    /// Pixels [x0, y0, x1, y1]; may reach outside the picture.
+    /// Pixels [x0, y0, x1, y1]; may extend outside the picture.
     pub bounds: [i32; 4],
-    /// Whether each pixel's centre shows the body, row by row.
+    /// Whether the body covers each pixel's centre, row by row.
     pub shown: Vec<bool>,
 }
 
-/// What a picture shows.
+/// The bodies in a rendered picture.
 pub(crate) struct Rendered {
-    /// The body that each pixel's centre shows.
+    /// The body at each pixel's centre.
     pub ids: Vec<u8>,
     /// The first bodies' pixels.
     pub footprints: Vec<Footprint>,
 }
 
-/// Memory that pictures are drawn in, one after the other. Nothing in it outlives a picture.
+/// Buffers for rendering, reused between pictures. Their contents do not outlive a picture.
 #[derive(Default)]
 pub(crate) struct Canvas {
     /// The picture in linear light, row by row.
     pub light: Vec<[f32; 3]>,
-    /// As long as the picture; for the sensor.
+    /// As long as the picture; used by the sensor.
     pub spare: Vec<[f32; 3]>,
     contacts: Vec<Contact>,
     row: TableRow,
 }
 
 impl Scene {
-    /// Draws the picture into the canvas, and the whole footprints of the first `num_footprints` bodies.
+    /// Renders the picture into the canvas, and the complete footprints of the first `num_footprints` bodies.
     pub fn render(&self, num_footprints: usize, canvas: &mut Canvas) -> Rendered {
         let (width, height) = (self.view.width, self.view.height);
         let shading = Shading::new(self, GROUND_CELL_PX);
@@ -79,8 +79,8 @@ impl Scene {
         Rendered { ids, footprints }
     }
 
-    /// Follows the sights of a box of pixels to a body and keeps what is nearest; `tell` learns of each pixel, row by row,
-    /// whether it meets the body.
+    /// Intersects the lines of sight of a box of pixels with a body and keeps the nearest contacts; `tell` is called
+    /// for each pixel, row by row, with whether it meets the body.
     fn meet_all(
         &self,
         idx: usize,
@@ -126,7 +126,7 @@ fn clipped(b: [i32; 4], width: usize, height: usize) -> [usize; 4] {
     [x(b[0]), y(b[1]), x(b[2]), y(b[3])]
 }
 
-/// For each row the columns [first, end) of all boxes and a pixel around them.
+/// For each row, the columns [first, end) of all boxes with a margin of one pixel.
 fn spans_of(boxes: &[[usize; 4]], width: usize, height: usize) -> Vec<[usize; 2]> {
     let mut spans = vec![[width, 0]; height];
     for &[x0, y0, x1, y1] in boxes {

@@ -1,4 +1,4 @@
-//! Scenes by random access.
+//! Scenes with random access.
 
 use std::cell::RefCell;
 use std::sync::Arc;
@@ -15,24 +15,24 @@ use super::sensor;
 use crate::random::{Stream, generator, scramble};
 use crate::{GeneratorError, LookAlike, Part, Result};
 
-/// Sizes of look-alikes.
+/// Scale factors of look-alikes.
 const SIZES: [f64; 4] = [0.8, 0.9, 1.1, 1.25];
 
-/// Look-alikes with a moved feature for each part.
+/// Number of look-alikes with a moved feature for each part.
 const NUM_MOVED: u64 = 3;
 
-/// Covers to choose from for each part.
+/// Number of covers to choose from for each part.
 const NUM_COVERS: u64 = 6;
 
-/// The most bodies in a picture: their numbers fit a byte beside the table's.
+/// Maximum number of bodies in a picture: their ids and the table's fit into a byte.
 pub(super) const MAX_BODIES: usize = 200;
 
 thread_local! {
-    /// The memory of each thread's pictures: asking the system for it takes a tenth of a picture's time.
+    /// Buffers of each thread: allocating them takes a tenth of a picture's time.
     pub(super) static CANVAS: RefCell<Canvas> = RefCell::default();
 }
 
-/// A part with what is drawn around it.
+/// A part with the objects drawn around it.
 pub(super) struct Subject {
     pub(super) part: Arc<Part>,
     pub(super) photo: DemonstrationPhoto,
@@ -40,7 +40,7 @@ pub(super) struct Subject {
     pub(super) covers: Vec<Arc<Part>>,
 }
 
-/// Pictures of scenes: sample *i* of a seed is the same in whatever order samples are made.
+/// Pictures of scenes: sample *i* of a seed does not depend on the order in which samples are made.
 pub struct Scenes {
     pub(super) config: SceneConfig,
     pub(super) seed: u64,
@@ -49,11 +49,11 @@ pub struct Scenes {
 }
 
 impl Scenes {
-    /// Prepares scenes of parts: their demonstrations, look-alikes, covers, and other parts. Sample *i* is of part
-    /// *i* modulo their number.
+    /// Prepares scenes of parts: their demonstrations, look-alikes, covers, and other parts. Sample *i* shows the part
+    /// with index *i* modulo the number of parts.
     ///
     /// # Errors
-    /// No part, or a configuration that [`SceneConfig::check`] refuses.
+    /// No part, or an invalid configuration ([`SceneConfig::check`]).
     pub fn new(parts: &[Part], config: SceneConfig, seed: u64) -> Result<Self> {
         config.check()?;
         if parts.is_empty() {
@@ -85,17 +85,17 @@ impl Scenes {
         Ok(Self { config, seed, subjects, others })
     }
 
-    /// The configuration with which the scenes were set up.
+    /// The configuration of the scenes.
     pub fn config(&self) -> &SceneConfig {
         &self.config
     }
 
-    /// The demonstration of a part, which the truth of its samples refers to.
+    /// The demonstration of a part, to which the ground truth of its samples refers.
     pub fn photo(&self, part_idx: usize) -> &DemonstrationPhoto {
         &self.subjects[part_idx].photo
     }
 
-    /// The part of an index, in the order in which parts were given.
+    /// The part with an index, in the order given.
     pub fn part(&self, part_idx: usize) -> &Part {
         &self.subjects[part_idx].part
     }
@@ -130,7 +130,7 @@ impl Scenes {
     }
 }
 
-/// The truth about an instance.
+/// The ground truth of an instance.
 pub(super) fn instance(subject: &Subject, scene: &Scene, body: usize, footprint: &Footprint, ids: &[u8]) -> Instance {
     let picture_from_part = pose(scene, body);
     let image_from_demonstration: PlanarSimilarity =
@@ -149,7 +149,7 @@ pub(super) fn instance(subject: &Subject, scene: &Scene, body: usize, footprint:
     }
 }
 
-/// The look-alikes of a part that there are.
+/// All existing look-alikes of a part.
 fn look_alikes(part: &Part, seed: u64) -> Vec<(LookAlike, Arc<Part>)> {
     let moved = (0..NUM_MOVED).map(|k| (LookAlike::FeatureMoved, seed.wrapping_add(k)));
     let sizes = SIZES.map(|size| (LookAlike::Scaled(size), 0));

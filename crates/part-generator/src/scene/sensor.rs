@@ -12,28 +12,28 @@ use crate::tiles::{Tiles, floor};
 /// Entries of the tone curve; a power of two.
 const CURVE: usize = 1024;
 
-/// What the camera does.
+/// The properties of the camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Sensor {
-    /// Factor of the light, before automatic exposure.
+    /// Exposure factor, before automatic exposure.
     pub exposure: f32,
-    /// Factors of red, green, blue.
+    /// Gains of red, green, blue.
     pub white_balance: [f32; 3],
     /// Standard deviation of noise at middle grey, as a share of full scale.
     pub noise: f32,
     /// Radius of blur in pixels.
     pub blur: f32,
-    /// Way of the camera during the exposure, in pixels.
+    /// Camera motion during the exposure, in pixels.
     pub motion: [f32; 2],
-    /// Loss of light in the corners, as a share.
+    /// Relative loss of light in the corners.
     pub vignetting: f32,
     /// Light that the lens scatters over the whole picture, as a share of full scale.
     pub veil: f32,
     /// Contrast: exponent of the tone curve, 1 for sRGB's.
     pub contrast: f32,
-    /// Colours: 0 is grey, 1 as they are.
+    /// Saturation: 0 is grey, 1 is unchanged.
     pub saturation: f32,
-    /// Quality of a JPEG file that the picture goes through, if any.
+    /// Quality of the JPEG compression, if any.
     pub jpeg: Option<u8>,
 }
 
@@ -41,11 +41,11 @@ pub(crate) struct Sensor {
 pub(crate) fn take(canvas: &mut Canvas, width: usize, sensor: &Sensor, rng: &mut Pcg64Mcg) -> RgbImage {
     let Canvas { light, spare, .. } = canvas;
     let height = light.len() / width;
-    // Automatic exposure brings the mean half-way to middle grey.
+    // Automatic exposure brings the mean halfway to middle grey.
     let mean = light.iter().step_by(7).map(|p| p[1].min(1.5)).sum::<f32>() / light.len().div_ceil(7) as f32;
     let automatic = (0.33 / mean.max(0.01)).powf(0.55).clamp(0.5, 2.4);
     let gain = sensor.white_balance.map(|w| w * automatic * sensor.exposure);
-    // Squares of the distance from the middle, from 0 to 1, times the loss.
+    // Squared distance from the centre, from 0 to 1, times the loss.
     let loss_at = |k: usize, count: usize| {
         let v = (k as f32 + 0.5) / count as f32 * 2.0 - 1.0;
         sensor.vignetting * 0.5 * v * v
@@ -56,7 +56,7 @@ pub(crate) fn take(canvas: &mut Canvas, width: usize, sensor: &Sensor, rng: &mut
         for (pixel, loss) in row.iter_mut().zip(&losses) {
             let lit = [0, 1, 2].map(|k| pixel[k] * gain[k] * (kept - loss));
             let grey = 0.3 * lit[0] + 0.59 * lit[1] + 0.11 * lit[2];
-            // Clipped before blurring, not by much: highlights bloom a little.
+            // Clipped before blurring, with a margin: highlights bloom a little.
             *pixel = lit.map(|c| (grey + (c - grey) * sensor.saturation + sensor.veil).clamp(0.0, 2.5));
         }
     }
@@ -75,7 +75,7 @@ pub(crate) fn take(canvas: &mut Canvas, width: usize, sensor: &Sensor, rng: &mut
     }
 }
 
-/// The mean along the camera's way.
+/// The mean along the camera's motion.
 fn motion(source: &[[f32; 3]], light: &mut [[f32; 3]], width: usize, way: [f32; 2]) {
     let height = light.len() / width;
     let taps = (way[0].hypot(way[1]).ceil() as usize + 1).clamp(2, 24);
@@ -102,7 +102,7 @@ fn motion(source: &[[f32; 3]], light: &mut [[f32; 3]], width: usize, way: [f32; 
 
 /// The tone curve, noise, and rounding to 8 bits.
 fn expose(light: &[[f32; 3]], width: usize, sensor: &Sensor, rng: &mut Pcg64Mcg) -> RgbImage {
-    // Over the square root of light: the curve is steep near black.
+    // As a function of the square root of light, because the curve is steep near black.
     let curve: [f32; CURVE] = std::array::from_fn(|k| {
         let root = k as f32 / (CURVE - 1) as f32;
         let v = root * root;
@@ -121,12 +121,12 @@ fn expose(light: &[[f32; 3]], width: usize, sensor: &Sensor, rng: &mut Pcg64Mcg)
             *value = light.min(1.0).sqrt() * (CURVE - 1) as f32 + 0.5;
         }
         for value in &mut values {
-            // From 0 to CURVE - 1; the mask spares a check.
+            // From 0 to CURVE - 1; the mask avoids a bounds check.
             *value = curve[floor(*value) as usize & (CURVE - 1)];
         }
         let pixels = values.chunks_exact(3).zip(noise.chunks_exact(3)).zip(noise[3..].iter().step_by(3));
         for (((value, noise), shared), out) in pixels.zip(out.chunks_exact_mut(3)) {
-            // Part of the noise is shared by the channels.
+            // Part of the noise is common to all channels.
             for k in 0..3 {
                 let strength = sigma * (0.45 + 0.55 * (value[k] * (1.0 / 128.0)).min(1.3));
                 let noisy = value[k] + strength * (0.75 * noise[k] + 0.6 * shared);
@@ -137,7 +137,7 @@ fn expose(light: &[[f32; 3]], width: usize, sensor: &Sensor, rng: &mut Pcg64Mcg)
     RgbImage::from_raw(width as u32, (light.len() / width) as u32, bytes).expect("three bytes were made for each pixel")
 }
 
-/// The picture after a round through a JPEG file; none where the codec refuses its size.
+/// The picture after JPEG compression; `None` if the codec rejects its size.
 fn compressed(image: &RgbImage, quality: u8) -> Option<RgbImage> {
     let mut bytes = std::io::Cursor::new(Vec::new());
     image.write_with_encoder(image::codecs::jpeg::JpegEncoder::new_with_quality(&mut bytes, quality)).ok()?;

@@ -1,4 +1,4 @@
-//! How what a line of sight meets is lit.
+//! Lighting of the contacts of lines of sight.
 
 use crate::recipe::Brushing;
 
@@ -8,30 +8,30 @@ use super::light::Lighting;
 use super::placement::{Contact, Placement};
 use super::view::{Sight, View};
 
-/// Mirrored surroundings of a smooth table are found at every so many pixels, and lie on lines between.
+/// Spacing, in pixels, of computed reflections in a smooth table; values in between are interpolated linearly.
 const GLOSS_STEP_PX: usize = 4;
 
-/// The same spacing for a table with grain.
+/// The same for a table with grain.
 const RIPPLE_STEP_PX: usize = 2;
 
-/// Scratches bend the directions that a brushed surface mirrors by these slopes.
+/// Slopes by which scratches tilt the reflected directions of a brushed surface.
 const BRUSHED_SLOPES: [f32; 3] = [-0.22, 0.0, 0.22];
 
-/// What shading reads.
+/// The inputs of shading.
 pub(crate) struct Shading<'a> {
     scene: &'a Scene,
     ground: Ground,
     shadows: Vec<Shadow>,
     contact_mm: f32,
     pub mm_per_px: f32,
-    /// Light that the table scatters upwards.
+    /// Light scattered upwards by the table.
     below: [f32; 3],
-    /// For each body its materials.
+    /// For each body, its materials.
     surfaces: Vec<Vec<Surface>>,
     exposure: Exposure,
 }
 
-/// A material of a body, as shading reads it.
+/// A material of a body, prepared for shading.
 struct Surface {
     albedo: [f32; 3],
     reflectance: [f32; 3],
@@ -48,7 +48,7 @@ enum Scratches {
     Around,
 }
 
-/// Places and colours of a row of the table.
+/// Positions and colours of a row of the table.
 #[derive(Default)]
 pub(crate) struct TableRow {
     places: Vec<[f32; 2]>,
@@ -57,7 +57,7 @@ pub(crate) struct TableRow {
 }
 
 impl<'a> Shading<'a> {
-    /// Prepares shadows and the light on the table; the grid of heights has cells of `cell_px` pixels.
+    /// Prepares shadows and the light on the table; the height grid has cells of `cell_px` pixels.
     pub fn new(scene: &'a Scene, cell_px: f32) -> Self {
         let mm_per_px = scene.view.mm_per_px();
         let mut ground = Ground::new(scene.view.ground(), cell_px * mm_per_px);
@@ -74,7 +74,7 @@ impl<'a> Shading<'a> {
         Self { scene, ground, shadows, contact_mm, mm_per_px, below: scene.table.mean(), surfaces, exposure }
     }
 
-    /// Writes the light that a row of the table sends to the camera: pixels from `first_px` on, at `py`.
+    /// Writes the light from a row of the table to the camera: pixels from `first_px` on, at `py`.
     pub fn table_row(&self, view: &View, first_px: f32, py: f32, row: &mut TableRow, out: &mut [[f32; 3]]) {
         let Scene { lighting, table, .. } = self.scene;
         let sights = view.row(py);
@@ -119,7 +119,7 @@ impl<'a> Shading<'a> {
         }
     }
 
-    /// The light that a point of a body sends to the camera.
+    /// The light from a point of a body to the camera.
     #[inline]
     pub fn body(&self, body: u8, contact: &Contact, sight: &Sight) -> [f32; 3] {
         let Scene { lighting, bodies, .. } = self.scene;
@@ -136,7 +136,7 @@ impl<'a> Shading<'a> {
         };
         let cell = self.ground.index(place);
         let open = self.ground.openness(cell, contact.z, self.contact_mm);
-        // What faces sideways gets its light from walls and from the table.
+        // Vertical faces get their light from walls and from the table.
         let up = 0.5 + 0.5 * normal[2];
         let mut light = [0, 1, 2].map(|k| lighting.ambient[k] * open * (up + (1.0 - up) * 0.8 * self.below[k]));
         let mut lit = open;
@@ -168,7 +168,7 @@ impl<'a> Shading<'a> {
             }
         };
         let aside = 1.0 - dot(normal, view).clamp(0.0, 1.0);
-        // Fresnel's rise of reflectance at grazing angles (Schlick 1994).
+        // Increase of reflectance at grazing angles by Fresnel (Schlick 1994).
         let grazing = aside * aside * (aside * aside) * aside * surface.gloss;
         let factor = self.exposure.at(place) * f32::from(texel.tone) * (1.0 / 128.0);
         [0, 1, 2].map(|k| {
@@ -177,12 +177,12 @@ impl<'a> Shading<'a> {
         })
     }
 
-    /// What a surface mirrors.
+    /// The light mirrored by a surface.
     #[inline(always)]
     fn surroundings(&self, level: usize, view: [f32; 3], normal: [f32; 3]) -> [f32; 3] {
         let direction = mirrored(view, normal);
         let up = self.scene.lighting.reflected(direction, level);
-        // Directions below the horizon meet the table.
+        // Directions below the horizon hit the table.
         let sky = (direction[2] * 4.0 + 0.5).clamp(0.0, 1.0);
         [0, 1, 2].map(|k| up[k] * sky + (1.0 - sky) * self.below[k] * 0.7)
     }
@@ -206,7 +206,7 @@ fn surfaces(body: &Placement) -> Vec<Surface> {
         .collect()
 }
 
-/// Light on the table (red, green, blue) and a factor for what it mirrors.
+/// Light on the table (red, green, blue) and a factor of its reflections.
 #[inline]
 fn light_on_table(scene: &Scene, exposure: &Exposure, place: [f32; 2], open: f32, reached: &[f32]) -> [f32; 4] {
     let factor = exposure.at(place);
@@ -222,11 +222,11 @@ fn light_on_table(scene: &Scene, exposure: &Exposure, place: [f32; 2], open: f32
     [light[0] * factor, light[1] * factor, light[2] * factor, light[3] * factor]
 }
 
-/// Change of the light across the picture, and the shadow from outside.
+/// Change of the light across the picture, and the shadow of an object outside.
 struct Exposure {
-    /// For a millimetre in x and in y.
+    /// Per millimetre in x and in y.
     gradient: [f32; 2],
-    /// For a millimetre in x and in y and at the origin: 0 to 1 across the shadow's edge.
+    /// Per millimetre in x and in y, and at the origin: 0 to 1 across the shadow's edge.
     edge: [f32; 3],
     strength: f32,
 }
@@ -260,13 +260,13 @@ fn normalized(v: [f32; 3]) -> [f32; 3] {
     v.map(|c| c * norm)
 }
 
-/// From a point on the line of sight to the camera.
+/// The direction from a point on the line of sight to the camera.
 #[inline(always)]
 fn towards_viewer(sight: &Sight) -> [f32; 3] {
     normalized([sight.drift[0], sight.drift[1], 1.0])
 }
 
-/// The direction from which light comes that is mirrored towards the viewer.
+/// The direction of the light that is mirrored towards the viewer.
 #[inline(always)]
 fn mirrored(view: [f32; 3], normal: [f32; 3]) -> [f32; 3] {
     let twice = 2.0 * dot(view, normal);

@@ -1,4 +1,4 @@
-//! What parts lie on: colours, grain, lines and print of table tops.
+//! Table tops: colours, grain, lines and print.
 
 use rand_pcg::Pcg64Mcg;
 
@@ -8,23 +8,23 @@ use crate::tiles::{Tile, Tiles};
 
 mod color;
 
-/// Share of the tables on which sheets lie: brightness differs within a photograph more than one table top does.
+/// Share of the tables with sheets on them: brightness varies more within a photograph than on one table top.
 const SHEETS_PROBABILITY: f32 = 0.4;
 
 /// A layer of noise over the base colour.
 struct Layer {
     tile: &'static Tile,
-    /// Texels for a millimetre along and across.
+    /// Texels per millimetre along and across.
     scale: [f32; 2],
     shift: [f32; 2],
-    /// What a value of 1 adds.
+    /// Colour added for a value of 1.
     color: [f32; 3],
 }
 
-/// Lines, squares or dots at even distances.
+/// Lines, squares or dots with regular spacing.
 enum Pattern {
     None,
-    /// Lines of a width every so many millimetres, every fifth one stronger.
+    /// Lines with regular spacing, every fifth one stronger.
     Grid {
         pitch: f32,
         width: f32,
@@ -35,7 +35,7 @@ enum Pattern {
         pitch: f32,
         color: [f32; 3],
     },
-    /// Boards or tiles with joints, each of a shade of its own.
+    /// Boards or tiles with joints, each with its own shade.
     Boards {
         width: f32,
         length: f32,
@@ -69,7 +69,7 @@ enum Pattern {
 struct Sheet {
     /// From the table top to the sheet, a unit vector.
     normal: [f32; 2],
-    /// Millimetres from the picture's middle to the sheet's edge.
+    /// Distance in millimetres from the picture's centre to the sheet's edge.
     distance: f32,
     color: [f32; 3],
 }
@@ -84,19 +84,19 @@ pub(crate) struct Table {
     shift: [f32; 2],
     /// Share of mirrored light: 0 for matt tops.
     pub gloss: f32,
-    /// Which map of reflections a glossy top reads.
+    /// Index of the reflection map for a glossy top.
     pub gloss_level: usize,
-    /// Slope of the top's grain, which breaks reflections up.
+    /// Slope of the top's grain, which breaks up reflections.
     pub ripple: f32,
     tiles: &'static Tiles,
 }
 
-/// Which tables are drawn.
+/// Style of the tables.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum TableStyle {
-    /// Any of the others, drawn at random.
+    /// Any kind of table, at random.
     Any,
-    /// Plain and light to middle grey, as a careful person chooses for a photo that teaches.
+    /// Plain and light to middle grey, as recommended for a demonstration's photo.
     Plain,
 }
 
@@ -128,7 +128,7 @@ impl Table {
         if rng.chance(SHEETS_PROBABILITY) {
             made.sheets = (0..rng.whole(1, 2)).map(|_| Sheet::draw(rng)).collect();
         }
-        // Dirt, wear and grain on everything.
+        // Dirt, wear and grain on all tables.
         let stains = rng.uniform(0.0, 0.09);
         let scale = rng.log_uniform(0.25, 1.2);
         if stains > 0.03 {
@@ -162,7 +162,7 @@ impl Table {
                 self.shine(rng.uniform(0.0, 0.08), rng);
             }
             2 | 3 => {
-                // Wood, in boards at times.
+                // Wood, sometimes in boards.
                 let level = rng.log_uniform(0.1, 0.5);
                 let warmth = rng.uniform(0.4, 1.0);
                 self.base = [level * (1.0 + 0.35 * warmth), level, level * (1.0 - 0.45 * warmth)];
@@ -246,7 +246,7 @@ impl Table {
         self.gloss_level = rng.whole(1, 3);
     }
 
-    /// The mean colour, roughly: what walls and shiny parts reflect from below.
+    /// The approximate mean colour: the light that walls and shiny parts get from below.
     pub fn mean(&self) -> [f32; 3] {
         self.base
     }

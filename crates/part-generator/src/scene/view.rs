@@ -5,17 +5,17 @@ use sdg_geometry::{PinholeCamera, PosedCamera};
 
 /// A pinhole camera that looks down at the table.
 ///
-/// The table's frame, in millimetres: x right and y down as in a picture from straight above, z up. (It is left-handed,
-/// as every frame with y down and z towards the viewer.)
+/// The table's frame, in millimetres: x right and y down as in a vertical picture, z up. (It is left-handed, like every
+/// frame with y down and z towards the viewer.)
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct View {
     pub width: usize,
     pub height: usize,
     /// Focal length in pixels.
     pub focal: f32,
-    /// Where the camera is.
+    /// The camera's position.
     pub position: [f32; 3],
-    /// The picture's right, down and the viewing direction.
+    /// The picture's right and down directions, and the viewing direction.
     axes: [[f32; 3]; 3],
 }
 
@@ -23,14 +23,14 @@ pub(crate) struct View {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct SightRow {
     position: [f32; 3],
-    /// Direction at the left edge, and its change for a pixel.
+    /// Direction at the left edge, and its change per pixel.
     first: [f32; 3],
     step: [f32; 3],
 }
 
 impl SightRow {
-    /// The same lines in another frame, in which [`Sight::foot`] lies at height `base`: `turned` takes directions to it,
-    /// `origin` is the place that it turns about, and `min` is what lies there at 0.
+    /// The same lines in another frame, in which [`Sight::foot`] is at height `base`: `turned` converts directions,
+    /// `origin` is the centre of rotation, and `min` is the point at the new frame's origin.
     #[inline]
     pub fn in_frame(&self, turned: impl Fn([f32; 2]) -> [f32; 2], origin: [f32; 2], min: [f32; 2], base: f32) -> Self {
         let direction = |v: [f32; 3]| {
@@ -45,11 +45,11 @@ impl SightRow {
         }
     }
 
-    /// The line of sight through a place in the row.
+    /// The line of sight through a position in the row.
     #[inline(always)]
     pub fn at(&self, px: f32) -> Sight {
         let ray = [0, 1, 2].map(|k| self.first[k] + self.step[k] * px);
-        // Down at least a little, so that the sight meets the table.
+        // At least slightly downwards, so that the line of sight meets the table.
         let inverse = 1.0 / ray[2].min(-0.05);
         let drift = [ray[0] * inverse, ray[1] * inverse];
         let z = self.position[2];
@@ -57,7 +57,7 @@ impl SightRow {
     }
 }
 
-/// A line of sight: where it meets the table, and how far it moves sideways for a millimetre of height.
+/// A line of sight: its intersection with the table, and its horizontal change per millimetre of height.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Sight {
     pub foot: [f32; 2],
@@ -65,7 +65,7 @@ pub(crate) struct Sight {
 }
 
 impl Sight {
-    /// The place at a height.
+    /// The point at a height.
     #[inline(always)]
     pub fn at(&self, z: f32) -> [f32; 2] {
         [self.foot[0] + self.drift[0] * z, self.foot[1] + self.drift[1] * z]
@@ -73,10 +73,10 @@ impl Sight {
 }
 
 impl View {
-    /// A camera that looks at the table's origin from `distance` millimetres, tilted by `tilt` radians from straight
-    /// down towards the direction `azimuth`.
+    /// A camera that looks at the table's origin from `distance` millimetres, tilted by `tilt` radians from vertical in
+    /// the direction `azimuth`.
     pub fn new(width: u32, height: u32, focal: f32, distance: f32, tilt: f32, azimuth: f32) -> Self {
-        // Turned about a level axis (Rodrigues).
+        // Rotated about a horizontal axis (Rodrigues).
         let (axis_y, axis_x) = azimuth.sin_cos();
         let (sin, cos) = tilt.sin_cos();
         let turned = |v: [f32; 3]| {
@@ -105,12 +105,12 @@ impl View {
         }
     }
 
-    /// The line of sight through a place in the picture.
+    /// The line of sight through a position in the picture.
     pub fn sight(&self, px: f32, py: f32) -> Sight {
         self.row(py).at(px)
     }
 
-    /// Where a point appears; none behind the camera.
+    /// The projection of a point; `None` behind the camera.
     pub fn project(&self, p: [f32; 3]) -> Option<[f32; 2]> {
         let d = [p[0] - self.position[0], p[1] - self.position[1], p[2] - self.position[2]];
         let along = |axis: &[f32; 3]| axis[0] * d[0] + axis[1] * d[1] + axis[2] * d[2];
@@ -123,13 +123,13 @@ impl View {
         })
     }
 
-    /// Millimetres of the table for one pixel in the middle of the picture.
+    /// Millimetres of the table per pixel in the centre of the picture.
     pub fn mm_per_px(&self) -> f32 {
         let [x, y, z] = self.position;
         (x * x + y * y + z * z).sqrt() / self.focal
     }
 
-    /// The camera in metres, in a right-handed frame: x right, y up as in a picture from straight above, z up.
+    /// The camera in metres, in a right-handed frame: x right, y up as in a vertical picture, z up.
     pub fn camera(&self) -> PosedCamera {
         let flipped = |[x, y, z]: [f32; 3]| Vector3::new(f64::from(x), -f64::from(y), f64::from(z));
         let axes = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&self.axes.map(flipped)));
@@ -144,7 +144,7 @@ impl View {
         }
     }
 
-    /// The box on the table that the picture shows: [min x, min y, max x, max y].
+    /// The bounding box of the visible part of the table: [min x, min y, max x, max y].
     pub fn ground(&self) -> [f32; 4] {
         let (w, h) = (self.width as f32, self.height as f32);
         [[0.0, 0.0], [w, 0.0], [0.0, h], [w, h]].iter().fold(
@@ -169,7 +169,7 @@ mod tests {
             let seen = view.project([x, y, z]).unwrap();
             assert!((seen[0] - px).abs() < 0.01 && (seen[1] - py).abs() < 0.01, "{seen:?}");
         }
-        // The camera as others know it: the same point in metres, y up.
+        // The camera as used by other crates: the same point in metres, y up.
         let seen = view.camera().project(&nalgebra::Point3::new(0.031, 0.012, 0.02)).unwrap();
         let expected = view.project([31.0, -12.0, 20.0]).unwrap().map(f64::from);
         assert!((seen - nalgebra::Point2::from(expected)).norm() < 1e-3, "{seen} {expected:?}");

@@ -1,8 +1,8 @@
-//! What all plots stand in: title, legend, the drawings for every width, caption.
+//! The frame of all plots: title, legend, the drawings for every width, caption.
 
 use crate::html::escape;
 
-/// A figure with the page style's classes. The legend and the drawings are HTML already.
+/// A figure with the page style's classes. The legend and the drawings are already HTML.
 pub(super) fn framed(
     class: &str,
     title: &str,

@@ -1,21 +1,21 @@
-//! A matrix of counts: what led to what, and how often.
+//! A matrix of counts, such as a confusion matrix.
 
 use super::frame::framed;
 use crate::html::{escape, format_number};
 
-/// Widths that a matrix is drawn for, with the class that chooses one by the room there is.
+/// Widths of the drawings, each with the class by which the style selects it.
 const SIZES: [(f64, &str); 3] = [(320.0, "narrow"), (440.0, "medium"), (720.0, "wide")];
 const ROW_HEIGHT: f64 = 30.0;
-/// Between neighbouring cells.
+/// Gap between neighbouring cells.
 const GAP: f64 = 3.0;
 /// Mean width of a letter in labels.
 const LETTER_WIDTH: f64 = 6.4;
-/// Sine and cosine of the turn of headings that do not fit over their columns.
+/// Sine and cosine of the angle of headings that do not fit over their columns.
 const SLANT: f64 = std::f64::consts::FRAC_1_SQRT_2;
-/// Shade of a cell that holds a single count of many: still to be seen.
+/// Minimum shade of a cell with a count, so that it is visible.
 const MIN_SHADE: f64 = 0.16;
 
-/// Counts in rows and columns, drawn as shaded cells: the confusion of what should be with what came of it.
+/// Counts in rows and columns, drawn as shaded cells: for example a confusion matrix.
 ///
 /// ```
 /// use sdg_report::Matrix;
@@ -42,14 +42,14 @@ impl Matrix {
         Self { title: title.into(), columns, good_column: None, rows: Vec::new(), caption: None }
     }
 
-    /// The column of what went well; the others are shaded as failures.
+    /// The column of successes; the others are shaded as failures.
     #[must_use]
     pub fn good_column(mut self, column: usize) -> Self {
         self.good_column = Some(column);
         self
     }
 
-    /// Adds a row. Panics unless there is a count for each column.
+    /// Adds a row. Panics unless there is one count per column.
     #[must_use]
     pub fn row(mut self, label: impl Into<String>, counts: impl Into<Vec<usize>>) -> Self {
         let counts = counts.into();
@@ -76,7 +76,7 @@ impl Matrix {
         };
         let longest_heading = longest(&mut self.columns.iter());
         let left = longest(&mut self.rows.iter().map(|(label, _)| label)).min(0.45 * width) + 10.0;
-        // Slanted headings lean over the right edge of their column.
+        // Slanted headings extend over the right edge of their column.
         let fits = |room: f64| longest_heading + 8.0 <= room / self.columns.len().max(1) as f64;
         let slanted = !fits(width - left);
         let right = if slanted { width - SLANT * longest_heading * 0.55 } else { width };
@@ -118,7 +118,7 @@ impl Matrix {
         };
         let share = count as f64 / total.max(1) as f64;
         let shade = if count == 0 { 1.0 } else { MIN_SHADE + (1.0 - MIN_SHADE) * share };
-        // Past the middle of the scale, the number stands on a dark ground (on a light one in the dark theme).
+        // In the darker half of the scale, the number is on a dark background (in the dark theme on a light one).
         let ink = if count > 0 && shade > 0.55 { " on" } else { "" };
         format!(
             "<rect class=\"cell {tone}\" x=\"{:.1}\" y=\"{y:.1}\" width=\"{:.1}\" height=\"{:.1}\" rx=\"3\" \
@@ -132,7 +132,7 @@ impl Matrix {
         )
     }
 
-    /// The counts in words, zeros left out, for screen readers.
+    /// The nonzero counts in words, for screen readers.
     fn description(&self) -> String {
         let mut text = format!("{}.", self.title);
         for (label, counts) in &self.rows {

@@ -1,4 +1,4 @@
-//! Plots: line charts here (what a curve is, apart from how it is drawn), matrices of counts and shares beside them.
+//! Plots: line charts here (the data, not the drawing), matrices of counts and shares in the other files.
 
 mod frame;
 mod matrix;
@@ -10,7 +10,7 @@ pub use matrix::Matrix;
 pub use scale::Scale;
 pub use shares::ShareChart;
 
-/// An axis: what it measures, in which unit, on which scale.
+/// An axis: its quantity, unit and scale.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
     pub(crate) label: String,
@@ -33,14 +33,14 @@ impl Axis {
         self
     }
 
-    /// The same axis with equal factors at equal distances; for errors that fall by orders of magnitude.
+    /// The same axis with a logarithmic scale; for errors that fall by orders of magnitude.
     #[must_use]
     pub fn logarithmic(mut self) -> Self {
         self.scale = Scale::Logarithmic;
         self
     }
 
-    /// The same axis, starting at zero unless a value lies below.
+    /// The same axis, starting at zero unless a value is below.
     #[must_use]
     pub fn from_zero(mut self) -> Self {
         self.from_zero = true;
@@ -71,7 +71,7 @@ impl Series {
         Self { name: name.into(), points, noisy: false, markers: false }
     }
 
-    /// The same curve drawn faint, with a running mean on top: for the loss of each step.
+    /// The same curve drawn faintly, with a running mean on top: for the loss of each step.
     #[must_use]
     pub fn noisy(mut self) -> Self {
         self.noisy = true;
@@ -85,7 +85,7 @@ impl Series {
         self
     }
 
-    /// A centred running mean over a twentieth of the curve; gaps stay gaps.
+    /// A centred running mean over a twentieth of the curve; gaps are kept.
     fn smoothed(&self) -> Vec<(f64, f64)> {
         let reach = (self.points.len() / 40).max(1);
         (0..self.points.len())
@@ -94,7 +94,7 @@ impl Series {
                 if !y.is_finite() {
                     return (x, y);
                 }
-                // Towards the ends the window narrows on both sides, or the mean would lean inwards.
+                // Towards the ends the window narrows on both sides; otherwise the mean would be biased inwards.
                 let reach = reach.min(at).min(self.points.len() - 1 - at);
                 let window = &self.points[at - reach..=at + reach];
                 let (sum, count) = window
@@ -126,7 +126,7 @@ impl Chart {
         Self { title: title.into(), caption: None, x_axis, y_axis, series: Vec::new(), limit: None, moment: None }
     }
 
-    /// Adds a curve. Four curves have colours of their own; a chart with more should be two.
+    /// Adds a curve. There are four colours; a chart with more curves should be split.
     #[must_use]
     pub fn series(mut self, series: Series) -> Self {
         self.series.push(series);

@@ -1,17 +1,17 @@
-//! Shares with the interval in which each truly lies, one below the other.
+//! Shares with their confidence intervals, one below the other.
 
 use super::frame::framed;
 use crate::html::{escape, format_number};
 
-/// Widths that the chart is drawn for, with the class that chooses one by the room there is.
+/// Widths of the drawings, each with the class by which the style selects it.
 const SIZES: [(f64, &str); 3] = [(320.0, "narrow"), (440.0, "medium"), (720.0, "wide")];
 const ROW_HEIGHT: f64 = 34.0;
 const TOP: f64 = 8.0;
 const BOTTOM: f64 = 24.0;
-/// Room for the number at the right.
+/// Space for the number at the right.
 const RIGHT: f64 = 64.0;
 const LETTER_WIDTH: f64 = 6.6;
-/// Where the axis may begin, in percent: at the last of these below everything drawn.
+/// Possible starts of the axis, in percent: the largest one below all drawn values.
 const STARTS: [f64; 4] = [0.0, 50.0, 80.0, 90.0];
 
 #[derive(Debug, Clone, PartialEq)]
@@ -22,7 +22,7 @@ struct ShareRow {
     reference: Option<f64>,
 }
 
-/// Shares in percent as dots on whiskers, each beside what another reached.
+/// Shares in percent as dots with whiskers, each compared with a reference.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ShareChart {
     title: String,
@@ -38,14 +38,14 @@ impl ShareChart {
         Self { title: title.into(), rows: Vec::new(), reference_name: None, caption: None }
     }
 
-    /// Names what the hollow marks are.
+    /// Sets the legend of the hollow marks.
     #[must_use]
     pub fn reference_name(mut self, name: impl Into<String>) -> Self {
         self.reference_name = Some(name.into());
         self
     }
 
-    /// Adds a share, its interval and what it is compared with, all in percent. A share that is not finite is left out.
+    /// Adds a share, its interval and its reference, all in percent. A share that is not finite is left out.
     #[must_use]
     pub fn row(mut self, label: impl Into<String>, percent: f64, interval: [f64; 2], reference: Option<f64>) -> Self {
         if percent.is_finite() && interval.iter().all(|bound| bound.is_finite()) {
@@ -148,7 +148,7 @@ mod tests {
     fn dots_stand_where_their_shares_are() {
         let chart = ShareChart::new("Held").row("C", 75.0, [65.0, 85.0], None);
         let svg = chart.to_svg(720.0, "wide");
-        // One letter: the axis from 50 to 100 % runs from x 20.6 to 656; 75 % is its middle.
+        // For one letter: the axis from 50 to 100 % runs from x 20.6 to 656; 75 % is its middle.
         assert!(svg.contains("class=\"mark s3\" cx=\"338.3\""), "{svg}");
         assert!(svg.contains("aria-label=\"Held. C: 75.0 percent, between 65.0 and 85.0.\""), "{svg}");
     }

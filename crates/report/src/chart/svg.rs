@@ -1,15 +1,15 @@
 //! A chart as inline SVG.
 //!
-//! Each chart is drawn in three widths, and the page's style shows the one that fits: scaling one drawing
-//! would make its text too small on a phone or too large on a desk. Colours are the page's own variables, so that
-//! the chart follows the theme.
+//! Each chart is drawn in three widths, and the page's style shows the one that fits: scaling a single drawing would
+//! make its text too small on a phone or too large on a desktop. Colours are the page's variables, so that the chart
+//! follows the theme.
 
 use super::frame::framed;
 use super::scale::FittedScale;
 use super::{Axis, Chart, Scale};
 use crate::html::{escape, format_number};
 
-/// Width and height of a drawing and the class that the style sheet selects it by.
+/// Width and height of a drawing, and the class by which the style sheet selects it.
 const SIZES: [(f64, f64, &str); 3] = [(320.0, 220.0, "narrow"), (430.0, 260.0, "medium"), (680.0, 330.0, "wide")];
 const TOP: f64 = 30.0;
 const BOTTOM: f64 = 38.0;
@@ -22,9 +22,9 @@ const LETTER_WIDTH: f64 = 6.2;
 const NUM_COLORS: usize = 4;
 
 impl Chart {
-    /// The whole figure: title, legend, drawings, caption.
+    /// The complete figure: title, legend, drawings, caption.
     pub(crate) fn to_html(&self) -> String {
-        // Even one curve is named: neighbouring charts then keep their plots on one line.
+        // A single curve is named too, so that the plots of neighbouring charts are aligned.
         let entries = self.series.iter().enumerate().map(|(order, series)| {
             let color = order % NUM_COLORS + 1;
             format!("<li><i class=\"swatch s{color}\"></i>{}</li>", escape(&series.name))
@@ -39,7 +39,7 @@ impl Chart {
 
     fn to_svg(&self, width: f64, height: f64, class: &str) -> String {
         let points = || self.series.iter().flat_map(|series| &series.points);
-        // A point counts for an axis only when it can be drawn on both.
+        // A point affects the axes only if it can be drawn on both.
         let both = || points().filter(|(x, y)| x.is_finite() && y.is_finite());
         let x_scale = FittedScale::fit(
             self.x_axis.scale,
@@ -115,7 +115,7 @@ impl Chart {
         let x_labels = tick_labels(&plot.x_scale.ticks, &self.x_axis);
         for (&tick, label) in plot.x_scale.ticks.iter().zip(&x_labels) {
             let Some(x) = plot.x(tick) else { continue };
-            // A label at the edge would be cut; it is moved in.
+            // A label at the edge would be cut off; it is moved inside.
             let half = 0.5 * DIGIT_WIDTH * label.chars().count() as f64;
             let text_x = x.min(width - half - 1.0);
             svg += &format!(
@@ -138,7 +138,7 @@ impl Chart {
     fn references(&self, plot: &Plot) -> String {
         let mut svg = String::new();
         if let Some((y, label)) = self.limit.as_ref().and_then(|(y, label)| Some((plot.y(*y)?, label))) {
-            // The label stands at the right end, or left of the moment's line when that would cross it.
+            // The label is at the right end, or left of the moment's line if they would cross.
             let label_width = LETTER_WIDTH * label.chars().count() as f64;
             let moment = self.moment.as_ref().and_then(|(x, _)| plot.x(*x));
             let right = match moment {
@@ -170,7 +170,7 @@ impl Chart {
     }
 }
 
-/// The rectangle that curves are drawn in.
+/// The drawing area of the curves.
 struct Plot {
     left: f64,
     right: f64,
@@ -193,7 +193,7 @@ impl Plot {
         Some((self.x(point.0)?, self.y(point.1)?))
     }
 
-    /// A path through the points, broken where one cannot be drawn; a dot where a point stands alone.
+    /// A path through the points, interrupted where a point cannot be drawn; a dot for an isolated point.
     fn curve(&self, points: &[(f64, f64)], class: &str) -> String {
         let mut path = String::new();
         let mut lone = String::new();
@@ -229,7 +229,7 @@ impl Plot {
     }
 }
 
-/// Keeps the lowest and the highest point of each half pixel, which look the same as all of them.
+/// Keeps the lowest and the highest point of each half pixel, which look the same as all points.
 fn thin_out(points: impl Iterator<Item = (f64, f64)>) -> Vec<(f64, f64)> {
     let mut kept: Vec<(f64, f64)> = Vec::new();
     let mut column: Vec<(f64, f64)> = Vec::new();
@@ -254,7 +254,7 @@ fn thin_out(points: impl Iterator<Item = (f64, f64)>) -> Vec<(f64, f64)> {
     kept
 }
 
-/// Labels with as many decimals as the ticks need to differ, powers of ten where numbers get long.
+/// Labels with as many decimals as needed to distinguish the ticks; powers of ten for long numbers.
 fn tick_labels(ticks: &[f64], axis: &Axis) -> Vec<String> {
     let largest = ticks.iter().fold(0.0f64, |m, t| m.max(t.abs()));
     if axis.scale == Scale::Logarithmic || largest >= 1e6 || (largest > 0.0 && largest < 1e-3) {
@@ -270,7 +270,7 @@ fn tick_labels(ticks: &[f64], axis: &Axis) -> Vec<String> {
     ticks.iter().map(|&tick| format_number(tick, decimals as usize)).collect()
 }
 
-/// A number with three significant digits and no needless zeros.
+/// A number with three significant digits, without trailing zeros.
 fn plain(value: f64) -> String {
     if !value.is_finite() || value == 0.0 {
         return format_number(value, 0);

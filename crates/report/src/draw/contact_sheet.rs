@@ -1,19 +1,19 @@
-//! Many small pictures as one.
+//! Many small pictures in one.
 
 use image::RgbImage;
 use image::imageops::{self, FilterType};
 
-/// Space between two pictures and round the sheet, in pixels.
+/// Space between pictures and around the sheet, in pixels.
 const GAP_PX: u32 = 6;
 const GROUND: image::Rgb<u8> = image::Rgb([28, 30, 34]);
 
-/// Lays pictures out row by row, each scaled into a cell `cell_width` wide with the first picture's proportions.
+/// Arranges pictures in rows, each scaled into a cell of `cell_width` with the first picture's proportions.
 ///
-/// Pictures of other proportions are centred in their cell. On a page, a gallery of separate pictures reads
-/// better, since it folds to the screen's width; a sheet is for one file to look at.
+/// Pictures of other proportions are centred in their cell. On a page, use a gallery of separate pictures, which adapts
+/// to the screen's width; a sheet is for a single file.
 ///
 /// # Panics
-/// When `columns` or `cell_width` is zero. No picture at all gives a sheet of one empty pixel.
+/// If `columns` or `cell_width` is zero. Without pictures the sheet is one empty pixel.
 #[must_use]
 pub fn contact_sheet(images: &[RgbImage], columns: u32, cell_width: u32) -> RgbImage {
     assert!(columns > 0 && cell_width > 0, "a sheet has columns of some width");

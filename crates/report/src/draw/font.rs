@@ -1,7 +1,8 @@
-//! Text as outlines: DejaVu Sans, cut down to the characters that labels need.
+//! Text as outlines: DejaVu Sans, reduced to the characters of labels.
 //!
-//! assets/DejaVuSans-subset.ttf was made of DejaVu Sans 2.37 by fontTools' `pyftsubset` with the characters of [`CHARACTERS`],
-//! `--no-hinting --layout-features='' --notdef-outline`; its licence stands beside it. Other characters are drawn as a box.
+//! assets/DejaVuSans-subset.ttf was made from DejaVu Sans 2.37 by fontTools' `pyftsubset` with the characters of
+//! [`CHARACTERS`], `--no-hinting --layout-features='' --notdef-outline`; its licence is beside it. Other characters are
+//! drawn as a box.
 
 use std::sync::LazyLock;
 
@@ -16,10 +17,10 @@ static FONT: LazyLock<FontRef<'static>> = LazyLock::new(|| {
     FontRef::try_from_slice(include_bytes!("../../assets/DejaVuSans-subset.ttf")).expect("the font in assets/ is whole")
 });
 
-/// How far descenders reach below the baseline, over the height of capitals.
+/// Depth of descenders below the baseline, relative to the height of capitals.
 pub(super) const DESCENT: f64 = 0.32;
 
-/// Pixels for one of the font's units, where capitals are `cap_height_px` high.
+/// Pixels per font unit for capitals of height `cap_height_px`.
 fn scale(cap_height_px: f64) -> f64 {
     let capital = FONT.outline(FONT.glyph_id('H')).map_or(1.0, |outline| outline.bounds.height().abs());
     cap_height_px / f64::from(capital)
@@ -31,7 +32,7 @@ pub(super) fn text_width(text: &str, cap_height_px: f64) -> f64 {
     scale(cap_height_px) * f64::from(advances)
 }
 
-/// The outlines of a line of text that begins at `left` on a baseline, in pixels; `None` where nothing is to be drawn.
+/// The outlines of a line of text that begins at `left` on a baseline, in pixels; `None` if there is nothing to draw.
 pub(super) fn text_path(text: &str, left: f64, baseline: f64, cap_height_px: f64) -> Option<Path> {
     let scale = scale(cap_height_px) as f32;
     let (mut left, baseline) = (left as f32, baseline as f32);
@@ -39,7 +40,7 @@ pub(super) fn text_path(text: &str, left: f64, baseline: f64, cap_height_px: f64
     for character in text.chars() {
         let glyph = FONT.glyph_id(character);
         let curves = FONT.outline(glyph).map_or_else(Vec::new, |outline| outline.curves);
-        // The font's y points up.
+        // The font's y axis points up.
         let at = |point: Point| (left + scale * point.x, baseline - scale * point.y);
         let mut end = None;
         for curve in curves {

@@ -1,4 +1,4 @@
-//! The two pictures that every report shows: what was taught, and what was found.
+//! The two kinds of pictures in every report: demonstrations and detections.
 
 use image::RgbImage;
 use nalgebra::Point2;
@@ -9,19 +9,19 @@ use super::{
 };
 use crate::html::format_number;
 
-/// Whether laying the demonstration over the image confirmed a detection.
+/// Result of comparing a detection with the demonstration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
     /// The demonstration agrees with the image.
     Verified,
-    /// It does not: not to be grasped.
+    /// The demonstration does not agree: the detection must not be grasped.
     Refused,
-    /// Verification was left out.
+    /// The comparison was skipped.
     Unchecked,
 }
 
 impl Verdict {
-    /// The colour in which a detection of this verdict is drawn.
+    /// The colour of detections with this verdict.
     #[must_use]
     pub fn color(self) -> Color {
         match self {
@@ -40,18 +40,18 @@ impl Verdict {
     }
 }
 
-/// A detection as drawn: every part but score and verdict is optional.
+/// A detection to draw: all fields but score and verdict are optional.
 #[derive(Debug, Clone, Copy)]
 pub struct DetectionMark<'a> {
     /// The detected box.
     pub bounds: Option<BoundingBox>,
-    /// The demonstration's outline, laid over the image.
+    /// The demonstration's outline, placed in the image.
     pub outline: Option<&'a Polygon>,
     /// The detected keypoints.
     pub keypoints: &'a [Keypoint],
-    /// The grasp read off them.
+    /// The resulting grasp.
     pub grasp: Option<PlanarGrasp>,
-    /// The score that decides, 0 to 1.
+    /// The final score, 0 to 1.
     pub score: f64,
     /// Verdict of the verification.
     pub verdict: Verdict,
@@ -59,8 +59,8 @@ pub struct DetectionMark<'a> {
     pub number: Option<u64>,
 }
 
-/// Line width that suits a picture's size: 3 pixels at 640 columns, so that marks and tags can still be read
-/// when three pictures share a row of the page.
+/// Line width for a picture's size: 3 pixels at 640 columns, so that marks and tags are readable when three pictures
+/// share a row of the page.
 pub fn line_width(image: &RgbImage) -> f64 {
     (f64::from(image.width().max(image.height())) / 213.0).clamp(1.0, 8.0)
 }
@@ -91,7 +91,7 @@ pub fn draw_demonstration(
 
 /// Draws a detection: box, outline, keypoints, a tag with score and verdict, and the grasp as a gripper.
 ///
-/// A refused detection has a dashed box and no gripper, for the robot will not go there.
+/// A refused detection has a dashed box and no gripper, because the robot will not go there.
 pub fn draw_detection(image: &mut RgbImage, mark: &DetectionMark<'_>) {
     let width = line_width(image);
     let color = mark.verdict.color();

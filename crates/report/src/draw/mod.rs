@@ -1,8 +1,8 @@
 //! Marks on pictures: boxes, outlines, keypoints, grasps, labels, contact sheets.
 //!
-//! Coordinates are pixels, x right, y down, the centre of the first pixel at (0.5, 0.5). Lines are antialiased
-//! and carry a dark halo, so that they show on bright and on dark ground alike. What lies outside the picture or
-//! is not finite is left out.
+//! Coordinates are pixels, x right, y down, the centre of the first pixel at (0.5, 0.5). Lines are antialiased and have
+//! a dark halo, so that they are visible on bright and dark backgrounds. Parts outside the picture, and coordinates
+//! that are not finite, are left out.
 
 mod contact_sheet;
 mod font;
@@ -21,7 +21,7 @@ pub use shapes::{draw_box, draw_grasp_jaws, draw_keypoints, draw_line, draw_poly
 pub struct Color(pub [u8; 3]);
 
 impl Color {
-    /// The grasp: what the whole page is about.
+    /// Grasps.
     pub const GRASP: Self = Self([255, 122, 41]);
     /// Boxes.
     pub const BOX: Self = Self([124, 196, 255]);
@@ -29,19 +29,19 @@ impl Color {
     pub const OUTLINE: Self = Self([255, 224, 102]);
     /// Colour of detections that passed verification.
     pub const VERIFIED: Self = Self([64, 214, 170]);
-    /// What was refused. Differs from [`Color::VERIFIED`] in lightness as well as in hue.
+    /// Colour of refused detections. It differs from [`Color::VERIFIED`] in lightness as well as in hue.
     pub const REFUSED: Self = Self([255, 92, 104]);
-    /// Neither passed nor refused.
+    /// Colour of detections that were not checked.
     pub const NEUTRAL: Self = Self([235, 235, 230]);
 
-    /// Relative luminance, 0 (black) to 1 (white), by the sRGB weights on the coded values.
+    /// Relative luminance, 0 (black) to 1 (white): sRGB weights applied to the encoded values.
     fn lightness(self) -> f64 {
         let [r, g, b] = self.0.map(f64::from);
         (0.2126 * r + 0.7152 * g + 0.0722 * b) / 255.0
     }
 }
 
-/// How a line is drawn.
+/// Style of a line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pen {
     /// Colour of the line.

@@ -1,7 +1,7 @@
-//! Strokes and fills: paths that tiny-skia rasterises with antialiasing, mixed into a picture.
+//! Strokes and fills: paths that tiny-skia rasterises with antialiasing, blended into a picture.
 //!
-//! All segments of a stroke are one path, filled once, so that joints and crossings of a translucent stroke do not show
-//! twice.
+//! All segments of a stroke form one path that is filled once, so that joints and crossings of a translucent stroke are
+//! not drawn twice.
 
 use image::RgbImage;
 use nalgebra::Point2;
@@ -15,10 +15,10 @@ pub(super) const HALO_WIDTH: f64 = 1.0;
 pub(super) const HALO_COLOR: Color = Color([12, 14, 18]);
 pub(super) const HALO_OPACITY: f64 = 0.45;
 
-/// Mixes a colour into the picture where the path covers it. What crosses itself is filled by the rule.
+/// Blends a colour into the picture where the path covers it. Self-intersecting paths are filled by `rule`.
 pub(super) fn fill(image: &mut RgbImage, path: Path, rule: FillRule, color: Color, opacity: f64) {
     let bounds = path.bounds();
-    // Float to integer casts saturate: what lies left of or above the picture becomes 0.
+    // Float to integer casts saturate: coordinates left of or above the picture become 0.
     let (x0, y0) = (bounds.left().floor() as u32, bounds.top().floor() as u32);
     let x1 = (bounds.right().ceil().max(0.0) as u32).min(image.width());
     let y1 = (bounds.bottom().ceil().max(0.0) as u32).min(image.height());
@@ -42,8 +42,8 @@ pub(super) fn fill(image: &mut RgbImage, path: Path, rule: FillRule, color: Colo
     }
 }
 
-/// The inside of the corners' polygon, as far as it lies in the picture: tiny-skia panics on paths far outside. `None` where
-/// nothing of it does, or a corner is not finite.
+/// The polygon of the corners, clipped to the picture, because tiny-skia panics on paths far outside. `None` if nothing
+/// is inside, or a corner is not finite.
 pub(super) fn inside_of(image: &RgbImage, corners: &[Point2<f64>]) -> Option<Path> {
     if corners.len() < 3 || !corners.iter().all(is_finite) {
         return None;
@@ -59,7 +59,7 @@ pub(super) fn inside_of(image: &RgbImage, corners: &[Point2<f64>]) -> Option<Pat
     path.finish()
 }
 
-/// Strokes polylines with a pen, its halo first.
+/// Strokes polylines with a pen, after its halo.
 pub(super) fn stroke(image: &mut RgbImage, polylines: &[Vec<Point2<f64>>], pen: &Pen) {
     if pen.halo {
         let rim = Pen { color: HALO_COLOR, width: pen.width + 2.0 * HALO_WIDTH, ..*pen };
@@ -68,12 +68,13 @@ pub(super) fn stroke(image: &mut RgbImage, polylines: &[Vec<Point2<f64>>], pen: 
     stroke_translucent(image, polylines, pen, 1.0);
 }
 
-/// Strokes polylines with a pen and an opacity, with round ends and joints, without a halo. A polyline of no length is a dot.
+/// Strokes polylines with a pen and an opacity, with round ends and joints, without a halo. A polyline of length zero
+/// is a dot.
 pub(super) fn stroke_translucent(image: &mut RgbImage, polylines: &[Vec<Point2<f64>>], pen: &Pen, opacity: f64) {
     if !(pen.width.is_finite() && pen.width > 0.0) {
         return;
     }
-    // A wider line covers the whole picture, too.
+    // A wider line covers the whole picture as well.
     let [width, height] = [image.width(), image.height()].map(f64::from);
     let pen = Pen { width: pen.width.min(2.0 * (width + height)), ..*pen };
     let reach = 0.5 * pen.width + 1.0;
@@ -108,7 +109,7 @@ pub(super) fn is_finite(point: &Point2<f64>) -> bool {
     point.x.is_finite() && point.y.is_finite()
 }
 
-/// The part of a segment inside a rectangle, by Liang and Barsky.
+/// Clips a segment to a rectangle, by Liang and Barsky.
 fn clip(
     a: Point2<f64>,
     b: Point2<f64>,
@@ -135,7 +136,7 @@ fn clip(
     (enter <= leave).then(|| (a + direction * enter, a + direction * leave))
 }
 
-/// Appends the dashes of a segment whose start lies `travelled` pixels along its path.
+/// Appends the dashes of a segment whose start is `travelled` pixels along its path.
 fn dash(
     a: Point2<f64>,
     b: Point2<f64>,
@@ -144,7 +145,7 @@ fn dash(
     segments: &mut Vec<(Point2<f64>, Point2<f64>)>,
 ) {
     let length = (b - a).norm();
-    // Below half a pixel a pattern is grey at best; a period of zero would never end.
+    // Below half a pixel a pattern is at best grey; a period of zero would never end.
     let Some((on, off)) = pattern.filter(|&(on, off)| on >= 0.5 && off >= 0.5 && length > 0.0) else {
         segments.push((a, b));
         return;

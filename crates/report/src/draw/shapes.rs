@@ -30,14 +30,14 @@ pub fn draw_polygon(image: &mut RgbImage, polygon: &Polygon, pen: &Pen) {
     }
 }
 
-/// Tints the inside of a polygon; opacity 0 leaves the picture as it is, 1 covers it.
+/// Tints the inside of a polygon; opacity 0 has no effect, 1 covers the picture.
 pub fn shade_polygon(image: &mut RgbImage, polygon: &Polygon, color: Color, opacity: f64) {
     if let Some(path) = inside_of(image, &polygon.vertices) {
         fill(image, path, FillRule::EvenOdd, color, opacity.clamp(0.0, 1.0));
     }
 }
 
-/// Draws keypoints: discs where they are seen, rings where they are hidden, nothing where they are not labelled.
+/// Draws keypoints: discs for visible, rings for hidden ones, nothing for unlabelled ones.
 ///
 /// The pen's width is the radius of a disc; its dash is ignored.
 pub fn draw_keypoints(image: &mut RgbImage, keypoints: &[Keypoint], pen: &Pen) {
@@ -54,10 +54,10 @@ pub fn draw_keypoints(image: &mut RgbImage, keypoints: &[Keypoint], pen: &Pen) {
     }
 }
 
-/// Draws a grasp as a gripper seen from above: two jaws, arrows that show how they close, a dot at the centre.
+/// Draws a grasp as a gripper seen from above: two jaws, arrows in their closing direction, a dot at the centre.
 ///
-/// The jaws' inner faces stand where [`PlanarGrasp::jaws`] puts them, across the marked line. The arrows stand
-/// outside, so that what lies between the jaws stays visible.
+/// The jaws' inner faces are at the positions of [`PlanarGrasp::jaws`], across the marked line. The arrows are outside,
+/// so that the part between the jaws stays visible.
 pub fn draw_grasp_jaws(image: &mut RgbImage, grasp: &PlanarGrasp, pen: &Pen) {
     let center = grasp.center();
     let faces = grasp.jaws();
@@ -118,7 +118,7 @@ mod tests {
     const GREY: Rgb<u8> = Rgb([128, 128, 128]);
     const RED: Color = Color([255, 0, 0]);
 
-    /// The rasteriser counts coverage in sixteenths or so, and round ends leave a little of a corner's pixel.
+    /// The rasteriser computes coverage in about sixteenths, and round ends cover a corner's pixel incompletely.
     const TOLERANCE: u8 = 8;
 
     #[track_caller]

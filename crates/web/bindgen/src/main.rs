@@ -1,6 +1,6 @@
-//! `sdg-web-bindgen MODULE.wasm FOLDER`: writes FOLDER/sdg_web.js and FOLDER/sdg_web_bg.wasm, for a page to import.
+//! `sdg-web-bindgen MODULE.wasm FOLDER`: writes FOLDER/sdg_web.js and FOLDER/sdg_web_bg.wasm, which a page imports.
 //!
-//! wasm-bindgen's command line tool is this call and a test server with a hundred more dependencies.
+//! The command-line tool of wasm-bindgen makes the same call, but has a hundred more dependencies for a test server.
 #![forbid(unsafe_code)]
 
 use std::path::PathBuf;

@@ -1,11 +1,11 @@
-//! What is wrong is said in the page, in the words of the command line, and nothing else happens.
+//! Errors are shown on the page with the texts of the command line, and nothing else happens.
 
 use std::path::PathBuf;
 
 use crate::taught::{Made, demonstration};
 use crate::{assert_quiet, choose, complaint, open_model, open_page, screenshots, site};
 
-/// The header of a PNG of that size, and nothing behind it.
+/// The header of a PNG of this size, without any data.
 fn png_header(width: u32, height: u32) -> Vec<u8> {
     let mut png = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR".to_vec();
     png.extend(width.to_be_bytes());
@@ -65,7 +65,7 @@ fn wrong_files_are_told_apart() {
 #[ignore = "needs Chromium and target/web: make test-browser"]
 fn a_browser_without_vectors_is_told_so() {
     let site = site();
-    // V8 offers WebAssembly's vectors on processors with SSE 4.1 only.
+    // V8 provides WebAssembly SIMD only on processors with SSE 4.1.
     let browser = open_page(&site, &["--js-flags=--no-enable-sse4-1"]);
     let text = complaint(&browser);
     assert!(text.contains("not its SIMD instructions"), "{text}");

@@ -1,4 +1,4 @@
-//! The page against the command line, and against the clock.
+//! The page compared with the command line, and its speed.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -9,34 +9,35 @@ use serde_json::{Value, json};
 use crate::taught::{Made, array, detect};
 use crate::{assert_quiet, choose, open_model, open_page, repository, screenshots, site};
 
-/// Largest differences between page and command line.
+/// Maximum differences between page and command line.
 const MAX_PX: f64 = 0.5;
 const MAX_DEGREES: f64 = 0.5;
-/// Scores are sums of products that each instruction set rounds in its own order.
+/// Scores are sums of products, which each instruction set rounds in its own order.
 const MAX_SCORE: f64 = 0.01;
-/// Which of two proposals of nearly one score is kept hangs on the last bit of either, and so does the network's score (0.036
-/// apart in one of the pictures). What is grasped does not: the demonstration decides that.
+/// Which of two proposals with nearly equal scores is kept depends on the last bit, and so does the network's score
+/// (0.036 apart in one of the pictures). The grasp does not depend on it: the demonstration decides.
 const MAX_NETWORK_SCORE: f64 = 0.05;
-/// The fastest look at a frame with an `edge` model on one core, without WebGPU. The aim is five a second (200 ms): measured
-/// 172 to 184 ms on an idle machine of two cores, and 245 ms on a shared one, which this bound leaves room for.
+/// Maximum time of the fastest search of a frame with an `edge` model on one core, without WebGPU. The target is five
+/// per second (200 ms): measured 172 to 184 ms on an idle machine with two cores, and 245 ms on a shared one, for which
+/// this bound leaves room.
 const MAX_MILLISECONDS: f64 = 300.0;
-/// Looks that are timed, after those that had the module's functions compiled.
+/// Number of timed searches, after those in which the module's functions are compiled.
 const LOOKS: usize = 7;
-/// Longer gaps between two of the page's frames are seen as freezing.
+/// Maximum gap between two frames of the page; longer ones are visible as freezing.
 const MAX_PAGE_GAP_MS: f64 = 150.0;
-/// A page that freezes by its own fault does so each time; one that another process keeps from its core does not.
+/// A page that freezes through its own fault does so every time; one that another process keeps from its core does not.
 const GAP_TRIALS: usize = 3;
 const MAX_DOWNLOAD_BYTES: usize = 4_000_000;
-/// What is fetched besides where somebody turns to the graphics card: compilers of shaders come along, and the weights once more.
+/// Maximum additional download for the graphics card: shader compilers, and the weights again.
 const MAX_CARD_DOWNLOAD_BYTES: usize = 4_700_000;
 
 const PROCESSOR: &str = "processor";
 const CARD: &str = "webgpu";
-/// Has Chromium lend a graphics card that it computes itself.
+/// Makes Chromium provide a software graphics card.
 const SOFTWARE_CARD: [&str; 3] =
     ["--enable-unsafe-webgpu", "--enable-features=WebGPU,Vulkan", "--use-webgpu-adapter=swiftshader"];
 
-/// Looks at the files of the page's own input, through the page's own modules, and keeps every digit.
+/// Searches the files of the page's input with the page's own modules, and keeps all digits.
 const LOOK: &str = "return (async (device, looks) => {
     const { Detector } = await import(new URL('./detector.js', location.href).href);
     const detector = new Detector(device);
@@ -52,7 +53,7 @@ const LOOK: &str = "return (async (device, looks) => {
     return { results, again: again.map(({ milliseconds }) => milliseconds) };
 })(arguments[0], arguments[1])";
 
-/// Keeps what is chosen, because the page empties its inputs so that the same file can be chosen again.
+/// Stores the chosen files, because the page clears its inputs so that the same file can be chosen again.
 const KEEP: &str = "
     for (const id of ['model-file', 'image-files']) {
         const input = document.getElementById(id);
@@ -63,7 +64,8 @@ fn number(value: &Value, path: &str) -> f64 {
     value.pointer(path).and_then(Value::as_f64).unwrap_or_else(|| panic!("{path} in {value}"))
 }
 
-/// What the page finds, `device` as its `Detector` takes it; and the milliseconds of so many more looks at the last picture.
+/// The page's detections, with `device` as for its `Detector`; and the milliseconds of further searches of the last
+/// picture.
 fn detect_in_all(
     browser: &Browser,
     device: &str,
@@ -94,7 +96,7 @@ fn assert_same(found: &Value, expected: &Value, about: &str) {
         ("/network_score", MAX_NETWORK_SCORE),
         ("/agreement", MAX_SCORE),
     ] {
-        // Model S asks no network.
+        // Model S has no network.
         if expected.pointer(path) == Some(&Value::Null) {
             assert_eq!(found.pointer(path), Some(&Value::Null), "{path}");
             continue;
@@ -107,13 +109,13 @@ fn assert_same(found: &Value, expected: &Value, about: &str) {
     assert!(turn.abs() <= MAX_DEGREES, "{about}: angle differs by {turn}");
 }
 
-/// Every grasp that one side accepts is the other's, too.
+/// Asserts that both sides accept the same grasps.
 fn assert_same_grasps(results: &[Value], expected: &[Vec<Value>], pictures: &[PathBuf], about: &str) {
     assert_eq!(results.len(), expected.len());
     let mut accepted = 0;
     for ((result, expected), picture) in results.iter().zip(expected).zip(pictures) {
         let about = format!("{about}, {}", picture.display());
-        // Best first; those nobody would grasp may come and go with the last bit of a score.
+        // Best first; refused detections may differ with the last bit of a score.
         let sure = |found: &[Value]| found.iter().filter(|d| number(d, "/score") >= 0.5).cloned().collect::<Vec<_>>();
         let (found, expected) = (sure(&array(result["record"]["detections"].clone())), sure(expected));
         assert_eq!(found.len(), expected.len(), "{about}: grasps found");
@@ -146,7 +148,7 @@ fn the_page_finds_what_the_command_line_finds_and_fast_enough() {
     }
 }
 
-/// On SwiftShader, which Chromium brings along: slower than the processor, but the same shaders.
+/// On SwiftShader, which is part of Chromium: slower than the processor, but with the same shaders.
 #[test]
 #[ignore = "needs Chromium and target/web: make test-browser"]
 fn the_graphics_card_finds_what_the_command_line_finds() {
@@ -160,7 +162,7 @@ fn the_graphics_card_finds_what_the_command_line_finds() {
     assert_same_grasps(&results, &expected, pictures, "on the graphics card");
     let times: Vec<f64> = results.iter().map(|result| number(result, "/milliseconds")).collect();
     println!("on SwiftShader: milliseconds a frame {times:.0?}");
-    // The page itself changes over, and says the same.
+    // The page itself switches, and shows the same.
     browser
         .run("document.querySelectorAll('#pictures small').forEach((small) => (small.textContent = ''))", &[])
         .unwrap();
@@ -172,7 +174,7 @@ fn the_graphics_card_finds_what_the_command_line_finds() {
     assert_quiet(&browser);
 }
 
-/// Opens the page, looks at the pictures, and returns the longest time (ms) between two of the page's frames meanwhile.
+/// Opens the page, searches the pictures, and returns the longest time (ms) between two frames of the page meanwhile.
 fn longest_gap(site: &Site, model: &Path, pictures: &[PathBuf]) -> (Browser, f64) {
     let browser = open_page(site, &[]);
     browser.run(
@@ -200,7 +202,7 @@ fn the_page_stays_fluid_and_fits_small_screens() {
         if gap < MAX_PAGE_GAP_MS {
             break;
         }
-        // The browser before it ends first: two would share the cores.
+        // The previous browser is closed first: two would share the cores.
         drop(browser);
         (browser, gap) = longest_gap(&site, &model, &pictures);
     }

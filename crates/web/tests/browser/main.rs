@@ -1,7 +1,7 @@
-//! The page in headless Chromium: the same grasps as `sdg detect`, fast enough, fluid, and clear about what is wrong.
+//! The page in headless Chromium: the same grasps as `sdg detect`, fast, fluid, and with clear errors.
 //!
-//! Needs what `make web` and `make build` write, and Chromium: `make test-browser` has all of it. Screenshots are kept in
-//! target/browser-test.
+//! Needs the results of `make web` and `make build`, and Chromium: `make test-browser` provides all. Screenshots are
+//! kept in target/browser-test.
 #![allow(clippy::unwrap_used)]
 
 mod bad_input;
@@ -14,7 +14,7 @@ use std::time::Duration;
 
 use sdg_webdriver::{Browser, BrowserOptions, Site, serve_folder};
 
-/// What cargo builds into: target/ of the workspace, or where CARGO_TARGET_DIR says.
+/// Cargo's target folder: target/ of the workspace, or CARGO_TARGET_DIR.
 fn target() -> PathBuf {
     // target/release/deps/browser-0123456789abcdef
     std::env::current_exe().unwrap().ancestors().nth(3).unwrap().to_owned()
@@ -28,24 +28,24 @@ fn screenshots() -> PathBuf {
     repository().join("target/browser-test")
 }
 
-/// The page as a static host serves it.
+/// The page on a static host.
 fn site() -> Site {
     let folder = repository().join("target/web");
     assert!(folder.join("sdg_web_bg.wasm").is_file(), "make web writes {}", folder.display());
     serve_folder(folder).unwrap()
 }
 
-/// The page, opened in a browser with these flags.
+/// Opens the page in a browser with these flags.
 fn open_page(site: &Site, flags: &[&str]) -> Browser {
     let flags = flags.iter().map(|flag| (*flag).to_owned()).collect();
-    // A graphics card that Chromium imitates takes its time.
+    // A software graphics card of Chromium is slow.
     let patience = Duration::from_secs(180);
     let browser = Browser::start(&BrowserOptions { flags, patience, ..BrowserOptions::default() }).unwrap();
     browser.open(&site.url("index.html")).unwrap();
     browser
 }
 
-/// Puts files into a file input, as its dialog would.
+/// Chooses files in a file input, as with its dialog.
 fn choose(browser: &Browser, input: &str, files: &[PathBuf]) {
     let paths: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
     browser.find(input).unwrap().type_text(&paths.join("\n")).unwrap();
@@ -56,7 +56,7 @@ fn open_model(browser: &Browser, file: &Path) {
     browser.wait_for("the model's facts", "return document.querySelector('#model-facts dl') !== null").unwrap();
 }
 
-/// The text of the page's alert, once there is one.
+/// The text of the page's alert; waits for it.
 fn complaint(browser: &Browser) -> String {
     let shown = "const a = document.getElementById('alert'); return a.hidden ? '' : a.textContent";
     browser.wait_for("a complaint", shown).unwrap().as_str().unwrap().to_owned()

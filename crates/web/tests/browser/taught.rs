@@ -1,4 +1,4 @@
-//! Models and pictures to try, made by `sdg` itself.
+//! Models and test pictures made by `sdg` itself.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -8,12 +8,12 @@ use tempfile::TempDir;
 
 use crate::{repository, target};
 
-/// Enough for the pendulum to be found; what matters here is that both sides find the same.
+/// Enough to detect the pendulum; what matters is that both sides detect the same.
 const STEPS: &str = "120";
 /// Augmented pictures beside the demonstration itself.
 const SAMPLES: usize = 6;
 
-/// A folder with what `sdg` made.
+/// A folder with files made by `sdg`.
 pub struct Made {
     folder: TempDir,
 }
@@ -62,7 +62,7 @@ pub fn demonstration() -> PathBuf {
     repository().join("datasets/demonstrations/pendulum/image.png")
 }
 
-/// What `sdg detect --json --all` says of pictures, best first each.
+/// The output of `sdg detect --json --all` for pictures, best first each.
 pub fn detect(model: &Path, pictures: &[PathBuf]) -> Vec<Vec<Value>> {
     let mut args = vec!["detect", "--json", "--all", "--grasp-model", model.to_str().unwrap()];
     args.extend(pictures.iter().map(|picture| picture.to_str().unwrap()));
@@ -74,12 +74,12 @@ pub fn array(value: Value) -> Vec<Value> {
     value.as_array().unwrap().clone()
 }
 
-/// Runs the command line that was built beside this test.
+/// Runs the program built beside this test.
 fn sdg(args: &[&str]) -> String {
     let binary = target().join("release/sdg");
     assert!(binary.is_file(), "make build writes {}", binary.display());
     let output = Command::new(binary).args(args).output().unwrap();
-    // 3: nothing to grasp, which is an answer too.
+    // 3: nothing to grasp, which is a valid answer too.
     let answered = matches!(output.status.code(), Some(0 | 3));
     assert!(answered, "sdg {}: {}", args.join(" "), String::from_utf8_lossy(&output.stderr));
     String::from_utf8(output.stdout).unwrap()

@@ -25,11 +25,11 @@ use crate::live_pictures;
 use crate::page_teacher::PageTeacher;
 use crate::web_browser;
 
-/// Keeps other pages from writing a file of marks; `None` where it cannot be written at all.
+/// Locks a file of marks against other processes; `None` where the folder is not writable.
 fn lock(written: &Path) -> Result<Option<WriterLock>> {
     WriterLock::take(written).map_err(|error| match error {
         FileError::Held { path, holder } => anyhow!(
-            "{}: another `sdg annotate` ({holder}) writes these marks; go on in its page, or end it first",
+            "{}: another `sdg annotate` ({holder}) is editing these marks; continue on its page, or stop it first",
             path.display()
         ),
         error => error.into(),
@@ -49,12 +49,12 @@ pub fn run(args: &AnnotateArgs) -> Result<Outcome> {
     let server = if args.images.is_empty() && args.from.is_none() {
         if args.out.is_some() || !args.trial_pictures.is_empty() {
             return Err(Usage(
-                "expected IMAGE or DIR with --out and --try, found none (without them, sdg annotate alone offers the projects)".into(),
+                "expected IMAGE or DIR with --out and --try, found none (without these options, sdg annotate lists the projects)".into(),
             )
             .into());
         }
         let start = Start {
-            // Without a home there is no list that outlives the page.
+            // Without a home directory the list of projects lasts as long as the process.
             recent: recent.unwrap_or_else(|| RecentProjects::at(".sdg-recent-projects.json".into())),
             folder: PathBuf::new(),
             open: opener(preset, camera),
@@ -80,7 +80,7 @@ pub fn run(args: &AnnotateArgs) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// Opens what the arguments name, and what belongs to it.
+/// Opens the files that the arguments name, and their projects.
 fn open(
     args: &AnnotateArgs,
     project: Option<PathBuf>,
@@ -95,7 +95,7 @@ fn open(
         (Some(_), Some(folder)) => Some(folder.join("photo.png")),
         (Some(_), None) => Some(photo_path(&mut images)?),
     };
-    // Marks are made for minutes before the first is written.
+    // Fail now, not after minutes of marking.
     for written in images.first().map(|(image, _)| image).into_iter().chain(&photo_path) {
         sdg_files::check_writable(&written.with_extension("json"))?;
     }
@@ -113,7 +113,7 @@ fn open(
     let locks = written.iter().map(|written| lock(written)).collect::<Result<Vec<_>>>()?;
     for folder in args.trial_pictures.iter().filter(|path| path.is_dir()) {
         for path in sdg_files::entries(folder)? {
-            // What stands beside pictures is no news; a picture that is not read is.
+            // Files beside the pictures are expected and not reported; pictures that cannot be read are.
             if sdg_files::has_extension(&path, &UNREADABLE_EXTENSIONS) {
                 let why = sdg_inputs::read_image(&path).err().map(|error| one_line(&error)).unwrap_or_default();
                 eprintln!("left out: {why}");
@@ -164,7 +164,8 @@ fn opener(preset: Preset, camera: Option<(CameraFile, [f64; 2])>) -> OpenProject
     })
 }
 
-/// How far the hand opens where the photo's middle shows the marks' plane; nearly the same all over a table that is seen from above.
+/// The hand's maximum opening in pixels at the middle of the photo, in the plane of the marks. It is nearly constant
+/// over a table that is seen from above.
 fn max_opening_px((file, [mark_height_m, _]): &(CameraFile, [f64; 2])) -> Option<f64> {
     let [width, height] = file.size_px();
     let middle = Point2::new(0.5 * f64::from(width), 0.5 * f64::from(height));
@@ -173,7 +174,7 @@ fn max_opening_px((file, [mark_height_m, _]): &(CameraFile, [f64; 2])) -> Option
     Some(HAND_OPENING_MAX_M / scale)
 }
 
-/// With a calibration its size is asked for, and pictures of another size are a fault.
+/// Opens the camera. With a calibration, its size is requested, and frames of another size are a fault.
 fn open_camera(
     from: Address,
     mut options: OpenOptions,
@@ -193,7 +194,7 @@ fn open_camera(
     Ok(LiveOptions { pictures, address: address.to_string(), photo_path })
 }
 
-/// The folder, where the arguments are one.
+/// The project's folder, if the arguments are one folder.
 fn project(arguments: &[String]) -> Result<Option<PathBuf>> {
     let mut folders = arguments.iter().map(Path::new).filter(|path| path.is_dir());
     let Some(folder) = folders.next() else { return Ok(None) };
@@ -209,8 +210,8 @@ fn project(arguments: &[String]) -> Result<Option<PathBuf>> {
     Ok(Some(folder.to_owned()))
 }
 
-/// Takes the one image that is not there yet, which is to be taken with the camera, out of those that are; without one it is
-/// photo.png in the current folder.
+/// Removes from `images` the one image that does not exist yet, which is the photo to be taken, and returns it;
+/// `photo.png` in the current folder if all exist.
 fn photo_path(images: &mut Vec<(PathBuf, Option<PathBuf>)>) -> Result<PathBuf> {
     let is_new = |(image, annotation): &mut (PathBuf, Option<PathBuf>)| annotation.is_none() && !image.exists();
     let mut new = images.extract_if(.., is_new).map(|(image, _)| image);
@@ -234,7 +235,7 @@ fn photo_path(images: &mut Vec<(PathBuf, Option<PathBuf>)>) -> Result<PathBuf> {
     Ok(photo)
 }
 
-/// `IMAGE`, or `IMAGE:ANNOTATION` where no file has that whole name.
+/// Splits `IMAGE:ANNOTATION`; an argument that is itself the name of an existing file is not split.
 fn split(argument: &str) -> (PathBuf, Option<PathBuf>) {
     if Path::new(argument).exists() {
         return (argument.into(), None);

@@ -16,16 +16,16 @@ pub struct BoardArgs {
     /// The SVG file to write
     #[arg(long, default_value = "board.svg", value_name = "FILE")]
     out: PathBuf,
-    /// A PDF file of the same sheet to write, too
+    /// Also write the sheet as PDF to this file
     #[arg(long, value_name = "FILE")]
     pdf: Option<PathBuf>,
-    /// Squares across and up
+    /// Number of squares, horizontally and vertically
     #[arg(long, default_value = "9x6", value_name = "WxH", value_parser = squares)]
     squares: [u32; 2],
-    /// A square's side in millimetres; without it, the most whole 5 mm that fit on the paper
+    /// Side of a square in millimetres; default: the largest multiple of 5 mm that fits on the paper
     #[arg(long, value_name = "MM")]
     square_mm: Option<f64>,
-    /// The paper
+    /// Paper size
     #[arg(long, default_value = "a4", value_name = "PAPER")]
     paper: PaperName,
 }

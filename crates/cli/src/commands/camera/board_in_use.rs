@@ -1,4 +1,4 @@
-//! The board that pictures show: from its file or its numbers, and a measured length.
+//! The board in the pictures: read from its file or given by its numbers, with the measured length of its ruler line.
 
 use std::path::{Path, PathBuf};
 
@@ -11,33 +11,33 @@ use serde_json::{Value, json};
 
 use crate::exit::Usage;
 
-/// Larger boards than `sdg camera board` writes.
+/// Maximum size of a board's file; `sdg camera board` writes smaller ones.
 const MAX_BYTES: u64 = 4 << 20;
 
-/// Which board.
+/// The board in the pictures.
 #[derive(Debug, Args)]
 pub struct BoardInUse {
-    /// The board's SVG or PDF, which names its squares
+    /// The board's SVG or PDF, which contains the number and size of its squares
     #[arg(long, value_name = "FILE", conflicts_with_all = ["squares", "square_mm"])]
     board: Option<PathBuf>,
-    /// Squares of the board, across and up
+    /// Number of squares of the board, horizontally and vertically
     #[arg(long, default_value = "9x6", value_name = "WxH", value_parser = squares)]
     squares: [u32; 2],
-    /// A square's side as drawn, in millimetres
+    /// Side of a square as designed, in millimetres
     #[arg(long, default_value_t = 25.0, value_name = "MM")]
     square_mm: f64,
-    /// The length of the printed 100 mm line by a ruler; printers scale
+    /// Measured length of the printed 100 mm line; printers scale
     #[arg(long, default_value_t = 100.0, hide_default_value = true, value_name = "MM")]
     measured_mm: f64,
 }
 
 impl BoardInUse {
-    /// The printed 100 mm line by a ruler, in millimetres.
+    /// Measured length of the printed 100 mm line, in millimetres.
     pub fn measured_mm(&self) -> f64 {
         self.measured_mm
     }
 
-    /// The board as it was printed.
+    /// The board with its printed size.
     pub fn read(&self) -> Result<Board> {
         let drawn = match &self.board {
             Some(path) => {
@@ -53,25 +53,25 @@ impl BoardInUse {
     }
 }
 
-/// `9x6`.
+/// Parses `9x6`.
 pub fn squares(text: &str) -> Result<[u32; 2], String> {
     let sides = text.split_once('x').and_then(|(columns, rows)| Some([columns.parse().ok()?, rows.parse().ok()?]));
-    sides.ok_or_else(|| format!("expected squares across and up, such as 9x6, found {text}"))
+    sides.ok_or_else(|| format!("expected squares horizontally and vertically, such as 9x6, found {text}"))
 }
 
-/// A picture's brightness, in which boards are found.
+/// The picture in grey, the input of board detection.
 pub fn grey(picture: &RgbImage) -> GrayImage {
     image::imageops::grayscale(picture)
 }
 
-/// A pose as camera files and `--json` have it.
+/// A pose in the format of camera files and `--json`.
 pub fn pose_json(pose: &Isometry3<f64>) -> Value {
     let translation: [f64; 3] = pose.translation.vector.into();
     let rotation: [f64; 4] = pose.rotation.coords.into();
     json!({"translation_m": translation, "rotation_xyzw": rotation})
 }
 
-/// A path as messages have it.
+/// A path as shown in messages.
 pub fn named(path: &Path) -> String {
     path.display().to_string()
 }

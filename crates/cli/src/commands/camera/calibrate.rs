@@ -19,32 +19,33 @@ use crate::exit::{Outcome, one_line};
 /// `sdg camera calibrate`
 #[derive(Debug, Args)]
 pub struct CalibrateArgs {
-    /// Pictures of the board, PNG or JPEG: 10 to 20, tilted every way by 20 to 40 degrees, all over the picture
+    /// Pictures of the board, PNG or JPEG: 10 to 20, tilted by 20 to 40 degrees in all directions, with the board in
+    /// every part of the picture
     #[arg(required_unless_present = "from", value_name = "PICTURE")]
     pictures: Vec<PathBuf>,
     #[command(flatten)]
     board: BoardInUse,
-    /// The camera's name in its file; without it, that of the existing file or `camera`
+    /// The camera's name in its file; default: the name in the existing file, or `camera`
     #[arg(long, value_name = "NAME")]
     camera_name: Option<String>,
-    /// The lens has a k3, too: for wide lenses and 20 pictures or more
+    /// Also estimate k3: for wide-angle lenses and at least 20 pictures
     #[arg(long)]
     k3: bool,
-    /// The camera file to write; comments and other programs' fields of an existing one stay
+    /// The camera file to write; comments and unknown fields of an existing file are kept
     #[arg(long, default_value = "camera.yaml", value_name = "FILE")]
     out: PathBuf,
     /// Print one JSON object
     #[arg(long)]
     json: bool,
-    // Last: the heading of its options would be that of what follows.
+    // Flattened last: its help heading also applies to all options after it.
     #[command(flatten)]
     live: TakingArgs,
 }
 
-/// Larger camera files than any tool writes.
+/// Maximum size of a camera file.
 const MAX_BYTES: u64 = 1 << 20;
 
-/// Finds the camera and writes its file.
+/// Calibrates the camera and writes its file.
 pub fn run(args: &CalibrateArgs) -> Result<Outcome> {
     let board = args.board.read()?;
     sdg_files::check_writable(&args.out)?;
@@ -69,7 +70,7 @@ pub fn run(args: &CalibrateArgs) -> Result<Outcome> {
     }
     let Some(first) = seen.first() else {
         if args.pictures.is_empty() {
-            bail!("expected pictures of the board, found that none was taken: the board was never seen at rest");
+            bail!("expected pictures of the board, found none: the board was never seen at rest");
         }
         bail!("expected pictures that show the board, found none among {}", args.pictures.len());
     };
@@ -104,7 +105,7 @@ fn look(path: &Path, board: &Board) -> Result<Seen> {
     Ok(Seen { path: path.to_owned(), size: picture.dimensions(), corners })
 }
 
-/// Corners that no picture shows may not be there.
+/// Warns if no picture shows all squares of the board: `--squares` may be wrong.
 fn warn_of_squares(board: &Board, seen: &[Seen]) {
     let most = |axis: usize| {
         let corners = seen.iter().flat_map(|seen| &seen.corners);
@@ -120,7 +121,8 @@ fn warn_of_squares(board: &Board, seen: &[Seen]) {
     }
 }
 
-/// Tells of a file that cannot be updated before pictures are taken for it. Not noted as an input: it is read again when it is written.
+/// Fails before any picture is taken if the existing file cannot be updated. It is not registered as an input here: it
+/// is read again when it is written.
 fn check_updatable(path: &Path) -> Result<()> {
     let Ok(text) = fs::read_to_string(path) else { return Ok(()) };
     let intrinsics = PinholeCamera::symmetric(640, 480, 500.0);
@@ -132,17 +134,17 @@ fn check_updatable(path: &Path) -> Result<()> {
 }
 
 fn write_camera(args: &CalibrateArgs, found: &Calibration) -> Result<()> {
-    // Board and pictures are read by now, and the file itself is not: it may be completed, they may not be replaced.
+    // The board and the pictures are inputs and must not be replaced; the camera file itself may be updated.
     sdg_files::check_writable(&args.out)?;
     let existing = match fs::exists(&args.out) {
         Ok(true) => String::from_utf8(sdg_files::read(&args.out, MAX_BYTES)?)
-            .map_err(|_| anyhow!("{}: expected YAML, found bytes that are no text", args.out.display()))?,
+            .map_err(|_| anyhow!("{}: expected YAML, found bytes that are not text", args.out.display()))?,
         _ => String::new(),
     };
     let old = CalibratedCamera::from_yaml(&existing).ok();
     if old.as_ref().is_some_and(|old| old.table.is_some() || old.flange_from_camera.is_some()) {
         eprintln!(
-            "{}: the camera's place was measured with the old lens and is removed: run table or hand-eye again",
+            "{}: the camera's pose was measured with the old calibration and is removed: run table or hand-eye again",
             args.out.display()
         );
     }

@@ -18,13 +18,13 @@ use crate::live_pictures::{LiveArgs, next_frame, open};
 pub struct GrabArgs {
     #[command(flatten)]
     pub live: LiveArgs,
-    /// How many frames
+    /// Number of frames
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     pub count: u32,
-    /// Seconds between frames; without it, one after the other
+    /// Seconds between frames; default: no wait
     #[arg(long, value_name = "SECS", default_value_t = 0.0)]
     pub every: f64,
-    /// A PNG file for one frame; a folder, made where it is missing, for more
+    /// A PNG file for one frame; a folder, created if missing, for several
     #[arg(long, value_name = "FILE|FOLDER")]
     pub out: PathBuf,
     /// Print a JSON object for each frame
@@ -32,7 +32,7 @@ pub struct GrabArgs {
     pub json: bool,
 }
 
-/// Frames to PNG files.
+/// Writes frames to PNG files.
 pub fn run(args: &GrabArgs) -> Result<Outcome> {
     if !(0.0..=86400.0).contains(&args.every) {
         return Err(Usage(format!("--every: expected 0 to 86400 seconds, found {}", args.every)).into());
@@ -54,7 +54,7 @@ pub fn run(args: &GrabArgs) -> Result<Outcome> {
     }
     let interrupt = Interrupt::watch();
     let mut camera = open(&args.live.from, &args.live.options())?;
-    // Between frames a live camera goes on: what is taken must be as old as the moment, not as the queue.
+    // A live camera keeps producing frames during the wait: take a fresh one, not one from the queue.
     if args.every > 0.0 && args.live.from.is_live() {
         camera = Box::new(LatestFrame::spawn(camera));
     }
@@ -74,10 +74,10 @@ pub fn run(args: &GrabArgs) -> Result<Outcome> {
         num_written += 1;
     }
     if num_written == 0 {
-        bail!("{}: expected a frame, found that there is none", args.live.from);
+        bail!("{}: expected a frame, found none", args.live.from);
     }
     if num_written < args.count {
-        eprintln!("sdg: {} of {} frames: there are no more", num_written, args.count);
+        eprintln!("sdg: {} of {} frames; the source has no more", num_written, args.count);
     }
     Ok(Outcome::Done)
 }

@@ -24,18 +24,19 @@ pub struct HandEyeArgs {
     /// The camera's file from `sdg camera calibrate`
     #[arg(long, value_name = "FILE")]
     camera: PathBuf,
-    /// Robot poses with the pictures taken there: YAML, JSON or CSV; pictures stand beside it
+    /// Robot poses and the names of the pictures taken at them: YAML, JSON or CSV; the pictures are in the same folder
     #[arg(long, value_name = "FILE")]
     poses: PathBuf,
-    /// What the camera is fixed to: the robot's hand, or its base
+    /// Where the camera is mounted: on the robot's hand, or fixed relative to its base
     #[arg(long, value_name = "PLACE")]
     mount: MountName,
     #[command(flatten)]
     board: BoardInUse,
-    /// The table's z in the robot's base, for a camera beside the robot; without it, that of the camera's file or 0
+    /// The table's z in the robot's base, for a camera beside the robot; default: the value in the camera's file, else
+    /// 0
     #[arg(long, value_name = "MM", allow_hyphen_values = true)]
     table_height_mm: Option<f64>,
-    /// The file to write, with the camera's pose; without it, nothing is written
+    /// The file to write, with the camera's pose; default: nothing is written
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Print one JSON object
@@ -59,12 +60,12 @@ impl From<MountName> for Mount {
     }
 }
 
-/// Larger files of robot poses than anybody measures.
+/// Maximum size of a file of robot poses.
 const MAX_BYTES: u64 = 4 << 20;
-/// A picture so many times worse than the median is named.
+/// A picture whose error is more than this many times the median is reported.
 const MAX_RMS_RATIO: f64 = 3.0;
 
-/// Finds the camera on the robot or beside it.
+/// Finds the pose of the camera on the robot or beside it.
 pub fn run(args: &HandEyeArgs) -> Result<Outcome> {
     let board = args.board.read()?;
     let mount = Mount::from(args.mount);
@@ -112,7 +113,7 @@ pub fn run(args: &HandEyeArgs) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// A pose whose picture is missing is a mistake in the file of poses, not a picture without the board.
+/// A missing picture is an error in the file of poses; it must not be treated as a picture without the board.
 fn check_pictures_exist(poses: &[RobotPose], folder: &Path) -> Result<()> {
     match poses.iter().map(|pose| folder.join(&pose.picture)).find(|picture| !picture.exists()) {
         Some(missing) => bail!("{}: expected the picture of a robot pose, found no such file", missing.display()),
@@ -120,12 +121,12 @@ fn check_pictures_exist(poses: &[RobotPose], folder: &Path) -> Result<()> {
     }
 }
 
-/// The error with the option that corrects it.
+/// Adds the option that corrects the error.
 fn explained(error: CalibrationError, args: &HandEyeArgs) -> anyhow::Error {
     match error {
         CalibrationError::OtherBoardScale { scale, .. } => {
             let measured_mm = scale * args.board.measured_mm();
-            anyhow!("{error} (--measured-mm; by the robot's metres about {measured_mm:.1})")
+            anyhow!("{error} (--measured-mm; about {measured_mm:.1} by the robot poses)")
         }
         error => error.into(),
     }
@@ -171,7 +172,7 @@ fn report(args: &HandEyeArgs, mount: Mount, found: &HandEye, seen: &[&RobotPose]
     )?;
     writeln!(
         stdout,
-        "  ± {:.2} mm, ± {:.3} degrees; one picture left out moves it by up to {spread_mm:.2} mm, {spread_deg:.3} degrees",
+        "  ± {:.2} mm, ± {:.3} degrees; leaving out one picture moves it by up to {spread_mm:.2} mm, {spread_deg:.3} degrees",
         1000.0 * found.sigma_m,
         found.sigma_rad.to_degrees()
     )?;

@@ -1,4 +1,4 @@
-//! `sdg camera`: calibration and live pictures. Each verb's arguments stand beside what it does.
+//! `sdg camera`: calibration and live pictures. Each verb's arguments are in the verb's file.
 
 mod board;
 mod board_in_use;
@@ -22,19 +22,20 @@ pub enum CameraCommand {
     List(list::ListArgs),
     /// Save single frames to files
     Grab(grab::GrabArgs),
-    /// Watch a camera's frames for faults
+    /// Watch a camera and report its faults
     Watch(watch::WatchArgs),
     /// Write a board to print, for calibrate, table and hand-eye
     Board(board::BoardArgs),
-    /// Calibrate a camera from pictures of the board, which it may take by itself, into a camera file
+    /// Calibrate a camera from given pictures of the board, or from pictures that it takes by itself, and write a
+    /// camera file
     Calibrate(calibrate::CalibrateArgs),
-    /// Find where a camera is, from one picture of the board on the table
+    /// Find a camera's pose from one picture of the board on the table
     Table(table::TableArgs),
-    /// Find where a camera is on the robot, or beside it, from robot poses and pictures of the board
+    /// Find a camera's pose on the robot, or beside it, from robot poses and pictures of the board
     HandEye(hand_eye::HandEyeArgs),
 }
 
-/// Runs one of them.
+/// Runs one of the verbs.
 pub fn run(command: &CameraCommand) -> Result<Outcome> {
     match command {
         CameraCommand::List(args) => list::run(args),

@@ -21,15 +21,17 @@ use crate::shared_args::height_mm;
 /// `sdg camera table`
 #[derive(Debug, Args)]
 pub struct TableArgs {
-    /// One picture of the sheet lying on the table
+    /// One picture of the sheet on the table
     #[arg(value_name = "PICTURE")]
     picture: PathBuf,
-    /// The camera's file from `sdg camera calibrate`; without it, the focal length is estimated and the lens taken as straight
+    /// The camera's file from `sdg camera calibrate`; without it, the focal length is estimated and no lens distortion
+    /// is assumed
     #[arg(long, value_name = "FILE")]
     camera: Option<PathBuf>,
     #[command(flatten)]
     board: BoardInUse,
-    /// The sheet's origin (the outer corner above its lower left text) in the robot's base; without it, the sheet is the frame
+    /// The sheet's origin (the outer corner above the text at its lower left) in the robot's base; without it, poses
+    /// are in the sheet's frame
     #[arg(
         long,
         value_name = "X,Y",
@@ -39,7 +41,7 @@ pub struct TableArgs {
         allow_hyphen_values = true
     )]
     sheet_in_base_mm: Vec<f64>,
-    /// The direction of the sheet's x in the robot's base, about its z
+    /// Direction of the sheet's x axis in the robot's base: rotation about z
     #[arg(
         long,
         default_value_t = 0.0,
@@ -59,16 +61,16 @@ pub struct TableArgs {
         allow_hyphen_values = true
     )]
     table_height_mm: f64,
-    /// How high the sheet lies above the table, on a plate
+    /// Height of the sheet's upper side over the table, if the sheet is on a plate
     #[arg(long, default_value_t = 0.0, hide_default_value = true, value_name = "MM", value_parser = height_mm)]
     sheet_thickness_mm: f64,
-    /// Height of a part's marks, at which the error from a wrong focal length is reported
+    /// Height of a part's marks at which the error caused by a wrong focal length is reported
     #[arg(long, default_value_t = 30.0, value_name = "MM", value_parser = height_mm)]
     mark_height_mm: f64,
-    /// Focal length in pixels of a camera without file
+    /// Focal length in pixels, for a camera without a file
     #[arg(long, value_name = "PX", conflicts_with = "camera")]
     focal_px: Option<f64>,
-    /// The file to write, with `table:`; without it, the camera's file itself
+    /// The file to write, with `table:`; default: the camera's file
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Print one JSON object
@@ -76,12 +78,12 @@ pub struct TableArgs {
     json: bool,
 }
 
-/// The error of the focal length whose cost is reported.
+/// Relative error of the focal length whose effect is reported.
 const FOCAL_ERROR: f64 = 0.1;
-/// The longest distance from a robot's base to a sheet.
+/// Maximum distance from a robot's base to a sheet.
 const MAX_REACH_MM: f64 = 5000.0;
 
-/// Finds the camera over the sheet and writes it into a camera file.
+/// Finds the camera's pose over the sheet and writes it into a camera file.
 pub fn run(args: &TableArgs) -> Result<Outcome> {
     let board = args.board.read()?;
     let frame_from_sheet = frame_from_sheet(args)?;
@@ -120,7 +122,7 @@ pub fn run(args: &TableArgs) -> Result<Outcome> {
         Some((_, text)) => camera.update_yaml(text).with_context(|| named(out))?,
         None => camera.to_yaml(),
     };
-    // What `detect --camera` would refuse is refused here.
+    // Check here what `detect --camera` would reject later.
     CalibratedCamera::from_yaml(&text).with_context(|| named(&args.picture))?;
     let cost = focal_cost(&camera.intrinsics, &board, &corners, args.mark_height_mm / 1000.0, FOCAL_ERROR)?;
     sdg_files::extend(out, args.camera.as_deref(), text.as_bytes())?;
@@ -128,7 +130,7 @@ pub fn run(args: &TableArgs) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// From the sheet's frame to that of the file.
+/// The transform from the sheet's frame to the frame of the file.
 fn frame_from_sheet(args: &TableArgs) -> Result<Isometry3<f64>> {
     let thickness = args.sheet_thickness_mm;
     let [x, y] = match args.sheet_in_base_mm[..] {
@@ -198,13 +200,13 @@ fn report(
         FocalSource::Guess => {
             writeln!(
                 stdout,
-                "  focal length {focal:.0} px guessed for a view of {ASSUMED_VIEW_DEG} degrees: the sheet is tilted too little to tell it"
+                "  focal length {focal:.0} px assumed for a view of {ASSUMED_VIEW_DEG} degrees: the sheet is tilted too little to estimate it"
             )?;
         }
     }
     writeln!(
         stdout,
-        "  10 % of focal length cost, {} mm above the sheet: {:.1} mm at the sheet, {:.1} mm at the picture's border",
+        "  an error of 10 % in the focal length gives, {} mm above the sheet: {:.1} mm at the sheet, {:.1} mm at the picture's border",
         args.mark_height_mm, costs[0], costs[1]
     )?;
     Ok(())

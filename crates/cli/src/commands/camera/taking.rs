@@ -1,8 +1,8 @@
-//! `sdg camera calibrate --from`: pictures of the board are taken by themselves, and a page shows which view helps next.
+//! `sdg camera calibrate --from`: takes pictures of the board automatically; a page shows which view is needed next.
 //!
 //! ```text
-//! camera ─ frame ─ find_board ─ PictureTaker: at rest, and new? ─ PNG in --taken ─ calibrate ─ what is lacking
-//!            └──────── corners, views, empty parts and words drawn on it ─ the page on 127.0.0.1
+//! camera ─ frame ─ find_board ─ PictureTaker: at rest, and new? ─ PNG in --taken ─ calibrate ─ what is missing
+//!            └──────── corners, views, empty parts and text drawn on it ─ the page on 127.0.0.1
 //! ```
 
 use std::path::{Path, PathBuf};
@@ -25,30 +25,31 @@ use crate::interrupt::Interrupt;
 use crate::live_pictures::{self, RequestArgs, next_frame};
 use crate::web_browser;
 
-/// Where pictures are written unless the user says.
+/// Default folder of the pictures.
 const DEFAULT_FOLDER: &str = "calibration-pictures";
-/// With so many pictures that lack nothing it is done; docs/calibration.md names both numbers.
+/// Number of pictures after which taking ends, if nothing is missing; docs/calibration.md states both numbers.
 const ENOUGH: usize = 12;
-/// However much is lacking, more pictures do not help.
+/// Number of pictures after which taking ends in any case: more do not improve the result.
 const MAX_TAKEN: usize = 40;
 const BOARD: Color = Color([255, 196, 61]);
 
-/// Where pictures are taken.
+/// Arguments of taking pictures.
 #[derive(Debug, Args)]
 pub struct TakingArgs {
-    /// Take the pictures with a camera instead: v4l:, v4l:/dev/video0, http://HOST/PATH, 'cmd:PROGRAM', dir:FOLDER
+    /// Take the pictures with this camera: v4l:, v4l:/dev/video0, http://HOST/PATH, 'cmd:PROGRAM', dir:FOLDER
     ///
-    /// A page opens that shows the board's corners, where it was seen so far, and the view that helps next. A picture is taken
-    /// whenever the board lies still in a new view, until 12 lack nothing, or 40 are taken; Ctrl-C ends it early with what there is.
+    /// A page opens that shows the board's corners, the views taken so far, and the view that is needed next. A picture
+    /// is taken whenever the board is held still in a new view. Taking ends after 12 pictures if nothing is missing,
+    /// after 40 at the latest; Ctrl-C ends it early and uses the pictures taken so far
     #[arg(long, value_name = "ADDRESS", conflicts_with = "pictures")]
     from: Option<Address>,
-    /// With --from: the folder for the pictures, new or empty; without this option, calibration-pictures
+    /// With --from: the folder for the pictures, new or empty; default: calibration-pictures
     #[arg(long, value_name = "FOLDER")]
     taken: Option<PathBuf>,
-    /// With --from: the page's port on 127.0.0.1; without this option, one that is free
+    /// With --from: the page's port on 127.0.0.1; default: any free port
     #[arg(long, value_name = "PORT")]
     port: Option<u16>,
-    /// With --from: print the page's address and leave the browser to you
+    /// With --from: print the page's address and do not open a browser
     #[arg(long)]
     no_browser: bool,
     #[command(flatten)]
@@ -65,17 +66,17 @@ pub struct Seen {
     pub corners: Vec<SeenCorner>,
 }
 
-/// What stands on the page, in its lower left corner.
+/// Text in the lower left corner of the page.
 struct Words {
     now: String,
     next: String,
 }
 
 impl TakingArgs {
-    /// The camera, if there is one.
+    /// The camera's address, if there is one.
     ///
     /// # Errors
-    /// Options that only a camera can have, without one.
+    /// Camera options are given without a camera.
     pub fn address(&self, pictures: &[PathBuf]) -> Result<Option<&Address>> {
         if self.from.is_none() {
             let own =
@@ -85,10 +86,10 @@ impl TakingArgs {
         Ok(self.from.as_ref())
     }
 
-    /// Takes pictures until nothing is lacking, the camera ends or Ctrl-C is pressed.
+    /// Takes pictures until nothing is missing, the camera ends or Ctrl-C is pressed.
     ///
     /// # Errors
-    /// A camera or a folder that cannot be used.
+    /// The camera or the folder cannot be used.
     pub fn take(
         &self,
         address: &Address,
@@ -120,7 +121,7 @@ impl TakingArgs {
             let size = frame.picture.dimensions();
             let taking = session.get_or_insert_with(|| Taking::new(board, config(size), folder, is_live));
             if taking.size() != size {
-                eprintln!("a frame of {} x {} pixels is passed over", size.0, size.1);
+                eprintln!("a frame of {} x {} pixels is skipped", size.0, size.1);
                 continue;
             }
             let (drawn, words) = taking.look(frame.picture)?;
@@ -140,7 +141,7 @@ struct Taking<'a> {
     folder: &'a Path,
     taker: PictureTaker,
     seen: Vec<Seen>,
-    /// What the pictures lack, the most useful first; empty where nothing is known to.
+    /// The view that is needed most; empty if nothing is known to be missing.
     next: String,
 }
 
@@ -160,7 +161,8 @@ impl<'a> Taking<'a> {
         self.seen.len() >= MAX_TAKEN || (self.seen.len() >= ENOUGH && self.next.is_empty())
     }
 
-    /// Looks at a frame, writes it where it is worth it, and gives what the page shows, and the same in words.
+    /// Searches a frame for the board, saves the frame if it is useful, and returns the picture for the page and the
+    /// same text in words.
     fn look(&mut self, picture: RgbImage) -> Result<(RgbImage, String)> {
         let corners = find_board(&grey(&picture), self.board);
         let now = match &corners {
@@ -170,15 +172,15 @@ impl<'a> Taking<'a> {
                     CalibrationError::OtherBoard { .. } | CalibrationError::OtherCheckerboard { .. } => {
                         error.to_string()
                     }
-                    _ => "the board is not seen".to_owned(),
+                    _ => "no board is visible".to_owned(),
                 }
             }
             Ok(corners) => match self.taker.look(corners) {
                 Sight::Moving => "hold it still".to_owned(),
-                Sight::Known => "seen so already, move it".to_owned(),
+                Sight::Known => "this view is taken, move the board".to_owned(),
                 Sight::New => {
                     self.keep(&picture, corners)?;
-                    "this one, too".to_owned()
+                    "picture taken".to_owned()
                 }
             },
         };
@@ -186,7 +188,7 @@ impl<'a> Taking<'a> {
         let words = match self.is_done() {
             true => Words {
                 now: format!("{so_far}: done"),
-                next: "the camera is calculated, its file is named in the terminal".to_owned(),
+                next: "the camera is being calibrated; the terminal shows its file".to_owned(),
             },
             false => Words { now: format!("{so_far}; {now}"), next: self.next.clone() },
         };
@@ -220,7 +222,8 @@ impl<'a> Taking<'a> {
         }
     }
 
-    /// The picture with the board's corners, the views so far, the parts of the picture that have none, and what to do.
+    /// The picture with the board's corners, the views so far, the regions without views, and the instructions drawn on
+    /// it.
     fn drawn(&self, mut picture: RgbImage, corners: &[SeenCorner], words: &Words) -> RgbImage {
         let width = line_width(&picture);
         for view in self.taker.taken() {
@@ -235,7 +238,7 @@ impl<'a> Taking<'a> {
         draw_keypoints(&mut picture, &places, &Pen::new(BOARD).width(0.6 * width));
         let text_px = (f64::from(picture.width().max(picture.height())) / 55.0).max(8.0);
         let mut bottom = f64::from(picture.height());
-        // A sentence has its own line, so that all of it is in the picture.
+        // One line per sentence, so that each fits into the picture.
         for line in words.next.split(": ").collect::<Vec<_>>().into_iter().rev().filter(|line| !line.is_empty()) {
             draw_label(&mut picture, Point2::new(0.0, bottom), line, Color::NEUTRAL, text_px);
             bottom -= 2.5 * text_px;
@@ -244,7 +247,7 @@ impl<'a> Taking<'a> {
         picture
     }
 
-    /// Of nine equal parts of the picture those that show no corner so far.
+    /// The cells of a 3x3 grid over the picture that contain no corner so far.
     fn empty_parts(&self) -> Vec<BoundingBox> {
         let [width, height] = [self.config.width, self.config.height].map(|side| f64::from(side) / 3.0);
         let parts = (0..9).map(|k| {

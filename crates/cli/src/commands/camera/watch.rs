@@ -18,18 +18,18 @@ use crate::live_pictures::{LiveArgs, open};
 pub struct WatchArgs {
     #[command(flatten)]
     pub live: LiveArgs,
-    /// Seconds to watch; until Ctrl-C without it
+    /// Seconds to watch; default: until Ctrl-C
     #[arg(long, value_name = "SECS")]
     pub seconds: Option<f64>,
-    /// Print a JSON object a second
+    /// Print one JSON object per second
     #[arg(long)]
     pub json: bool,
 }
 
-/// How often a line is printed.
+/// Time between lines.
 const PERIOD: Duration = Duration::from_secs(1);
 
-/// A line a second: frame rate, size, brightness, faults.
+/// Prints one line per second: frame rate, size, brightness, faults.
 pub fn run(args: &WatchArgs) -> Result<Outcome> {
     let limit = match args.seconds {
         Some(secs) if !(0.1..=1e6).contains(&secs) => {
@@ -69,7 +69,7 @@ pub fn run(args: &WatchArgs) -> Result<Outcome> {
     Ok(if num_frames > 0 { Outcome::Done } else { Outcome::NothingToGrasp })
 }
 
-/// The content of one line.
+/// The measurements of one line.
 struct Period {
     start: Instant,
     num_frames: u64,
@@ -77,7 +77,7 @@ struct Period {
     last_number: Option<u64>,
     size: (u32, u32),
     brightness_sum: f64,
-    /// By name: how often, and the last one in words.
+    /// For each fault's name: its count, and the last occurrence in words.
     faults: BTreeMap<&'static str, (u64, String)>,
 }
 

@@ -1,4 +1,4 @@
-//! `sdg demo`: the main job on shipped input, from a photo to grasps.
+//! `sdg demo`: the complete task on shipped input, from a photo to grasps.
 
 #[cfg(feature = "simulation")]
 mod run;
@@ -15,16 +15,16 @@ use crate::shared_args::seconds;
 /// `sdg demo`
 #[derive(Debug, ClapArgs)]
 pub struct DemoArgs {
-    /// The object: one of those shipped under datasets/
+    /// The object: one of the parts in datasets/
     #[arg(long, default_value = "pendulum", value_name = "NAME")]
     pub object: String,
-    /// Grasp attempts
+    /// Number of grasp attempts
     #[arg(long, default_value_t = 10, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub attempts: u32,
-    /// Decides every random choice
+    /// Seed of all random choices
     #[arg(long, default_value_t = 1, value_name = "N")]
     pub seed: u64,
-    /// Seconds that the network's training may take at most
+    /// Maximum seconds for training the network
     #[arg(long, value_name = "SECS", value_parser = seconds)]
     pub time_budget: Option<f64>,
     /// Folder for the report

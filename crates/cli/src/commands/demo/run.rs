@@ -1,4 +1,4 @@
-//! `sdg demo`: the main job on shipped input, from a photo to grasps.
+//! `sdg demo`: the complete task on shipped input, from a photo to grasps.
 
 use std::time::Duration;
 
@@ -17,12 +17,12 @@ use crate::interrupt::Interrupt;
 use crate::parts::part_named;
 use crate::teaching_progress::TeachingProgress;
 
-/// Pictures with the part, and without it, on which the model is tried.
+/// Numbers of test pictures with the part and without it.
 const VIEWS: (usize, usize) = (12, 12);
-/// Seeds of those pictures, far from those of attempts and tests.
+/// Seeds of those pictures; they differ from the seeds of attempts and tests.
 const VIEWS_SEED: u64 = 7_000_000;
 
-/// Teach, try, grasp, report.
+/// Teaches, tests, grasps and writes the report.
 pub fn run(args: &DemoArgs) -> Result<Outcome> {
     let object = part_named("--object", &args.object)?;
     let demonstration = shipped::demonstration(&args.object)?;
@@ -32,7 +32,7 @@ pub fn run(args: &DemoArgs) -> Result<Outcome> {
     let interrupt = Interrupt::watch();
     eprintln!("teaching the {} from one photo", object.title.to_lowercase());
     let mut options = TeachOptions::new(args.seed);
-    // The workcell's camera hovers as high as it was for the photo.
+    // The workcell's camera hovers at the height from which the photo was taken.
     options.size_tolerance = CheckConfig::FIXED_HEIGHT_TOLERANCE;
     options.time_budget = args.time_budget.map(Duration::from_secs_f64);
     options.symmetry = object.symmetry;

@@ -9,7 +9,7 @@ use sdg_cell::DEFAULT_MIN_SCORE;
 use crate::live_pictures::RequestArgs;
 use crate::shared_args::{ComputeArgs, RegionArg, SizeTolerance, region_or_all, share, size_tolerance};
 
-/// Where an angle is zero and which way it grows, drawn.
+/// Drawing of the zero angle and the direction in which angles grow.
 const ANGLES_HELP: &str = "\
 Angles:
   The angle of a grasp is the direction from the first marked point to the second; the jaws close across it.
@@ -25,57 +25,60 @@ Angles:
 #[derive(Debug, ClapArgs)]
 #[command(after_long_help = ANGLES_HELP)]
 pub struct DetectArgs {
-    /// A grasp model that `sdg teach` wrote
+    /// A grasp model written by `sdg teach`
     #[arg(long, value_name = "FILE")]
     pub grasp_model: PathBuf,
-    /// Where the network computes
+    /// Device for the network
     #[command(flatten)]
     pub compute: ComputeArgs,
-    /// Leave out the check against the demonstration: the network alone decides and places
+    /// Skip the check against the demonstration: the network alone decides and gives the poses
     #[arg(long)]
     pub no_verify: bool,
-    /// Most parts to find in an image, the surest first
+    /// Maximum number of parts per image, highest scores first
     #[arg(long, default_value_t = 100, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub max: u32,
-    /// Smallest and largest size of the part over its size in the photo, instead of what it was taught with
+    /// Smallest and largest size of the part relative to the photo, in place of the values that the model was taught
+    /// with
     #[arg(long, value_name = "LOW-HIGH", value_parser = size_tolerance)]
     pub size_tolerance: Option<SizeTolerance>,
-    /// The calibrated camera that took the pictures: grasps in metres, and parts of another size refused. For models taught
-    /// with a camera, this or another one
+    /// The calibrated camera that took the pictures: grasps are also given in metres, and parts of another size are
+    /// refused. For models taught with a camera, the same one or another
     #[arg(long, value_name = "FILE", conflicts_with = "size_tolerance")]
     pub camera: Option<PathBuf>,
-    /// Search only this part of each picture: left edge, upper edge, width and height in its pixels; the word "all" searches all of it;
-    /// without it, the part that the model was taught with. A part counts whose grasp point lies in it and at least half of the part
+    /// Search only this part of each picture: left edge, upper edge, width and height in its pixels; "all" searches the
+    /// whole picture; default: the region that the model was taught with. A part counts if its grasp point and at least
+    /// half of its area are in the region
     #[arg(long, value_name = "X,Y,W,H|all", allow_hyphen_values = true, value_parser = region_or_all)]
     pub region: Option<RegionArg>,
-    /// Accept detections that score at least so much; more for fewer wrong ones, less for fewer missed ones
+    /// Minimum score of accepted detections; a higher value gives fewer wrong and more missed parts
     #[arg(long, value_name = "SCORE", default_value_t = DEFAULT_MIN_SCORE, value_parser = share)]
     pub min_score: f64,
-    /// Also list detections scored below that, with what speaks against them
+    /// Also list refused detections, with the reasons
     #[arg(long)]
     pub all: bool,
-    /// A JSON line for each image
+    /// Print one JSON line per image
     #[arg(long)]
     pub json: bool,
-    /// Write each image with its grasps drawn on it into this folder, under what was refused marks where edges, surface and features differ
-    /// from the photo; with --from, show them in browsers at this port of 127.0.0.1 instead, 0 for any
+    /// Write each image with its grasps to this folder; refused detections show marks where edges, surface and features
+    /// differ from the photo. With --from, serve the pictures to browsers at this port of 127.0.0.1 instead (0: any
+    /// free port)
     #[arg(long, value_name = "DIR|PORT")]
     pub draw: Option<PathBuf>,
-    /// Images (PNG, JPEG, WebP, BMP, TIFF), folders of them, or - for one on standard input
+    /// Images (PNG, JPEG, WebP, BMP, TIFF), folders of images, or - for one image from standard input
     #[arg(required_unless_present = "from", value_name = "IMAGE|DIR|-")]
     pub images: Vec<PathBuf>,
-    /// Live pictures instead of images, until Ctrl-C: v4l:, v4l:/dev/video0, v4l:NAME, http://HOST/PATH, 'cmd:PROGRAM ARGUMENTS',
-    /// dir:FOLDER, file:PATH or sim:PART. Parts are followed from frame to frame, or searched for in each with --every-frame;
-    /// --json prints a line for each frame
+    /// Live pictures in place of images, until Ctrl-C: v4l:, v4l:/dev/video0, v4l:NAME, http://HOST/PATH, 'cmd:PROGRAM
+    /// ARGUMENTS', dir:FOLDER, file:PATH or sim:PART. Parts are tracked from frame to frame, or searched for in each
+    /// frame with --every-frame; --json prints one line per frame
     #[arg(long, value_name = "ADDRESS", help_heading = "Live pictures")]
     pub from: Option<Address>,
-    /// End after so many frames
+    /// Stop after this number of frames
     #[arg(long, value_name = "N", help_heading = "Live pictures")]
     pub frames: Option<u64>,
-    /// Search every frame on its own, instead of following parts
+    /// Search every frame independently; parts are not tracked
     #[arg(long, help_heading = "Live pictures")]
     pub every_frame: bool,
-    /// What the camera is asked for
+    /// Settings of the camera
     #[command(flatten)]
     pub request: RequestArgs,
 }

@@ -1,4 +1,4 @@
-//! The pictures of `sdg detect`, checked before the first is looked at.
+//! The pictures of `sdg detect`, checked before the first is searched.
 
 use std::path::{Path, PathBuf};
 
@@ -7,11 +7,11 @@ use sdg_inputs::{PictureInput, STANDARD_INPUT};
 
 use crate::exit::Usage;
 
-/// Drawings are called like their pictures and end in `.png`: in the folder of these they would replace them or their neighbours, and a
-/// second run would take them for pictures.
+/// Drawings have the names of their pictures with the extension `.png`. In the pictures' folder they would overwrite
+/// pictures, and a second run would read them as pictures.
 ///
 /// # Errors
-/// A folder that a picture lies in.
+/// A picture is in this folder.
 pub fn check_drawn_elsewhere<'a>(folder: &Path, pictures: impl Iterator<Item = &'a PictureInput>) -> Result<()> {
     let Ok(folder_of_drawings) = folder.canonicalize() else {
         return Ok(());
@@ -30,7 +30,7 @@ pub fn check_drawn_elsewhere<'a>(folder: &Path, pictures: impl Iterator<Item = &
     Ok(())
 }
 
-/// Standard input can be read once.
+/// Standard input can be read only once.
 ///
 /// # Errors
 /// [`Usage`] where it is named twice.

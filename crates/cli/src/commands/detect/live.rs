@@ -1,4 +1,4 @@
-//! `sdg detect --from`: parts in live pictures, a line for each frame.
+//! `sdg detect --from`: parts in live pictures, one line per frame.
 //!
 //! ```text
 //! camera ─ frame ─┬─ LiveTracker: followed from frame to frame, searches beside ─┬─ line on standard output
@@ -66,7 +66,7 @@ pub fn run(args: &DetectArgs, address: &Address, detector: Perception) -> Result
         left -= 1;
         let began = Instant::now();
         let picture = Arc::new(std::mem::take(&mut frame.picture));
-        // Of a folder each picture is told, as any that cannot be used.
+        // In a folder, every picture of a wrong size is reported, like any picture that cannot be used.
         if !matches!(address, Address::Folder { .. })
             && let Some(error) = sizes.check(finder.perception(), &picture)?
         {
@@ -77,7 +77,7 @@ pub fn run(args: &DetectArgs, address: &Address, detector: Perception) -> Result
         }
         let parts = match finder.find(&picture, &frame) {
             Ok(parts) => parts,
-            // One picture of a folder says nothing of the others.
+            // In a folder, one picture's error does not affect the others.
             Err(error) if matches!(address, Address::Folder { .. }) => {
                 let error = anyhow::Error::from(error).context(format!("frame {} of {address}", frame.number));
                 write_error(&mut stdout, args, address, &error)?;
@@ -105,21 +105,23 @@ pub fn run(args: &DetectArgs, address: &Address, detector: Perception) -> Result
     Ok(if found_any { Outcome::Done } else { Outcome::NothingToGrasp })
 }
 
-/// Which frames can be searched by their size: a camera that is set to another one gives frames that the region, or the calibration, is not
-/// for.
+/// Skips frames of a wrong size: a camera that is switched to another size gives frames to which the region or the
+/// calibration does not apply.
 #[derive(Default)]
 struct Sizes {
-    /// A frame could be searched.
+    /// A frame of the right size was seen.
     is_any_right: bool,
-    /// The wrong size that was told last, until a right one comes.
+    /// The wrong size that was reported last, until a frame of the right size.
     told: Option<(u32, u32)>,
 }
 
 impl Sizes {
-    /// `None` for a picture that can be searched. A picture of another size is skipped; the first in a row gives the error to be told.
+    /// `None` if the picture can be searched. A picture of another size is skipped; the first one in a row returns the
+    /// error to report.
     ///
     /// # Errors
-    /// The first picture of the stream has another size: so will the others, and nothing would ever be found.
+    /// The first picture of the stream has another size: the following ones would have it too, and nothing would ever
+    /// be found.
     fn check(&mut self, detector: &Perception, picture: &RgbImage) -> Result<Option<Option<anyhow::Error>>> {
         let Err(error) = detector.check_picture(picture) else {
             *self = Self { is_any_right: true, told: None };
@@ -134,7 +136,7 @@ impl Sizes {
     }
 }
 
-/// A camera is asked for the size that it was calibrated with, or that the region is for.
+/// Opens the camera with the size of its calibration, or of the model's region.
 fn open(args: &DetectArgs, address: &Address, detector: &Perception) -> Result<Frames> {
     let mut options = args.request.options();
     options.frame = detector.pixel_frame();
@@ -213,7 +215,7 @@ fn write_line(
             writeln!(out, "frame {}: {}{text} ({:.1} ms)", frame.number, of.unwrap_or_default(), 1e3 * seconds)?;
         }
     }
-    // Whoever reads the stream waits for this frame.
+    // Flushed, because readers of the stream wait for this frame.
     Ok(out.flush()?)
 }
 
@@ -229,11 +231,11 @@ fn write_error(out: &mut impl Write, args: &DetectArgs, address: &Address, error
     Ok(())
 }
 
-/// A line of `--json` for a frame.
+/// One line of `--json`: a frame.
 #[derive(Serialize)]
 struct FrameLine<'a> {
     camera: &'a str,
-    /// The part that the model looks for.
+    /// Name of the part that the model detects.
     object: &'a str,
     frame: u64,
     /// Seconds since 1970.
@@ -257,7 +259,7 @@ struct FaultLine {
 struct PartLine {
     #[serde(flatten)]
     found: FoundRecord,
-    /// As for pictures.
+    /// As in the records of pictures.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     jaws_touch: Vec<usize>,
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -26,7 +26,7 @@ use crate::json_line::json_line;
 use crate::paint::{Paint, Tone};
 use crate::shared_args::RegionArg;
 
-/// Every image gets its line; one that cannot be read gets its error, and the next one its turn.
+/// Prints one line per image. An image that cannot be read gets a line with its error, and the run continues.
 pub fn run(args: &DetectArgs) -> Result<Outcome> {
     if args.from.is_none() {
         let own = [("--frames", args.frames.is_some()), ("--every-frame", args.every_frame)];
@@ -95,35 +95,35 @@ pub fn run(args: &DetectArgs) -> Result<Outcome> {
     match (batch.num_failed, batch.num_found > 0) {
         (0, true) => Ok(Outcome::Done),
         (0, false) => Ok(Outcome::NothingToGrasp),
-        // One line says all of one picture.
+        // For one picture its line says everything.
         (1, _) if batch.is_alone => bail!(batch.last_error),
         (failed, _) => bail!("{failed} of {} pictures could not be used", failed + batch.num_used),
     }
 }
 
-/// Pictures one after the other, each with its line.
+/// Processes pictures in order and prints a line for each.
 struct Batch<'a, W> {
     args: &'a DetectArgs,
     detector: &'a Perception,
     stdout: W,
-    /// Names of the pictures that were drawn.
+    /// File names of the drawings written so far.
     drawn: BTreeSet<String>,
     num_used: usize,
     num_failed: usize,
-    /// There is one picture in all.
+    /// It is the only picture of this run.
     is_alone: bool,
     last_error: String,
     /// Accepted detections in all pictures.
     num_found: usize,
-    /// Pictures with at least one of them.
+    /// Pictures with at least one accepted detection.
     num_with_parts: usize,
 }
 
 impl<W: Write> Batch<'_, W> {
-    /// Detects in a picture and writes its line; a picture that cannot be used gets a line with its error.
+    /// Detects parts in a picture and prints its line; a picture that cannot be used gets a line with its error.
     ///
     /// # Errors
-    /// Standard output that cannot be written.
+    /// Standard output cannot be written.
     fn picture(&mut self, input: &PictureInput) -> Result<()> {
         match self.detect(input) {
             Ok(seen) => {
@@ -137,7 +137,7 @@ impl<W: Write> Batch<'_, W> {
         }
     }
 
-    /// Says on standard error what was found in several pictures.
+    /// Prints the totals of several pictures on standard error.
     fn summarize(&self) {
         if !self.is_alone {
             let Self { num_found, num_with_parts, num_used, .. } = self;
@@ -175,7 +175,8 @@ impl<W: Write> Batch<'_, W> {
     }
 }
 
-/// The picture with its detections, and under the best refused ones where it differs from the demonstration, and why.
+/// The picture with its detections drawn; for the best refused ones also the differences from the demonstration and the
+/// reasons.
 fn drawn(mut image: RgbImage, found: &[Found], wording: &Wording<'_>) -> RgbImage {
     let detections = || found.iter().map(|found| &found.detection);
     let refused: Vec<_> = wording.explained(detections()).into_iter().map(|idx| &found[idx].detection).collect();
@@ -242,11 +243,11 @@ impl Seen {
     }
 }
 
-/// A line of `--json`; docs/command-line.md describes it.
+/// One line of `--json` (docs/command-line.md).
 #[derive(Serialize)]
 struct ImageLine<'a> {
     image: &'a str,
-    /// The part that the model looks for.
+    /// Name of the part that the model detects.
     object: &'a str,
     width: u32,
     height: u32,
@@ -257,22 +258,22 @@ struct ImageLine<'a> {
     detections: Vec<PictureRecord>,
 }
 
-/// A detection and what helps to understand it.
+/// A detection with explanatory values.
 #[derive(Serialize)]
 struct PictureRecord {
     #[serde(flatten)]
     found: FoundRecord,
-    /// Over that in the photo.
+    /// Size relative to the photo.
     #[serde(skip_serializing_if = "Option::is_none")]
     size: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     advice: Option<&'static str>,
-    /// Numbers, in this list, of the parts that its jaws would touch.
+    /// Indices, in this list, of the parts that the jaws would touch.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     jaws_touch: Vec<usize>,
 }
 
-/// A line of `--json` for an image that cannot be used.
+/// One line of `--json` for an image that cannot be used.
 #[derive(Serialize)]
 struct ErrorLine {
     image: String,

@@ -3,7 +3,7 @@
 use sdg_grasp::SearchRegion;
 use serde::Serialize;
 
-/// The part of the picture that was searched; pixels.
+/// The searched region of the picture, in pixels.
 #[derive(Serialize)]
 pub struct RegionRecord {
     x: u32,

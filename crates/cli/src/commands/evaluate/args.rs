@@ -9,35 +9,36 @@ use super::sharing_args::SharingArgs;
 use super::split_args::{SPLIT_HELP, SplitArgs};
 use crate::shared_args::{backend, share};
 
-/// What `sdg evaluate --pictures` reads and writes.
+/// Help on the input and output of `sdg evaluate --pictures`.
 const PICTURES_HELP: &str = "\
 Labelled pictures (--pictures DIR):
-  DIR holds pictures (PNG, JPEG, WebP, BMP, TIFF) and their labels: LabelMe (a JSON file of the same name beside each) or COCO (one
-  JSON file with `images` and `annotations`), or truth.json, beside which other labels are not read (docs/file-formats.md). Each instance of the part has a box or an outline and the two points of the
-  grasp, grasp_start and grasp_end; in LabelMe its shapes share a group_id. An instance flagged `optional` (LabelMe: in
-  `flags`; COCO: in `attributes`) is neither missed nor wrong, and may lack the grasp. A picture whose labels mark nothing is one without the part.
-  A picture that the model was taught from is left out. Folders are not searched for folders: call once for each.
+  DIR contains pictures (PNG, JPEG, WebP, BMP, TIFF) and their labels: LabelMe (a JSON file of the same name beside each picture)
+  or COCO (one JSON file with `images` and `annotations`) or truth.json; with truth.json, other labels are ignored
+  (docs/file-formats.md). Each instance of the part has a box or an outline and the two points of the grasp, grasp_start and
+  grasp_end; in LabelMe its shapes share a group_id. An instance flagged `optional` (LabelMe: in `flags`; COCO: in `attributes`)
+  counts neither as missed nor as wrong, and may lack the grasp. A picture with labels but without instances is a picture without
+  the part. Pictures that the model was taught from are left out. Subfolders are not searched: run the command once per folder.
 
-  A hit lies within 4 % of the instance's diagonal and 10 degrees of the marks, but for turns that `sdg teach --symmetry`
-  said look alike; one detection to one instance, the best score first. The diagonal is that of the demonstration's box, as
-  much larger as the instance's marks are longer than the demonstration's; truth.json has diagonal and symmetry of each. A picture is clean when something on it is right
-  and nothing wrong.
+  A hit is a detection within 4 % of the instance's diagonal and within 10 degrees of the marks; turns in which the part looks the
+  same (`sdg teach --symmetry`) are equivalent. Detections are matched to instances one to one, highest score first. The diagonal
+  is that of the demonstration's box, scaled by the length of the instance's marks over that of the demonstration's; truth.json
+  states diagonal and symmetry of each instance. A picture is clean if it has a right detection and no wrong one.
 
   --json prints one object: found, parts, missed, wrong, optional_found, optional, clean, pictures_with_part, false_alarms,
   pictures_without_part (counts); errors {median_px, median_percent, median_deg, p95_px, p95_percent, p95_deg} or null;
   pictures [{image, outcome: right|missed|wrong|quiet|false_alarm, found, parts, missed, wrong, clean, false_alarm,
   seconds, instances [{grasp: {x, y, angle_deg, diagonal_px} or null, box, optional, found}], detections [{hit: {instance,
   error: {px, percent, deg} or null} or null, detection: as `sdg detect --json`}]}]; by_kind [{kind, found, parts, wrong,
-  false_alarms, pictures_without_part}] where truth.json names kinds; by_min_score [{min_score, found, wrong, clean, false_alarms}]; left_out [{file, why}]; other_labels; report;
-  label_offset {agreeing {count, of}, along_percent, across_percent, px, turn_deg, totals}, where the labels mark another grasp on the part.
-  The exit code is 3 where parts are marked and nothing at all was detected.";
+  false_alarms, pictures_without_part}] if truth.json names kinds; by_min_score [{min_score, found, wrong, clean, false_alarms}]; left_out [{file, why}]; other_labels; report;
+  label_offset {agreeing {count, of}, along_percent, across_percent, px, turn_deg, totals}, if the labels mark another grasp on the part.
+  The exit code is 3 if parts are marked and nothing was detected.";
 
 /// `sdg evaluate`
 #[derive(Debug, ClapArgs)]
 #[command(after_long_help = format!("{PICTURES_HELP}\n\n{SPLIT_HELP}"))]
 pub struct EvaluateArgs {
-    /// Test a taught model on your own labelled pictures instead: a folder of pictures with LabelMe or COCO labels or truth.json. The
-    /// end of --help says how they are labelled and what is counted
+    /// Test a taught model on your own labelled pictures: a folder of pictures with LabelMe or COCO labels or
+    /// truth.json. The end of --help describes the labels and the counts
     #[arg(
         long,
         value_name = "DIR",
@@ -50,16 +51,17 @@ pub struct EvaluateArgs {
         help_heading = PICTURES
     )]
     pub pictures: Option<PathBuf>,
-    /// The grasp model to test, as `sdg teach` wrote it
+    /// The grasp model to test, written by `sdg teach`
     #[arg(long, value_name = "FILE", requires = "pictures", help_heading = PICTURES)]
     pub grasp_model: Option<PathBuf>,
-    /// Leave out the check against the demonstration: the network alone decides and places
+    /// Skip the check against the demonstration: the network alone decides and gives the poses
     #[arg(long, requires = "pictures", help_heading = PICTURES)]
     pub no_verify: bool,
-    /// The calibrated camera that took the pictures, for a model taught with a camera: errors in millimetres, too
+    /// The calibrated camera that took the pictures, for a model taught with a camera: errors are also given in
+    /// millimetres
     #[arg(long, value_name = "FILE", requires = "pictures", help_heading = PICTURES)]
     pub camera: Option<PathBuf>,
-    /// The least score that counts
+    /// Minimum score of accepted detections
     #[arg(
         long,
         default_value_t = 0.5,
@@ -69,10 +71,10 @@ pub struct EvaluateArgs {
         help_heading = PICTURES
     )]
     pub min_score: f64,
-    /// The label of the part, where others are labelled too; without it, the model's object
+    /// The label of the part, if other objects are labelled too; default: the model's object
     #[arg(long, value_name = "NAME", requires = "pictures", help_heading = PICTURES)]
     pub label: Option<String>,
-    /// Where the network computes: flex, or what this build adds; see sdg devices
+    /// Device for the network: flex, or one that this build adds; see sdg devices
     #[arg(
         long,
         default_value = "flex",
@@ -82,27 +84,28 @@ pub struct EvaluateArgs {
         help_heading = PICTURES
     )]
     pub device: ComputeBackend,
-    /// The grasp models, by letter or name; without it, all
+    /// The grasp models, by letter or name; default: all
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub models: Vec<String>,
-    /// The parts, out of those shipped under datasets/; without it, the paper's eight
+    /// The parts: names of folders in datasets/; default: the paper's eight
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub objects: Vec<String>,
-    /// Grasp attempts of each model on each part
+    /// Number of grasp attempts of each model on each part
     #[arg(long, default_value_t = 10, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub attempts: u32,
-    /// Unseen pictures of each part, for detection against the truth
+    /// Number of unseen pictures of each part, for detection against the ground truth
     #[arg(long, default_value_t = 25, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub views: u32,
-    /// Pictures for each part in which it is not, for false alarms
+    /// Number of pictures without the part for each part, for false alarms
     #[arg(long, default_value_t = 25, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub scenes: u32,
-    /// Also try every grasp without the check against the demonstration: twice the attempts
+    /// Also run every grasp without the check against the demonstration: this doubles the attempts
     #[arg(long)]
     pub unverified: bool,
-    /// Instead of the paper's protocol: pictures made harder one axis at a time (height, tilt, covered, dark, blur, tint,
-    /// clutter, instances, look-alikes; all: pictures) and grasps under errors (no-error, marks, mark-height, hand-eye,
-    /// friction, shake; all: grasps). Without names, everything, on all parts
+    /// Evaluate pictures whose difficulty is raised along one axis at a time (height, tilt, covered, dark, blur, tint,
+    /// clutter, instances, look-alikes; all: pictures), and grasps under errors (no-error, marks, mark-height,
+    /// hand-eye, friction, shake; all: grasps), in place of the paper's protocol. Without names: everything, on all
+    /// parts
     #[arg(
         long,
         value_name = "NAMES",
@@ -113,9 +116,9 @@ pub struct EvaluateArgs {
         help_heading = AXES
     )]
     pub axes: Option<Vec<String>>,
-    /// Instead of the paper's protocol: parts taught in the plan view of one calibrated camera, on pictures of others (webcam,
-    /// phone, overhead), along the axes, and of parts of other sizes (other-sizes). Without names, everything, by models S and
-    /// C on all parts
+    /// Evaluate parts taught in the plan view of one calibrated camera on pictures of other cameras (webcam, phone,
+    /// overhead), along the axes, and on parts of other sizes (other-sizes), in place of the paper's protocol. Without
+    /// names: everything, by models S and C on all parts
     #[arg(
         long,
         value_name = "NAMES",
@@ -126,7 +129,7 @@ pub struct EvaluateArgs {
         help_heading = AXES
     )]
     pub cameras: Option<Vec<String>>,
-    /// Pictures of each part and axis, or of each part and camera
+    /// Number of pictures of each part and axis, or of each part and camera
     #[arg(
         long,
         default_value_t = 20,
@@ -136,7 +139,7 @@ pub struct EvaluateArgs {
         help_heading = AXES
     )]
     pub axis_views: u32,
-    /// Edge points that model S compares at each pose of its search, instead of as taught
+    /// Number of edge points that model S compares at each pose of its search, in place of the taught number
     #[arg(
         long,
         value_name = "N",
@@ -145,28 +148,28 @@ pub struct EvaluateArgs {
         help_heading = AXES
     )]
     pub search_points: Option<u32>,
-    /// The folder (--out) of another run with --axes, to compare with on the same pictures
+    /// The --out folder of another run with --axes, to compare with on the same pictures
     #[arg(long, value_name = "DIR", requires = "axes", help_heading = AXES)]
     pub against: Option<PathBuf>,
     /// Network, training and augmentation
     #[arg(long, default_value = "edge", value_name = "NAME")]
     pub preset: String,
-    /// Optimiser steps instead of the preset's
+    /// Number of optimiser steps, in place of the preset's
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub steps: Option<u32>,
-    /// Seconds that a network's training may take at most; --jobs 1 gives each teaching the whole machine
+    /// Maximum seconds for training one network; with --jobs 1 each training has the whole machine
     #[arg(long, value_name = "SECS", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub time_budget: Option<u32>,
-    /// Decides every random choice
+    /// Seed of all random choices
     #[arg(long, default_value_t = 1, value_name = "N")]
     pub seed: u64,
-    /// Teachings and rehearsals side by side; without it, one for each core
+    /// Number of teachings and rehearsals run in parallel; default: one per core
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=256))]
     pub jobs: Option<u32>,
-    /// Folder for models and results; what is in it already is not done again
+    /// Folder for models and results; results that are already in it are kept and not computed again
     #[arg(long, default_value = "target/evaluation", value_name = "DIR")]
     pub out: PathBuf,
-    /// Folder for the page; without it, the folder of the results, or target/pictures-report for --pictures
+    /// Folder for the page; default: the folder of the results, for --pictures target/pictures-report
     #[arg(long, value_name = "DIR")]
     pub report: Option<PathBuf>,
     /// Sets of pictures on both sides of a split

@@ -1,4 +1,4 @@
-//! `sdg evaluate --axes`: pictures made harder one axis at a time, and grasps under errors.
+//! `sdg evaluate --axes`: pictures along one axis of difficulty at a time, and grasps under errors.
 
 use std::fmt::Write;
 
@@ -17,7 +17,7 @@ use crate::interrupt::Interrupt;
 use crate::json_line::json_line;
 use crate::progress::EvaluationProgress;
 
-/// Does what is still to do, then writes the tables of all that there is: after Ctrl-C, too.
+/// Runs the remaining units, then writes the tables of all finished ones; also after Ctrl-C.
 pub fn run(args: &EvaluateArgs, names: &[String]) -> Result<Outcome> {
     let selection = Selection::parse(names).map_err(|error| Usage(format!("--axes: {error}")))?;
     let models = models(&args.models, &ModelKind::ALL)?;
@@ -25,7 +25,7 @@ pub fn run(args: &EvaluateArgs, names: &[String]) -> Result<Outcome> {
     let (preset, settings) = settings(args)?;
     let store = Store::open(&args.out, &settings)?;
     let against = args.against.as_deref().map(Against::open).transpose().context("--against")?;
-    // Beside the page of the paper's protocol, not in its place.
+    // Beside the page of the paper's protocol, which is kept.
     let report_folder = args.report.clone().unwrap_or_else(|| args.out.join("axes"));
     sdg_files::prepare_folder(&report_folder)?;
 
@@ -66,19 +66,19 @@ pub fn run(args: &EvaluateArgs, names: &[String]) -> Result<Outcome> {
     }
     match (failures.first(), remaining) {
         (None, 0) => Ok(Outcome::Done),
-        (None, _) => bail!("interrupted with {remaining} units of work to do: the same command goes on"),
+        (None, _) => bail!("interrupted with {remaining} units of work to do: the same command continues"),
         (Some(first), _) => bail!(
-            "{} units of work failed, {remaining} are to do: the same command tries them again; the first: {first}",
+            "{} units of work failed, {remaining} are to do: the same command tries again; the first: {first}",
             failures.len()
         ),
     }
 }
 
-/// The command that gives the same results.
+/// The command that reproduces the results.
 fn command(args: &EvaluateArgs, names: &[String]) -> String {
     let mut command = "sdg evaluate --axes".to_owned();
     let mut option = |name: &str, value: &dyn std::fmt::Display| {
-        // Writing into a string cannot fail.
+        // Writing to a string cannot fail.
         let _ = write!(command, "{}{value}", if name.is_empty() { " ".to_owned() } else { format!(" --{name} ") });
     };
     if !names.is_empty() {

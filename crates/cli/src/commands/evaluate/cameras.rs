@@ -1,4 +1,4 @@
-//! `sdg evaluate --cameras`: parts taught with one calibrated camera and found with others.
+//! `sdg evaluate --cameras`: parts taught with one calibrated camera, detected with others.
 
 use anyhow::{Result, bail};
 use sdg_evaluation::Store;
@@ -15,7 +15,7 @@ use crate::interrupt::Interrupt;
 use crate::json_line::json_line;
 use crate::progress::EvaluationProgress;
 
-/// Does what is still to do, then writes the tables of all that there is: after Ctrl-C, too.
+/// Runs the remaining units, then writes the tables of all finished ones; also after Ctrl-C.
 pub fn run(args: &EvaluateArgs, names: &[String]) -> Result<Outcome> {
     let sets = sets(names)?;
     let models = models(&args.models, &[ModelKind::S, ModelKind::C])?;
@@ -53,11 +53,11 @@ pub fn run(args: &EvaluateArgs, names: &[String]) -> Result<Outcome> {
     }
     match summary.remaining {
         0 => Ok(Outcome::Done),
-        remaining => bail!("interrupted with {remaining} units of work to do: the same command goes on"),
+        remaining => bail!("interrupted with {remaining} units of work to do: the same command continues"),
     }
 }
 
-/// The sets of these names; without a name, all.
+/// The picture sets with these names; all sets if there are no names.
 fn sets(names: &[String]) -> Result<Vec<PictureSet>> {
     let all = PictureSet::all();
     if names.is_empty() {
@@ -71,7 +71,7 @@ fn sets(names: &[String]) -> Result<Vec<PictureSet>> {
     names.iter().map(of).collect()
 }
 
-/// The command that gives the same results.
+/// The command that reproduces the results.
 fn command(args: &EvaluateArgs, names: &[String]) -> String {
     let mut words = vec!["sdg evaluate --cameras".to_owned()];
     words.extend((!names.is_empty()).then(|| names.join(",")));

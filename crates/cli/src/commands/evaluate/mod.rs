@@ -1,4 +1,5 @@
-//! `sdg evaluate`: the paper's protocol, whole or in units; pictures along axes, other cameras, the user's own pictures, or a split of sets.
+//! `sdg evaluate`: the paper's protocol, whole or in units; pictures along axes, other cameras, the user's own
+//! pictures, or split sets.
 
 mod args;
 #[cfg(feature = "simulation")]

@@ -6,10 +6,10 @@ use sdg_grasp::ModelKind;
 
 use crate::exit::Usage;
 
-/// The models of these letters or names; without any, those given.
+/// The models with these letters or names; `otherwise` if there are no names.
 ///
 /// # Errors
-/// No model of a name; a model twice.
+/// An unknown name, or a model given twice.
 pub fn models(names: &[String], otherwise: &[ModelKind]) -> Result<Vec<ModelKind>> {
     if names.is_empty() {
         return Ok(otherwise.to_vec());

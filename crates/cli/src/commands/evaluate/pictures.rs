@@ -19,10 +19,10 @@ use crate::json_line::json_line;
 use crate::progress::EvaluationProgress;
 use crate::shared_args::ComputeArgs;
 
-/// Where the page goes unless `--report` says otherwise; not among the user's pictures.
+/// Default folder of the page; not the folder of the user's pictures.
 const DEFAULT_REPORT: &str = "target/pictures-report";
 
-/// Every label is read and checked first, then the model looks at one picture after the other.
+/// Reads and checks every label first, then searches the pictures in order.
 pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
     let (Some(folder), Some(model_file)) = (&args.pictures, &args.grasp_model) else {
         return Err(
@@ -44,7 +44,7 @@ pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
         let name = picture.name();
         let of_picture = match Tested::detect(picture, &detector, verification) {
             Ok(of_picture) => of_picture,
-            // The model searches a region of pictures of another size.
+            // The model's region is for pictures of another size.
             Err(error) if matches!(error.downcast_ref(), Some(CellError::Grasp(GraspError::Region(_)))) => {
                 labelled.left_out.push(LeftOut { file: name, why: error.root_cause().to_string() });
                 continue;
@@ -80,10 +80,10 @@ pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
     Ok(if found_nothing { Outcome::NothingToGrasp } else { Outcome::Done })
 }
 
-/// The command that gives the same results.
+/// The command that reproduces the results.
 fn command(args: &EvaluateArgs, folder: &Path, model_file: &Path) -> String {
     let mut command = format!("sdg evaluate --pictures {} --grasp-model {}", folder.display(), model_file.display());
-    // Writing into a string cannot fail.
+    // Writing to a string cannot fail.
     let _ = write!(command, " --min-score {}", args.min_score);
     if let Some(camera) = &args.camera {
         let _ = write!(command, " --camera {}", camera.display());

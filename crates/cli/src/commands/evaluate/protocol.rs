@@ -17,7 +17,7 @@ use crate::interrupt::Interrupt;
 use crate::json_line::json_line;
 use crate::progress::EvaluationProgress;
 
-/// Does what is still to do, then writes the tables of all that there is: after Ctrl-C, too.
+/// Runs the remaining units, then writes the tables of all finished ones; also after Ctrl-C.
 pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
     let models = models(&args.models, &ModelKind::ALL)?;
     let objects = objects(&args.objects, ObjectSpec::paper_names())?;
@@ -36,18 +36,18 @@ pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
 
     let remaining = write_tables(args, &evaluation, &settings)?;
     if interrupted {
-        bail!("interrupted with {remaining} units of work to do: the same command goes on");
+        bail!("interrupted with {remaining} units of work to do: the same command continues");
     }
     Ok(Outcome::Done)
 }
 
-/// Where the page goes.
+/// Folder of the page.
 pub(super) fn report_folder(args: &EvaluateArgs) -> &Path {
     args.report.as_ref().unwrap_or(&args.out)
 }
 
-/// Writes the tables of what there is, prints them in brief, and says how many units are still to do. `settings` are what the
-/// reader is told.
+/// Writes the tables of the finished units, prints a summary, and returns the number of remaining units. `settings` are
+/// those shown to the reader.
 pub(super) fn write_tables(args: &EvaluateArgs, evaluation: &Evaluation, settings: &Settings) -> Result<usize> {
     let command = command(args, settings);
     let WrittenTables { summaries, remaining, cells, tables, report } =
@@ -71,11 +71,11 @@ pub(super) fn write_tables(args: &EvaluateArgs, evaluation: &Evaluation, setting
     Ok(remaining)
 }
 
-/// The command that gives the same results.
+/// The command that reproduces the results.
 pub(super) fn command(args: &EvaluateArgs, settings: &Settings) -> String {
     let mut command = "sdg evaluate".to_owned();
     let mut option = |name: &str, value: &dyn std::fmt::Display| {
-        // Writing into a string cannot fail.
+        // Writing to a string cannot fail.
         let _ = write!(command, " --{name} {value}");
     };
     if !args.models.is_empty() {

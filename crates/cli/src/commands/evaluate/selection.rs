@@ -1,4 +1,4 @@
-//! What all kinds of `sdg evaluate` read from its arguments: parts, preset and workers.
+//! Arguments that all kinds of `sdg evaluate` share: parts, preset and workers.
 
 use anyhow::Result;
 use sdg_evaluation::Settings;
@@ -9,10 +9,10 @@ use super::args::EvaluateArgs;
 use crate::exit::Usage;
 use crate::parts::part_named;
 
-/// The preset, and what the store's results depend on.
+/// The preset, and the settings on which the stored results depend.
 ///
 /// # Errors
-/// No preset of that name.
+/// Unknown preset.
 pub fn settings(args: &EvaluateArgs) -> Result<(Preset, Settings)> {
     let preset: Preset = args.preset.parse().map_err(|error: GraspError| Usage(format!("--preset: {error}")))?;
     let settings = Settings {
@@ -29,12 +29,12 @@ pub fn settings(args: &EvaluateArgs) -> Result<(Preset, Settings)> {
     Ok((preset, settings))
 }
 
-/// Units of work side by side: as asked for, else one for each core.
+/// Number of units run in parallel: as given, else one per core.
 pub fn jobs(args: &EvaluateArgs) -> usize {
     args.jobs.map_or_else(|| std::thread::available_parallelism().map_or(1, usize::from), |jobs| jobs as usize)
 }
 
-/// The parts of these names; without a name, `all`.
+/// The parts with these names; `all` if there are no names.
 pub fn objects(names: &[String], all: impl Iterator<Item = &'static str>) -> Result<Vec<ObjectSpec>> {
     let names: Vec<String> = if names.is_empty() { all.map(str::to_owned).collect() } else { names.to_vec() };
     let mut objects: Vec<ObjectSpec> = Vec::new();

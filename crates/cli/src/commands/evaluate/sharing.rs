@@ -24,15 +24,15 @@ use crate::exit::{Outcome, Usage, one_line};
 use crate::interrupt::Interrupt;
 use crate::progress::EvaluationProgress;
 
-/// How often a folder is read again.
+/// Time between two reads of the folder.
 const WATCH_EVERY: Duration = Duration::from_secs(2);
 
-/// What the arguments name.
+/// The evaluation that the arguments describe.
 struct Asked {
     models: Vec<ModelKind>,
     objects: Vec<ObjectSpec>,
     preset: Preset,
-    /// Of the ordinary run: without the program's hash.
+    /// Settings of an ordinary run: without the program's hash.
     settings: Settings,
     unverified: bool,
 }
@@ -53,13 +53,13 @@ impl Asked {
         all_units(&self.models, &self.objects, self.unverified)
     }
 
-    /// Opens the folder as one of many.
+    /// Opens the folder for use by several processes.
     fn open(&self, folder: &Path) -> Result<Store> {
         let settings = Settings { program: Some(own_sha256()?), ..self.settings.clone() };
         Store::open_shared(folder, &settings)
     }
 
-    /// Units run one at a time in each process.
+    /// In each process, units run one at a time.
     fn evaluation<'a>(&'a self, store: &'a Store) -> Evaluation<'a> {
         Evaluation {
             models: &self.models,
@@ -72,7 +72,7 @@ impl Asked {
     }
 }
 
-/// Runs what the arguments ask for.
+/// Runs the option that was given.
 pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
     let sharing = &args.sharing;
     if let Some(folder) = &sharing.watch {
@@ -116,7 +116,7 @@ fn do_units(asked: &Asked, args: &EvaluateArgs) -> Result<Outcome> {
         })
     });
     let named = named.collect::<Result<Vec<_>, _>>()?;
-    // A missing simulator is told once, before anything is done or written.
+    // A missing simulator is reported once, before anything is done or written.
     if named.iter().any(|unit| UnitKind::of(&unit.name).is_some_and(UnitKind::is_simulated)) {
         sdg_simulation::load()?;
     }
@@ -132,7 +132,7 @@ fn do_units(asked: &Asked, args: &EvaluateArgs) -> Result<Outcome> {
         let (told, how) = match done {
             Ok(Ended::Done(summary)) => (summary, "done"),
             Ok(Ended::Already(receipt)) => (format!("done already, by {}", receipt.by), "already"),
-            Ok(Ended::Interrupted) => bail!("{}: interrupted; the same command goes on", unit.name),
+            Ok(Ended::Interrupted) => bail!("{}: interrupted; the same command continues", unit.name),
             Err(error) => {
                 failures.push(error);
                 continue;
@@ -187,7 +187,7 @@ fn watch(folder: &Path, json: bool) -> Result<Outcome> {
         let screen = progress.to_string();
         let line = screen.lines().next().unwrap_or_default();
         if is_terminal {
-            // From the upper left corner, with what was there removed.
+            // Redraws from the upper left corner and clears the old content.
             print!("\x1b[H\x1b[J{screen}");
         } else if progress.is_settled {
             print!("{screen}");
@@ -199,7 +199,7 @@ fn watch(folder: &Path, json: bool) -> Result<Outcome> {
         if progress.is_settled {
             return match progress.units - progress.done {
                 0 => Ok(Outcome::Done),
-                missing => Err(anyhow!("{}: {missing} of {} units came to nothing", folder.display(), progress.units)),
+                missing => Err(anyhow!("{}: {missing} of {} units have no result", folder.display(), progress.units)),
             };
         }
         std::thread::sleep(WATCH_EVERY);
@@ -211,7 +211,7 @@ fn submit(asked: &Asked, args: &EvaluateArgs) -> Result<Outcome> {
     let folder = std::path::absolute(&args.out)?;
     let program = std::env::current_exe().context("the program's own path")?;
     let arguments = protocol::command(args, &asked.settings);
-    // No argument of an evaluation has a space.
+    // No argument of an evaluation contains a space.
     let arguments = arguments.split(' ').skip(1).map(str::to_owned);
     let command: Vec<String> = [program.display().to_string()].into_iter().chain(arguments).collect();
     let job = SlurmJob {

@@ -7,13 +7,13 @@ use clap::Args as ClapArgs;
 /// The heading of these options in the help.
 const SHARING: &str = "Units for a cluster (docs/slurm.md)";
 
-/// Single units in a folder that many machines see, and the tables of what they left there.
+/// Running single units in a shared folder, and making the tables from their results.
 #[derive(Debug, ClapArgs)]
 pub struct SharingArgs {
-    /// List the units of work by name and do nothing; with --json what each waits for, and whether it is done
+    /// List the names of all units of work and exit; with --json also each unit's dependencies and whether it is done
     #[arg(long, group = "sharing", conflicts_with_all = ["pictures", "sheet"], help_heading = SHARING)]
     pub list_units: bool,
-    /// Do these units alone, in the folder of --out, in which other processes may do others; what is done is left
+    /// Run only these units, in the folder of --out, where other processes may run others; finished units are skipped
     #[arg(
         long,
         value_name = "NAME",
@@ -24,11 +24,11 @@ pub struct SharingArgs {
         help_heading = SHARING
     )]
     pub unit: Vec<String>,
-    /// Check that every unit was done once, by this program with these settings, and write the tables; otherwise say what
-    /// is wrong with which
+    /// Check that every unit was done exactly once, by this program with these settings, and write the tables;
+    /// otherwise report the error of each faulty unit
     #[arg(long, group = "sharing", conflicts_with_all = ["pictures", "sheet"], help_heading = SHARING)]
     pub collect: bool,
-    /// Show how far the units of a folder are until nothing changes any more; with --json once, as one object
+    /// Show the progress of the units in a folder until nothing changes any more; with --json once, as one object
     #[arg(
         long,
         value_name = "DIR",
@@ -37,7 +37,7 @@ pub struct SharingArgs {
         help_heading = SHARING
     )]
     pub watch: Option<PathBuf>,
-    /// Print a script that hands all units to this scheduler as job arrays
+    /// Print a script that submits all units to this scheduler as job arrays
     #[arg(
         long,
         value_name = "SCHEDULER",
@@ -47,10 +47,10 @@ pub struct SharingArgs {
         help_heading = SHARING
     )]
     pub submit: Option<String>,
-    /// Run that script instead of printing it
+    /// Run that script in place of printing it
     #[arg(long, requires = "submit", help_heading = SHARING)]
     pub yes: bool,
-    /// Cores that a unit asks for
+    /// Number of cores requested for a unit
     #[arg(
         long,
         default_value_t = 2,
@@ -60,7 +60,7 @@ pub struct SharingArgs {
         help_heading = SHARING
     )]
     pub cores: u32,
-    /// Memory that a unit asks for
+    /// Memory requested for a unit
     #[arg(
         long,
         default_value_t = 1500,
@@ -70,7 +70,7 @@ pub struct SharingArgs {
         help_heading = SHARING
     )]
     pub memory_mb: u32,
-    /// How long a unit may take
+    /// Time limit of a unit
     #[arg(
         long,
         default_value_t = 30,
@@ -80,13 +80,13 @@ pub struct SharingArgs {
         help_heading = SHARING
     )]
     pub limit_mins: u32,
-    /// A further argument for sbatch, such as --sbatch=--partition=cpu; repeat for several
+    /// An additional argument for sbatch, such as --sbatch=--partition=cpu; repeat for several
     #[arg(long, value_name = "ARG", allow_hyphen_values = true, requires = "submit", help_heading = SHARING)]
     pub sbatch: Vec<String>,
 }
 
 impl SharingArgs {
-    /// Whether any of these was asked for instead of the whole evaluation.
+    /// Whether any of these options is given; otherwise the whole evaluation runs.
     pub fn is_asked_for(&self) -> bool {
         self.list_units || !self.unit.is_empty() || self.collect || self.watch.is_some() || self.submit.is_some()
     }

@@ -1,4 +1,4 @@
-//! `sdg evaluate --split`: sets that may be tuned on beside sets that are only reported.
+//! `sdg evaluate --split`: sets that may be used for tuning and sets that are only reported.
 
 use std::path::Path;
 
@@ -13,7 +13,7 @@ use super::model_names::models;
 use crate::exit::{Outcome, Usage};
 use crate::progress::EvaluationProgress;
 
-/// Every set is read first, then taught and measured, one after the other: the detector's speed is part of the result.
+/// Reads every set first, then teaches and measures one set at a time: the detector's speed is part of the result.
 pub fn run(args: &EvaluateArgs, file: &Path) -> Result<Outcome> {
     let Some(sets_folder) = &args.split.sets else {
         return Err(Usage("--split: expected --sets DIR beside it, found none".to_owned()).into());

@@ -7,28 +7,29 @@ use clap::Args as ClapArgs;
 /// The heading of these options in the help.
 const SPLIT: &str = "Sets on both sides of a split";
 
-/// What `sdg evaluate --split` reads, counts and writes.
+/// Help on the input, counts and output of `sdg evaluate --split`.
 pub const SPLIT_HELP: &str = "\
 Sets on both sides of a split (--split FILE --sets DIR):
-  FILE (datasets/split.toml, docs/file-formats.md) names sets of pictures below DIR, how each is taught, and its side: tuned (constants may
-  be fitted on it), used (earlier constants were) or reported. Every set is taught by each of --models (without it, S) with each of
-  --seeds and the defaults of `sdg teach`, and its pictures are searched as by `sdg detect`; counted as by --pictures. Printed as
-  tables: each set, each kind of picture, and the sides beside each other with 95 % intervals (Wilson) and the difference of tuned
-  and reported (Newcombe), which is beyond chance where its interval does not hold zero. Both take detections as independent.
-  With several seeds each figure is the worst of them. Wrong is out of all detections accepted on pictures with the part.
+  FILE (datasets/split.toml, docs/file-formats.md) names sets of pictures below DIR, how each is taught, and its side: tuned
+  (constants may be fitted on it), used (earlier constants were) or reported. Every set is taught with each of --models (default: S)
+  and each of --seeds, with the defaults of `sdg teach`; its pictures are searched as by `sdg detect` and counted as by --pictures.
+  The tables show each set, each kind of picture, and the sides with 95 % intervals (Wilson), and the difference of tuned and
+  reported (Newcombe), which is significant if its interval does not contain zero. Both intervals assume independent detections.
+  With several seeds, each figure is the worst of them. Wrong detections are given as a share of all accepted ones on pictures with
+  the part.
 
   --json, or --results FILE beside the tables, gives one object: split, sides, models [{model, pictures_per_second, seeds [{seed,
   sides [{side, found, wrong, false_alarms {count, of}, their _interval, kinds, by_min_score}], sets [{set, side, found, wrong,
   false_alarms, pictures, teach_seconds, detect_seconds, kinds}]}], worst [as sides], tuned_less_reported [{figure, interval}] or
-  null}]. --records FILE gets a JSON line for each candidate, accepted or not: set, side, model, seed, image, kind, place (right,
+  null}]. --records FILE writes a JSON line for each candidate, accepted or not: set, side, model, seed, image, kind, place (right,
   wrong_turn, misplaced: within half a diagonal, wrong), hit (part, optional or null), distance_percent, turn_deg, and the fields of a
   detection of `sdg detect --json`.";
 
-/// Teaches and measures sets, both those that may be tuned on and the others.
+/// Teaches and measures the sets that may be used for tuning and the others.
 #[derive(Debug, ClapArgs)]
 pub struct SplitArgs {
-    /// Teach and measure the sets that a file names, what may be tuned on beside what is only reported. The end of --help says
-    /// what is counted
+    /// Teach and measure the sets named in a file, separately for sets that may be used for tuning and sets that are
+    /// only reported. The end of --help describes the counts
     #[arg(
         long,
         value_name = "FILE",
@@ -43,10 +44,10 @@ pub struct SplitArgs {
     /// The folder that holds the sets' folders
     #[arg(long, value_name = "DIR", requires = "split", help_heading = SPLIT)]
     pub sets: Option<PathBuf>,
-    /// The tuned side alone: nothing of the others is read or printed
+    /// Only the tuned sets: the others are neither read nor printed
     #[arg(long, requires = "split", help_heading = SPLIT)]
     pub tuned: bool,
-    /// Seeds to teach with
+    /// Seeds of the teachings
     #[arg(
         long,
         default_value = "1",
@@ -56,10 +57,10 @@ pub struct SplitArgs {
         help_heading = SPLIT
     )]
     pub seeds: Vec<u64>,
-    /// Write the object of --json into a file, beside the tables
+    /// Also write the object of --json to this file
     #[arg(long, value_name = "FILE", requires = "split", help_heading = SPLIT)]
     pub results: Option<PathBuf>,
-    /// Write a JSON line for each candidate of the measured sides, with what it is by the truth
+    /// Write one JSON line for each candidate of the measured sides, with its class by the ground truth
     #[arg(long, value_name = "FILE", requires = "split", help_heading = SPLIT)]
     pub records: Option<PathBuf>,
 }

@@ -1,4 +1,4 @@
-//! Numbers on the command line of `sdg plan`.
+//! Parsers of the numeric arguments of `sdg plan`.
 
 use std::f64::consts::FRAC_PI_4;
 use std::str::FromStr;
@@ -28,7 +28,7 @@ pub fn opening_mm(text: &str) -> Result<f64, String> {
     millimetres(text, "an opening", [0.0, HAND_OPENING_MAX_M * 1e3])
 }
 
-/// `--margin-mm`. Nothing in a cell keeps a tenth of a metre from everything.
+/// `--margin-mm`. A larger margin than 100 mm would fit no cell.
 pub fn margin_mm(text: &str) -> Result<f64, String> {
     millimetres(text, "a distance", [0.1, 100.0])
 }
@@ -83,12 +83,13 @@ impl FromStr for Held {
     }
 }
 
-/// No tcp comes so near to the middle of the robot's base.
+/// Minimum distance of a goal from the origin of the robot's base.
 const MIN_DISTANCE_MM: f64 = 10.0;
-/// How far rounded numbers are from parts of a turn.
+/// Maximum distance of an angle from a multiple of an eighth turn that is attributed to rounding.
 const ROUNDING_RAD: f64 = 0.006;
 
-/// Whether the angles are eighths of a turn in radians, as 3.14 and 0.785: hardly anybody means 3.14 degrees.
+/// Whether the angles look like multiples of an eighth turn in radians, such as 3.14 and 0.785; 3.14 degrees is an
+/// unlikely input.
 fn are_radians(angles: &[f64]) -> bool {
     let is_part = |angle: f64| {
         let eighths = angle.abs() / FRAC_PI_4;

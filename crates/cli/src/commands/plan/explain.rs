@@ -7,19 +7,19 @@ use sdg_kinematics::planning::{Plan, PlanPart, nearest_on, plan_parts};
 use sdg_kinematics::{ArmGeometry, JointVector, Trajectory};
 use serde_json::{Value, json};
 
-/// What there is to say of a plan.
+/// A plan and its key figures.
 pub(super) struct Explained {
     arm: ArmGeometry,
     start: JointVector,
     parts: Vec<PlanPart>,
-    /// Motions from rest to rest that the parts are followed in.
+    /// Number of motions from rest to rest that follow the parts.
     num_motions: usize,
-    /// How long they take, and how long with a stop at every waypoint.
+    /// Duration of these motions in seconds; `stopping_secs` is the duration with a stop at every waypoint.
     secs: f64,
     stopping_secs: f64,
-    /// What is in the way of the straight motion, where that is not the plan.
+    /// The collision on the straight motion, if the plan is not straight.
     straight: Option<Proximity>,
-    /// Number of the goal as it was given, from 0, and its turn, degrees.
+    /// Index of the goal in the order given, from 0, and the chosen turn in degrees.
     goal: (usize, f64),
     num_checks: usize,
     planning_ms: f64,
@@ -53,10 +53,10 @@ impl Explained {
 
     pub(super) fn text(&self) -> String {
         let mut text = String::new();
-        let mut line = |what: String| writeln!(text, "  {what}").expect("a string takes any text");
+        let mut line = |what: String| writeln!(text, "  {what}").expect("writing to a string cannot fail");
         let (secs, num_motions) = (self.secs, self.num_motions);
         let motions = match num_motions {
-            0 => "the arm is there already, a motion".to_owned(),
+            0 => "the arm is at the goal already, a motion".to_owned(),
             1 => "one motion".to_owned(),
             _ => format!("{num_motions} motions"),
         };
@@ -72,7 +72,7 @@ impl Explained {
         line(format!("goal {}, turned by {turn_deg:.0}° about the hand's axis", goal + 1));
         match &self.straight {
             None => line("nothing is in the way of the straight motion".to_owned()),
-            Some(nearest) => line(format!("not straight, for on the straight motion {nearest}")),
+            Some(nearest) => line(format!("not straight, because on the straight motion {nearest}")),
         }
         for (index, part) in self.parts.iter().enumerate() {
             let tcp = self.arm.forward(&part.end).translation.vector * 1e3;

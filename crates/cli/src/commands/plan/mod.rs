@@ -25,38 +25,41 @@ use explain::Explained;
 /// `sdg plan`
 #[derive(Debug, Args)]
 pub struct PlanArgs {
-    /// The workcell's file, with an [[obstacle]] for everything that stands in the cell
+    /// The workcell's file, with an [[obstacle]] for every object in the cell
     #[arg(long, value_name = "FILE")]
     pub workcell: PathBuf,
-    /// Joint angles that the arm starts from: seven, in degrees, as in 0,-45,0,-135,0,90,45; without it, the workcell's first joints_deg, or the ready pose
+    /// Joint angles at the start: seven, in degrees, as in 0,-45,0,-135,0,90,45; default: the first joints_deg in the
+    /// workcell's file, else the ready pose
     #[arg(long, value_name = "Q", allow_hyphen_values = true)]
     pub start: Option<JointsDeg>,
-    /// Goal of the tcp in the base frame: X,Y,Z in mm, or X,Y,Z,YAW with the hand straight down and turned by YAW degrees, or
-    /// X,Y,Z,ROLL,PITCH,YAW (180,0,YAW is straight down). Given several times, the pose that is quickest to reach is taken
+    /// Goal of the tcp in the base frame: X,Y,Z in mm; or X,Y,Z,YAW with the hand pointing straight down, rotated by
+    /// YAW degrees; or X,Y,Z,ROLL,PITCH,YAW (180,0,YAW points straight down). If given several times, the pose that is
+    /// reached fastest is chosen
     #[arg(long, value_name = "POSE", required = true, allow_hyphen_values = true)]
     pub goal: Vec<GoalPose>,
-    /// Number of equal turns about the hand's axis in which the goal may be reached: 2 allows exchanged fingers, 1 the given pose only
+    /// Number of equally spaced turns about the hand's axis in which the goal may be reached: 2 allows exchanged
+    /// fingers, 1 only the given pose
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=36))]
     pub turns: u32,
-    /// What the hand holds, as a capsule around the hand's axis from the tcp on: DIAMETER,LENGTH in mm
+    /// The held object, as a capsule along the hand's axis that starts at the tcp: DIAMETER,LENGTH in mm
     #[arg(long, value_name = "SIZE")]
     pub held_mm: Option<Held>,
-    /// How far the fingers are open
+    /// Distance between the open fingers
     #[arg(long, value_name = "MM", default_value_t = HAND_OPENING_MAX_M * 1e3, value_parser = arguments::opening_mm)]
     pub opening_mm: f64,
-    /// Distance to keep from everything
+    /// Minimum distance to all obstacles
     #[arg(long, value_name = "MM", default_value_t = 3.0, value_parser = arguments::margin_mm)]
     pub margin_mm: f64,
     /// Share of the joints' velocity limits, above 0 and at most 0.6
     #[arg(long, value_name = "SHARE", default_value_t = DEFAULT_SPEED)]
     pub speed: f64,
-    /// Seed of the search's random configurations: the same seed gives the same path
+    /// Seed of the random search; the same seed gives the same path
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
-    /// Folder for the drawn motion
+    /// Folder for the drawing of the motion
     #[arg(long, value_name = "DIR", default_value = "plan")]
     pub out: PathBuf,
-    /// Draw nothing
+    /// Skip the drawing
     #[arg(long)]
     pub no_drawing: bool,
     /// Print the path as one JSON object on standard output
@@ -64,7 +67,7 @@ pub struct PlanArgs {
     pub json: bool,
 }
 
-/// Plans, prints the plan and draws it.
+/// Plans a motion, prints it and draws it.
 pub fn run(args: &PlanArgs) -> Result<Outcome> {
     let pace = robots::pace(args.speed)?;
     let (workcell, _) = sdg_inputs::read_workcell(&args.workcell)?;
@@ -80,7 +83,7 @@ pub fn run(args: &PlanArgs) -> Result<Outcome> {
         let found = start.map(|angle| angle.to_degrees());
         let found: Vec<String> = found.iter().map(|angle| format!("{angle:.3}")).collect();
         bail!(
-            "--start: expected joint angles in degrees, found {}, which the joints reach as radians alone: radians given as degrees?",
+            "--start: expected joint angles in degrees, found {}, which fit the joint limits only as radians: radians given as degrees?",
             found.join(",")
         );
     }
@@ -109,7 +112,7 @@ pub fn run(args: &PlanArgs) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// All poses in all their turns.
+/// All goal poses in all their turns.
 fn goals(args: &PlanArgs) -> Vec<Isometry3<f64>> {
     let turn = |index: u32| {
         let angle_rad = std::f64::consts::TAU * f64::from(index) / f64::from(args.turns);
@@ -118,7 +121,7 @@ fn goals(args: &PlanArgs) -> Vec<Isometry3<f64>> {
     args.goal.iter().flat_map(|GoalPose(pose)| (0..args.turns).map(move |index| pose * turn(index))).collect()
 }
 
-/// The first of the limits on every motion of `sdg grasp` that these break: the workspace, the table, the tcp's speed.
+/// The first limit of `sdg grasp` that the motions violate: the workspace, the table, the tcp's speed.
 fn refused_by_limits(workcell: &Workcell, motions: &[Trajectory]) -> Option<String> {
     let limits = workcell.safety_limits();
     motions.iter().find_map(|motion| limits.check(motion.clone()).err()).map(|violation| violation.to_string())
@@ -126,7 +129,7 @@ fn refused_by_limits(workcell: &Workcell, motions: &[Trajectory]) -> Option<Stri
 
 #[cfg(feature = "simulation")]
 fn draw(args: &PlanArgs, workcell: &Workcell, motions: &[Trajectory]) -> Result<()> {
-    // The plan is made; it is drawn where there is a simulator.
+    // The drawing needs a simulator; the plan does not.
     if let Err(missing) = sdg_simulation::load() {
         eprintln!("  no motion is drawn: {missing}");
         return Ok(());

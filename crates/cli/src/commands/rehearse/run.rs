@@ -21,7 +21,7 @@ use crate::json_line::json_line;
 use crate::parts::part_named;
 use crate::shared_args::OwnPartArgs;
 
-/// Attempts, then the report; Ctrl-C reports the attempts so far.
+/// Runs the attempts and writes the report; after Ctrl-C, the report of the attempts so far.
 pub fn run(args: &RehearseArgs) -> Result<Outcome> {
     let shipped = args.object.as_deref().map(|name| part_named("--object", name)).transpose()?;
     sdg_simulation::load()?;
@@ -33,7 +33,7 @@ pub fn run(args: &RehearseArgs) -> Result<Outcome> {
         None => {
             let OwnPart { object, model, facts } = own_part(args, model, &model_file)?;
             eprintln!("{facts}");
-            // Sizes are known in metres, so it looks through a calibrated camera in any case.
+            // Sizes are known in metres, so a calibrated camera is used in every case.
             camera = camera.or(Some(PinholeCamera::WRIST));
             (object, model)
         }
@@ -82,7 +82,7 @@ pub fn run(args: &RehearseArgs) -> Result<Outcome> {
     finish(&page, None, &report, args.json)
 }
 
-/// The part that a model was taught from.
+/// The part that the model was taught from.
 fn own_part(args: &RehearseArgs, model: GraspModel, model_file: &str) -> Result<OwnPart> {
     let OwnPartArgs { height_mm, length_mm, mass_g, friction } = args.own_part;
     let sizes = OwnPartSizes { height_mm, length_mm, mass_g, friction };
@@ -111,7 +111,7 @@ fn own_part(args: &RehearseArgs, model: GraspModel, model_file: &str) -> Result<
     })
 }
 
-/// A place of a workcell's file.
+/// A place in the workcell's file.
 fn rehearsed_place(text: &str, path: &Path) -> Result<RehearsedPlace> {
     let (workcell, _) = sdg_inputs::read_workcell(path)?;
     if workcell.table_height_m != 0.0 {
@@ -121,7 +121,7 @@ fn rehearsed_place(text: &str, path: &Path) -> Result<RehearsedPlace> {
     Ok(RehearsedPlace::named(text, workcell).map_err(|error| Usage(format!("--{error}")))?)
 }
 
-/// A line for each attempt; breaks when Ctrl-C was pressed.
+/// Prints one line per attempt; breaks after Ctrl-C.
 pub fn show_attempt(attempt: &AttemptSummary, of: u32, interrupt: &Interrupt) -> ControlFlow<()> {
     let error = attempt
         .detection_error
@@ -139,7 +139,7 @@ pub fn show_attempt(attempt: &AttemptSummary, of: u32, interrupt: &Interrupt) ->
     if interrupt.is_requested() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
 }
 
-/// The closing lines, or the one object of `--json` (docs/command-line.md).
+/// Prints the closing lines, or the JSON object of `--json` (docs/command-line.md).
 pub fn finish(page: &RunPage, teach_seconds: Option<f64>, report: &std::path::Path, json: bool) -> Result<Outcome> {
     let RunPage { model, object, rehearsed, .. } = page;
     let Rehearsed { attempts, .. } = rehearsed;

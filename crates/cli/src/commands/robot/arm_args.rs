@@ -1,4 +1,4 @@
-//! The arguments that name an arm, which all verbs of `sdg robot` take.
+//! The arguments that select an arm, shared by all verbs of `sdg robot`.
 
 use std::path::PathBuf;
 
@@ -9,10 +9,10 @@ use sdg_robot::{FrankaArm, RobotAddress, Scheduling};
 use crate::exit::Usage;
 use crate::robots::RobotChoice;
 
-/// Which arm.
+/// The arm.
 #[derive(Debug, Args)]
 pub struct ArmArgs {
-    /// HOST or HOST:PORT; without it, the address in the workcell's file
+    /// HOST or HOST:PORT; default: the address in the workcell's file
     #[arg(long, value_name = "ADDRESS")]
     pub robot: Option<RobotChoice>,
     /// The workcell's file
@@ -29,7 +29,7 @@ impl ArmArgs {
         match RobotChoice::named(self.robot.as_ref(), of_workcell.as_deref())? {
             RobotChoice::Network(address) => Ok(address),
             RobotChoice::Sim => Err(Usage(
-                "--robot: expected the address of an arm; a simulated one lives only as long as sdg grasp, or as sdg \
+                "--robot: expected the address of an arm; a simulated one exists only within sdg grasp, or within sdg \
                  simulate --fci, whose address is 127.0.0.1"
                     .to_owned(),
             )
@@ -37,7 +37,7 @@ impl ArmArgs {
         }
     }
 
-    /// Connects; what is asked of the arm without a control loop needs no real time.
+    /// Connects without real-time scheduling: the verbs that use this run no control loop.
     pub(super) fn connect(&self) -> Result<(FrankaArm, RobotAddress)> {
         let address = self.address()?;
         Ok((FrankaArm::connect(&address, Scheduling::Ordinary)?, address))

@@ -12,11 +12,11 @@ use crate::exit::{Outcome, Usage};
 use crate::interrupt::Interrupt;
 use crate::robots::{self, write_states};
 
-/// Speed of the fingers against each other, m/s.
+/// Relative speed of the fingers, m/s.
 const SPEED_M_S: f64 = 0.05;
-/// Any width between the fingers may be that of what is closed on.
+/// Target width for closing on an object of unknown width: any final width counts as grasped.
 const ANY_WIDTH_M: f64 = 0.5 * HAND_OPENING_MAX_M;
-/// What the hand holds for long, N.
+/// Maximum continuous grasping force of the hand, N.
 const MAX_FORCE_N: f64 = 70.0;
 
 /// `sdg robot open`
@@ -27,7 +27,7 @@ pub struct OpenArgs {
     /// Distance between the fingers, 0 to 80
     #[arg(long, value_name = "MM", default_value_t = 80.0)]
     width_mm: f64,
-    /// Where the arm's last second is written after an error, as CSV
+    /// File for the arm's last second of states after an error, as CSV
     #[arg(long, value_name = "FILE", default_value = "robot-states.csv")]
     states: PathBuf,
 }
@@ -40,7 +40,7 @@ pub struct CloseArgs {
     /// Force of each finger, 1 to 70
     #[arg(long, value_name = "N", default_value_t = 20.0)]
     force_n: f64,
-    /// Where the arm's last second is written after an error, as CSV
+    /// File for the arm's last second of states after an error, as CSV
     #[arg(long, value_name = "FILE", default_value = "robot-states.csv")]
     states: PathBuf,
 }
@@ -53,7 +53,7 @@ pub(super) fn open(args: &OpenArgs) -> Result<Outcome> {
     }
     let (mut arm, _) = args.arm.connect()?;
     let hand = command(&mut arm, HandCommand::Move { opening_m, speed_m_s: SPEED_M_S }, &args.states)?;
-    // What the hand carried is not there any more.
+    // The hand no longer carries anything.
     arm.set_load(Load::NONE)?;
     eprintln!("the hand is {:.1} mm open", hand.opening_m * 1e3);
     Ok(Outcome::Done)

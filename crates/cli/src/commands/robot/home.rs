@@ -17,19 +17,19 @@ use crate::robots::{self, Consent, confirm, write_states};
 pub struct HomeArgs {
     #[command(flatten)]
     arm: ArmArgs,
-    /// Move the fingers through their range, once after the hand was switched on; the arm stands still
+    /// Home the fingers: move them through their range, once after the hand was switched on; the arm does not move
     #[arg(long)]
     hand: bool,
-    /// Do not ask, for programs
+    /// Do not ask for confirmation; for programs
     #[arg(long)]
     yes: bool,
     /// Share of the joints' velocity limits, above 0 and at most 0.6
     #[arg(long, value_name = "SHARE", default_value_t = DEFAULT_SPEED)]
     speed: f64,
-    /// Drive a real arm from a thread that the kernel may delay; for simulated ones
+    /// Drive an arm on the network from a thread without real-time priority; for simulated arms
     #[arg(long)]
     no_realtime: bool,
-    /// Where the arm's last second is written after an error, as CSV
+    /// File for the arm's last second of states after an error, as CSV
     #[arg(long, value_name = "FILE", default_value = "robot-states.csv")]
     states: PathBuf,
 }
@@ -55,7 +55,7 @@ pub(super) fn run(args: &HomeArgs) -> Result<Outcome> {
     let home = workcell.home().unwrap_or_else(ready_pose);
     let motions = if workcell.obstacles.is_empty() {
         let motion = robot.plan_free(&home, &pace.free_limits(robot.geometry()))?;
-        // Refused before anybody is asked.
+        // Check the motion before asking for confirmation.
         robot.limits().check(motion.clone()).map_err(sdg_robot::RobotError::from)?;
         vec![motion]
     } else {

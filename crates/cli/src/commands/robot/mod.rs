@@ -1,4 +1,4 @@
-//! `sdg robot`: a real arm by hand. Each verb's arguments stand beside what it does.
+//! `sdg robot`: manual control of a real arm. Each verb's arguments are in the verb's file.
 
 mod arm_args;
 mod hand;
@@ -17,15 +17,16 @@ use crate::robots::{Consent, confirm};
 /// The verbs of `sdg robot`.
 #[derive(Debug, Subcommand)]
 pub enum RobotCommand {
-    /// Print where arm and hand are, and whether they can move
+    /// Print the state of arm and hand, and whether they can move
     State(state::StateArgs),
-    /// Move the arm to its first look-out pose that is given as joint angles, or to Franka's ready pose; or the hand's fingers through their range
+    /// Move the arm to its first look-out pose that is given as joint angles, else to Franka's ready pose; with --hand,
+    /// home the fingers instead
     Home(home::HomeArgs),
-    /// Clear the error after a reflex, once a person has looked at the cell. Nothing moves
+    /// Clear the error after a reflex, once a person has checked the cell. Nothing moves
     Recover(RecoverArgs),
     /// Open the hand
     Open(hand::OpenArgs),
-    /// Close the hand on what is between its fingers
+    /// Close the hand on the object between its fingers
     Close(hand::CloseArgs),
 }
 
@@ -34,12 +35,12 @@ pub enum RobotCommand {
 pub struct RecoverArgs {
     #[command(flatten)]
     arm: ArmArgs,
-    /// A person has looked at the cell; do not ask
+    /// Confirm that a person has checked the cell; do not ask
     #[arg(long)]
     yes: bool,
 }
 
-/// Runs one of them.
+/// Runs one of the verbs.
 pub fn run(command: &RobotCommand) -> Result<Outcome> {
     match command {
         RobotCommand::State(args) => state::run(args),
@@ -52,7 +53,7 @@ pub fn run(command: &RobotCommand) -> Result<Outcome> {
 
 fn recover(args: &RecoverArgs) -> Result<Outcome> {
     let (mut arm, address) = args.arm.connect()?;
-    let question = format!("Is nothing in the way of the arm at {address}, and may it move again when it is told?");
+    let question = format!("Is nothing in the way of the arm at {address}, and may it accept motions again?");
     if confirm(&question, args.yes)? == Consent::Refused {
         return Ok(Outcome::Done);
     }

@@ -11,31 +11,32 @@ use crate::shared_args::{ComputeArgs, ToldHeightArgs, positive, share};
 /// `sdg ros2`
 #[derive(Debug, Args)]
 pub struct Ros2Args {
-    /// A grasp model that sdg teach wrote; without it, nothing is detected until one is taught by the service
+    /// A grasp model written by sdg teach; without it, nothing is detected until the service has taught one
     #[arg(long, value_name = "FILE")]
     pub grasp_model: Option<PathBuf>,
-    /// The camera's file, with its place over the table; without it and --base-frame, detections have no poses
+    /// The camera's file, with its pose over the table; without it and --base-frame, detections have no poses
     #[arg(long, value_name = "FILE")]
     pub camera: Option<PathBuf>,
-    /// Take the camera's place from tf, in this frame: the robot's base; intrinsics come from --camera or from camera_info
+    /// Look up the camera's pose in tf, in this frame: the robot's base; intrinsics come from --camera or from
+    /// camera_info
     #[arg(long, value_name = "FRAME")]
     pub base_frame: Option<String>,
-    /// With --base-frame: z of the table in that frame; without it, that of the workcell's file or 0
+    /// With --base-frame: z of the table in that frame; default: the value in the workcell's file, else 0
     #[arg(long, value_name = "MM", allow_hyphen_values = true)]
     pub table_height_mm: Option<f64>,
-    /// With --base-frame: how old a transform may be beside the picture's stamp
+    /// With --base-frame: maximum difference between the stamps of transform and picture
     #[arg(long, value_name = "SECS", default_value_t = 0.2, value_parser = positive)]
     pub max_transform_age_secs: f64,
-    /// Detections with a lower score are not published
+    /// Minimum score of published detections
     #[arg(long, value_name = "SCORE", default_value_t = 0.5, value_parser = share)]
     pub min_score: f64,
-    /// Pictures that wait while one is searched; the oldest are skipped
+    /// Maximum number of pictures waiting for a search; the oldest are skipped
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub queue: u32,
-    /// Where the network computes
+    /// Device for the network
     #[command(flatten)]
     pub compute: ComputeArgs,
-    /// What is asked of ROS 2
+    /// Settings of ROS 2
     #[command(flatten)]
     pub ros: RosArgs,
     /// The arm of the service ~/grasp
@@ -46,7 +47,7 @@ pub struct Ros2Args {
     pub teach: TeachTriggerArgs,
 }
 
-/// What is asked of ROS 2.
+/// Settings of ROS 2.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "ROS 2")]
 pub struct RosArgs {
@@ -56,25 +57,25 @@ pub struct RosArgs {
     /// The node's namespace
     #[arg(long, value_name = "NAMESPACE", default_value = "/")]
     pub namespace: String,
-    /// Replace a name, as in image:=/camera/color/image_raw; __node and __ns too; repeat for several
+    /// Remap a name, as in image:=/camera/color/image_raw; also __node and __ns; repeat for several
     #[arg(short = 'r', long = "remap", value_name = "FROM:=TO")]
     pub remappings: Vec<Remapping>,
-    /// Accepted and passed over, so that ros2 launch can start the node
+    /// Accepted and ignored, so that ros2 launch can start the node
     #[arg(long)]
     pub ros_args: bool,
-    /// The domain; without it, that of ROS_DOMAIN_ID or 0
+    /// The domain; default: ROS_DOMAIN_ID, else 0
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=232))]
     pub domain_id: Option<u16>,
-    /// Whose services and actions are spoken: fastrtps or cyclonedds
+    /// The RMW whose protocol of services and actions is used: fastrtps or cyclonedds
     #[arg(long, value_name = "NAME", default_value = "fastrtps")]
     pub rmw: Rmw,
-    /// Hear and speak on this computer only
+    /// Communicate on this computer only
     #[arg(long)]
     pub loopback: bool,
     /// Subscribe to CompressedImage on image/compressed instead of Image on image
     #[arg(long)]
     pub compressed: bool,
-    /// Have lost pictures sent again, where the camera offers it
+    /// Request retransmission of lost pictures, if the camera offers it
     #[arg(long)]
     pub reliable: bool,
 }
@@ -83,43 +84,43 @@ pub struct RosArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Grasping")]
 pub struct ArmArgs {
-    /// Let the service ~/grasp move the arm, whoever calls it; without it there is no such service
+    /// Allow the service ~/grasp to move the arm for any caller; without it there is no such service
     #[arg(long, requires_all = ["workcell", "camera"])]
     pub allow_motion: bool,
     /// The workcell's file
     #[arg(long, value_name = "FILE")]
     pub workcell: Option<PathBuf>,
-    /// The arm's FollowJointTrajectory
+    /// Name of the arm's FollowJointTrajectory action
     #[arg(long, value_name = "ACTION", default_value = "/panda_arm_controller/follow_joint_trajectory")]
     pub trajectory_action: String,
-    /// The hand's GripperCommand
+    /// Name of the hand's GripperCommand action
     #[arg(long, value_name = "ACTION", default_value = "/panda_hand_controller/gripper_cmd")]
     pub gripper_action: String,
-    /// The arm's JointState
+    /// Topic of the arm's JointState messages
     #[arg(long, value_name = "TOPIC", default_value = "/joint_states")]
     pub joint_states: String,
-    /// What stands before joint1 to joint7 and finger_joint1 to finger_joint2
+    /// Prefix of the names joint1 to joint7 and finger_joint1 to finger_joint2
     #[arg(long, value_name = "PREFIX", default_value = "panda_")]
     pub joint_prefix: String,
-    /// The gripper's position over the opening: 0.5 where it is that of one finger, 1 where it is the opening
+    /// The gripper's position divided by its opening: 0.5 if the position is that of one finger, 1 if it is the opening
     #[arg(long, value_name = "RATIO", default_value_t = 0.5, value_parser = positive)]
     pub gripper_ratio: f64,
-    /// Share of the joints' velocity limits, above 0 and at most 0.6, unless a request says another
+    /// Share of the joints' velocity limits, above 0 and at most 0.6, unless a request gives another
     #[arg(long, value_name = "SHARE", default_value_t = sdg_robot::DEFAULT_SPEED)]
     pub speed: f64,
-    /// How high parts lie
+    /// The parts' height
     #[command(flatten)]
     pub height: ToldHeightArgs,
 }
 
-/// What `~/teach_trigger` teaches.
+/// The input and output of `~/teach_trigger`.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Teaching by Trigger")]
 pub struct TeachTriggerArgs {
-    /// The photo, and its annotation unless it stands beside the photo
+    /// The photo, and its annotation if it is not beside the photo
     #[arg(long, value_name = "IMAGE[:ANNOTATION]", requires = "teach_out")]
     pub teach_demo: Option<String>,
-    /// The file to write, which the node then detects with
+    /// The file to write; the node then detects with it
     #[arg(long, value_name = "FILE")]
     pub teach_out: Option<PathBuf>,
     /// The grasp model, by letter or name

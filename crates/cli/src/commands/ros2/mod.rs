@@ -19,10 +19,10 @@ use crate::interrupt::Interrupt;
 use args::{ArmArgs, Ros2Args};
 use settings::{grasp_settings, node_settings};
 
-/// How long the arm's topic and actions are waited for.
+/// Timeout for the arm's topic and actions.
 const ARM_TIMEOUT: Duration = Duration::from_secs(20);
 
-/// Joins ROS 2 and works until Ctrl-C.
+/// Joins ROS 2 and runs until Ctrl-C.
 pub fn run(args: &Ros2Args) -> Result<Outcome> {
     let naming = Naming::new(&args.ros.namespace, &args.ros.node_name, &args.ros.remappings).map_err(usage)?;
     let interrupt = Interrupt::watch();
@@ -66,7 +66,7 @@ fn arm_config(args: &ArmArgs, geometry: ArmGeometry) -> ArmConfig {
     }
 }
 
-/// What `ros2 param get` tells.
+/// The parameters shown by `ros2 param get`.
 fn parameters(args: &Ros2Args) -> Vec<(String, String)> {
     let path = |path: &Option<PathBuf>| path.as_ref().map_or(String::new(), |path| path.display().to_string());
     vec![

@@ -1,4 +1,4 @@
-//! The node's settings, read and checked before it joins.
+//! The node's settings, read and checked before it joins ROS 2.
 
 use std::sync::Arc;
 
@@ -16,18 +16,18 @@ use crate::exit::Usage;
 use crate::interrupt::Interrupt;
 use crate::robots;
 
-/// Pictures that the network keeps for the node.
+/// Queue depth of the picture subscription.
 const PICTURE_DEPTH: usize = 10;
 
-/// Reads the files of a node.
+/// Reads the files of the node.
 ///
 /// # Errors
-/// A file that cannot be used; a model without lengths where there is a camera.
+/// A file cannot be used; a model without lengths is given together with a camera.
 pub(super) fn node_settings(args: &Ros2Args, interrupt: &Interrupt) -> Result<Settings> {
     let device = devices::open(&args.compute)?;
     let model = args.grasp_model.as_ref().map(|path| read_model(path, &device)).transpose()?;
     if args.table_height_mm.is_some() && args.base_frame.is_none() {
-        return Err(Usage("--table-height-mm: expected --base-frame, in which it is".to_owned()).into());
+        return Err(Usage("--table-height-mm: expected --base-frame, the frame of this height".to_owned()).into());
     }
     let camera_pose = match (&args.base_frame, &args.camera) {
         (Some(base_frame), camera) => {
@@ -42,7 +42,7 @@ pub(super) fn node_settings(args: &Ros2Args, interrupt: &Interrupt) -> Result<Se
                 intrinsics: camera.as_deref().map(CameraFile::read_intrinsics).transpose()?,
             }
         }
-        // A camera on the hand has no place of its own: its pictures are searched for the grasp alone.
+        // A camera on the hand has no fixed pose: its pictures are searched only for the grasp service.
         (None, Some(path)) if args.arm.allow_motion => {
             CameraFile::read(path).map_or(CameraPoseSource::Unknown, |camera| CameraPoseSource::File(camera.over_table))
         }
@@ -70,10 +70,10 @@ pub(super) fn node_settings(args: &Ros2Args, interrupt: &Interrupt) -> Result<Se
     })
 }
 
-/// Reads and checks the workcell and the camera of grasps.
+/// Reads and checks the workcell and the camera of the grasp service.
 ///
 /// # Errors
-/// Files that cannot be used.
+/// A file cannot be used.
 pub(super) fn grasp_settings(args: &Ros2Args) -> Result<GraspSettings> {
     let needed = |option: &str| Usage(format!("--allow-motion: expected {option} FILE"));
     let workcell_path = args.arm.workcell.as_ref().ok_or_else(|| needed("--workcell"))?;

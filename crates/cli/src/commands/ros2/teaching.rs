@@ -1,4 +1,4 @@
-//! What the node's service teaches, by the function of `sdg teach`.
+//! Teaching by the node's services, with the function of `sdg teach`.
 
 use std::path::Path;
 
@@ -14,7 +14,7 @@ use crate::interrupt::Interrupt;
 use crate::paint::{Paint, Tone};
 use crate::shared_args::{TaughtCameraArgs, height_mm};
 
-/// What a Trigger teaches, where that is said.
+/// The teaching of the Trigger service, if its arguments are given.
 pub(super) fn trigger_job(args: &TeachTriggerArgs) -> Option<TeachJob> {
     Some(TeachJob {
         photo: args.teach_demo.clone()?,
@@ -31,7 +31,7 @@ pub(super) fn trigger_job(args: &TeachTriggerArgs) -> Option<TeachJob> {
 /// Teaches and writes the model; `camera` is the file of the node's camera.
 ///
 /// # Errors
-/// As `sdg teach`; a height of marks without a camera.
+/// Those of `sdg teach`; a height of marks without a camera.
 pub(super) fn teach(job: &TeachJob, camera: Option<&Path>, interrupt: &Interrupt) -> Result<()> {
     let demonstration = match &job.marks {
         Some(marks) => (job.photo.clone().into(), marks.clone()),

@@ -1,4 +1,4 @@
-//! Two runs on the same pictures: whether their models differ, and how many pictures would show it.
+//! Compares two runs on the same pictures: whether their models differ, and how many pictures would show it.
 
 use std::path::{Path, PathBuf};
 
@@ -20,10 +20,10 @@ use crate::simulated::store::read_stored;
 use crate::simulated::tables::Titled;
 use crate::statistics::Share;
 
-/// Stands for all axes that show the part: their cases added up.
+/// Name of the sum over all axes that show the part.
 pub const ALL_WITH_PART: &str = "all with the part";
 
-/// A model in two runs, on the same pictures.
+/// A model in two runs on the same pictures.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RunDifference {
     pub group: PartGroup,
@@ -32,14 +32,14 @@ pub struct RunDifference {
     pub model: ModelKind,
     /// With the check or without.
     pub way: Way,
-    /// Cases by who answered them right: this run, the other one.
+    /// Cases by which run answered them correctly: this run, the other one.
     pub counts: PairedCounts,
-    /// This run's share less the other's, and within what it lies with 95 % confidence.
+    /// This run's share minus the other's, and its 95 % confidence interval.
     pub difference: f64,
     pub interval: [f64; 2],
-    /// Whether the interval leaves zero out.
+    /// Whether the interval excludes zero.
     pub differs: bool,
-    /// Cases that would show a difference of this size; see [`PairedCounts::cases_needed`].
+    /// Number of cases that would show a difference of this size; see [`PairedCounts::cases_needed`].
     pub cases_needed: Option<usize>,
 }
 
@@ -49,10 +49,10 @@ pub struct Against {
 }
 
 impl Against {
-    /// Checks that a folder holds an evaluation. It is read only: another process may be at work in it.
+    /// Checks that a folder contains an evaluation. It is only read: another process may be writing to it.
     ///
     /// # Errors
-    /// A folder without results of axes.
+    /// The folder has no results of axes.
     pub fn open(folder: &Path) -> Result<Self> {
         if !folder.join("axes").is_dir() {
             bail!("{}: expected the folder of another run over axes, found none", folder.display());
@@ -64,10 +64,10 @@ impl Against {
         &self.folder
     }
 
-    /// Compares each model with itself in the other run, where both were shown the same pictures.
+    /// Compares each model with itself in the other run, if both were shown the same pictures.
     ///
     /// # Errors
-    /// Records that cannot be read, and those of other pictures.
+    /// Records cannot be read, or are of other pictures.
     pub fn compare(&self, evaluation: &AxesEvaluation) -> Result<Vec<RunDifference>> {
         let mut comparisons = Vec::new();
         for group in PartGroup::ALL {
@@ -114,9 +114,9 @@ impl Against {
         Ok(counts)
     }
 
-    /// The detections of the other run's model, checked to be of the same pictures.
+    /// The detections of the other run's model, after a check that the pictures are the same.
     fn record(&self, cell: Cell, axis: Axis, settings: &AxisSettings) -> Result<Option<AxisRecord>> {
-        /// What decides the pictures; teaching and search may differ, and are what is compared.
+        /// The settings that determine the pictures; teaching and search may differ, and are compared.
         #[derive(Serialize)]
         struct PictureSettings {
             axes: u32,
@@ -135,7 +135,7 @@ impl Against {
 }
 
 impl RunDifference {
-    /// `None` of no cases.
+    /// `None` if there are no cases.
     fn new(group: PartGroup, axis: &'static str, model: ModelKind, way: Way, counts: PairedCounts) -> Option<Self> {
         Some(Self {
             group,
@@ -151,7 +151,7 @@ impl RunDifference {
     }
 }
 
-/// The comparisons as one table for each group of parts.
+/// The comparisons as one table per group of parts.
 pub fn difference_tables(comparisons: &[RunDifference], against: &str) -> Vec<Titled> {
     PartGroup::ALL
         .into_iter()
@@ -160,8 +160,8 @@ pub fn difference_tables(comparisons: &[RunDifference], against: &str) -> Vec<Ti
             (!rows.is_empty()).then(|| Titled {
                 title: format!("{}: against {against}", group.title()),
                 lead: "Both runs on the same pictures; right is an instance found or a look-alike refused. The interval of \
-                       the difference is Newcombe's for paired shares (1998, method 10), 95 %: a difference shows when it \
-                       leaves zero out. Cases needed: so many show a difference of this size with 80 % power on the 5 % \
+                       the difference is Newcombe's for paired shares (1998, method 10), 95 %: a difference is shown if it \
+                       excludes zero. Cases needed: number of cases that shows a difference of this size with 80 % power at the 5 % \
                        level, two-sided, by McNemar's test (Connor, 1987). Instances of one picture are counted as if they \
                        were independent."
                     .to_owned(),
@@ -178,8 +178,8 @@ fn header() -> Table {
         Column::text(""),
         Column::text("this run").group("right"),
         Column::text("the other").group("right"),
-        Column::number("this alone").group("right"),
-        Column::number("the other alone").group("right"),
+        Column::number("only this").group("right"),
+        Column::number("only the other").group("right"),
         Column::number("difference").unit("points"),
         Column::text("95 % interval"),
         Column::text("differs"),

@@ -1,4 +1,4 @@
-//! The axes' results as files of the evaluation's folder.
+//! Writes the results of the axes to files in the evaluation's folder.
 
 use std::path::{Path, PathBuf};
 
@@ -13,11 +13,11 @@ use crate::machine::machine;
 use crate::simulated::store::Store;
 
 impl AxesSummary {
-    /// Writes tables and a page; their files. `jobs` units were done side by side, `against` are the comparisons with another run and
-    /// its folder, and `command` makes the same results again.
+    /// Writes tables and a page, and returns their files. `jobs` is the number of parallel units, `against` contains
+    /// the comparisons with another run and its folder, and `command` reproduces the results.
     ///
     /// # Errors
-    /// Files that cannot be written.
+    /// Files cannot be written.
     pub fn write(
         &self,
         store: &Store,

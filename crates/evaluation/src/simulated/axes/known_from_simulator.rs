@@ -1,16 +1,16 @@
-//! Quantities that the simulated robot takes from the simulator and a real one would have to measure.
+//! Quantities that the simulated robot gets from the simulator and that must be measured for a real one.
 
-/// A quantity that the simulated robot is given.
+/// A quantity given to the simulated robot.
 pub(super) struct Given {
-    /// The quantity that the simulator hands over.
+    /// The quantity.
     pub what: &'static str,
-    /// Where it comes from.
+    /// Its source.
     pub source: &'static str,
-    /// The error under which grasps are tried, if any.
+    /// The error under which grasps are tested, if any.
     pub error: &'static str,
 }
 
-/// All of them, in the order in which an attempt uses it.
+/// All such quantities, in the order in which an attempt uses them.
 pub(super) fn known_from_simulator() -> [Given; 13] {
     let given = |what, source, error| Given { what, source, error };
     [

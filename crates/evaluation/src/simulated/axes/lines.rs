@@ -1,10 +1,10 @@
-//! Axes in a few lines, for people.
+//! A summary of the axes in a few lines.
 
 use super::against::RunDifference;
 use super::summary::AxesSummary;
 use super::way::Way;
 
-/// A line for each model in each group and way, and for each error.
+/// One line for each model in each group and way, and for each error.
 pub fn summary_lines(summary: &AxesSummary) -> String {
     let mut text = String::new();
     let mut line = |line: String| text += &(line + "\n");
@@ -43,7 +43,7 @@ pub fn summary_lines(summary: &AxesSummary) -> String {
     text
 }
 
-/// A line for each comparison.
+/// One line per comparison.
 pub fn difference_lines(comparisons: &[RunDifference]) -> String {
     let mut text = String::new();
     let mut line = |line: String| text += &(line + "\n");

@@ -1,4 +1,4 @@
-//! Detections beside the truth about all instances of a part in a picture.
+//! Matches detections to the true instances of a part in a picture.
 
 use nalgebra::Isometry3;
 use sdg_geometry::PosedCamera;
@@ -10,10 +10,11 @@ use super::records::{Answer, PlacedDetection};
 use crate::against_truth::{grasp_error, grasp_pose};
 use crate::trial::{RIGHT_DEGREES, RIGHT_MM};
 
-/// Places detections (best first) beside the instances of a part.
+/// Compares detections (best first) with the instances of a part.
 ///
-/// Where there is at most one instance, the best detection alone counts, as in the paper's protocol: a robot goes there.
-/// Several instances are found one to one: each detection in turn takes the nearest that is right and not yet taken.
+/// If there is at most one instance, only the best detection counts, as in the paper's protocol: a robot would go
+/// there. Several instances are matched one to one: each detection in order takes the nearest correct instance that is
+/// still free.
 pub(super) fn place(
     object: &ObjectSpec,
     camera: &PosedCamera,
@@ -60,7 +61,8 @@ fn nearest(errors: &[Option<DetectionError>]) -> Option<DetectionError> {
     errors.iter().flatten().copied().min_by(|a, b| a.distance_mm.total_cmp(&b.distance_mm))
 }
 
-/// The instance that each detection finds; `errors` of every detection, best first, to every instance.
+/// The instance found by each detection; `errors` has the errors of every detection, best first, against every
+/// instance.
 pub(crate) fn match_one_to_one(errors: &[Vec<Option<DetectionError>>], accepted: &[bool]) -> Vec<Option<usize>> {
     let mut is_taken = vec![false; errors.first().map_or(0, Vec::len)];
     errors
@@ -92,7 +94,7 @@ mod tests {
 
     #[test]
     fn each_instance_is_found_once_and_by_the_best() {
-        // The second detection is nearer, but the first is better; the third is turned; the fourth has no place.
+        // The second detection is nearer, but the first is better; the third is turned; the fourth has no position.
         let errors = [
             vec![error(4.0, 1.0), error(80.0, 1.0)],
             vec![error(1.0, 1.0), error(79.0, 1.0)],
@@ -111,7 +113,7 @@ mod tests {
         assert_eq!(match_one_to_one(&errors, &[true; 2]), [Some(1), Some(0)]);
     }
 
-    /// A detection whose grasp is that of the part at a pose, as the camera shows it.
+    /// A detection with the grasp of the part at a pose, as seen by the camera.
     fn detection(object: &ObjectSpec, camera: &PosedCamera, at: &Isometry3<f64>, score: f64) -> GraspDetection {
         let [start, end] = object.marks_in_base(at).map(|mark| camera.project(&mark).unwrap());
         let middle: Point2<f64> = nalgebra::center(&start, &end);
@@ -153,10 +155,10 @@ mod tests {
         assert_eq!((answer.detections.len(), answer.num_wrong()), (3, 1));
         assert!(answer.detections[0].error_mm.unwrap() < 1e-6 && answer.detections[1].error_mm.unwrap() > 20.0);
 
-        // With one instance the best detection decides, and here it lies elsewhere.
+        // With one instance the best detection decides, and here it is elsewhere.
         let answer = place(&object, &camera, &detections[1..], &instances[..1]);
         assert_eq!((answer.detections.len(), answer.num_wrong(), answer.has_found(0)), (1, 1, false));
-        // Without the part, whatever is accepted is wrong.
+        // Without the part, every accepted detection is wrong.
         let answer = place(&object, &camera, &detections, &[]);
         assert!(answer.is_accepted() && answer.num_wrong() == 1 && answer.detections[0].error_mm.is_none());
         let refused = place(&object, &camera, &detections[3..], &instances);

@@ -1,4 +1,4 @@
-//! Axes along which the paper's protocol is made harder, one at a time, and grasps under errors.
+//! Axes along which the paper's protocol is made more difficult, one at a time, and grasps under errors.
 //!
 //! ```text
 //! AxesEvaluation ─ units: teachings (the protocol's, and from jittered marks), pictures of a part and axis, attempts
@@ -7,9 +7,9 @@
 //!       └─ Store ─ AxesSummary (the paper's parts, and apart from them the held-out ones) ─ Markdown, JSON, page
 //! ```
 //!
-//! A **case** is an instance of the part in a picture, or a look-alike: what two models can be compared on. A **condition**
-//! is what is wrong in an attempt. Pictures depend on the part, axis, number and seed alone; attempts meet the scenes of the
-//! paper's protocol.
+//! A **case** is an instance of the part in a picture, or a look-alike: the unit for comparing two models. A
+//! **condition** is the error in an attempt. Pictures depend only on part, axis, number and seed; attempts use the
+//! scenes of the paper's protocol.
 
 mod against;
 mod files;

@@ -1,24 +1,24 @@
-//! Two shares of the same cases: their difference with its uncertainty, and how many cases would show it.
+//! Two shares of the same cases: their difference with its uncertainty, and the number of cases that would show it.
 
 use serde::Serialize;
 
 use crate::statistics::{Share, wilson_interval};
 
-/// Standard deviations on either side that hold 95 % of a normal distribution: a test on the 5 % level, two-sided.
+/// Two-sided 95 % quantile of the normal distribution: a test at the 5 % level.
 const Z_TWO_SIDED_5_PERCENT: f64 = 1.959_963_984_540_054;
-/// Standard deviations below which 80 % of a normal distribution lie.
+/// 80 % quantile of the normal distribution.
 const Z_POWER_80_PERCENT: f64 = 0.841_621_233_572_914;
 
-/// What became of cases that two tried: four counts.
+/// Outcomes of cases tried by two models: four counts.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct PairedCounts {
-    /// Cases that both solved.
+    /// Cases solved by both.
     pub both: usize,
-    /// Cases that the first alone solved.
+    /// Cases solved only by the first.
     pub first_only: usize,
-    /// Cases that the second alone solved.
+    /// Cases solved only by the second.
     pub second_only: usize,
-    /// Cases that neither solved.
+    /// Cases solved by neither.
     pub neither: usize,
 }
 
@@ -33,33 +33,33 @@ impl PairedCounts {
         } += 1;
     }
 
-    /// All cases.
+    /// Number of all cases.
     pub fn total(self) -> usize {
         self.both + self.first_only + self.second_only + self.neither
     }
 
-    /// What the first solved.
+    /// Share solved by the first.
     pub fn first(self) -> Share {
         Share { count: self.both + self.first_only, of: self.total() }
     }
 
-    /// What the second solved.
+    /// Share solved by the second.
     pub fn second(self) -> Share {
         Share { count: self.both + self.second_only, of: self.total() }
     }
 
-    /// The first share less the second; `None` of no cases.
+    /// The first share minus the second; `None` without cases.
     pub fn difference(self) -> Option<f64> {
         let n = self.total();
         (n > 0).then(|| (self.first_only as f64 - self.second_only as f64) / n as f64)
     }
 
-    /// Between which differences the true one lies, with 95 % confidence; `None` of no cases.
+    /// 95 % confidence interval of the difference; `None` without cases.
     ///
     /// # Source
     /// R. G. Newcombe, "Improved confidence intervals for the difference between binomial proportions based on paired
-    /// data", Statistics in Medicine 17, 1998, method 10: Wilson's intervals of both shares, squared and added with the
-    /// correlation of the cases, which is corrected for continuity where it is positive.
+    /// data", Statistics in Medicine 17, 1998, method 10: Wilson's intervals of both shares, squared and added, with
+    /// the correlation of the cases, which is corrected for continuity if it is positive.
     pub fn difference_interval(self) -> Option<[f64; 2]> {
         let difference = self.difference()?;
         let n = self.total() as f64;
@@ -71,7 +71,7 @@ impl PairedCounts {
         Some([difference - combined(p1 - low1, high2 - p2), difference + combined(high1 - p1, p2 - low2)])
     }
 
-    /// Correlation of the two outcomes, as the interval wants it.
+    /// Correlation of the two outcomes, as used in the interval.
     fn correlation(self) -> f64 {
         let [both, first_only, second_only, neither] =
             [self.both, self.first_only, self.second_only, self.neither].map(|count| count as f64);
@@ -84,13 +84,13 @@ impl PairedCounts {
         corrected / margins.sqrt()
     }
 
-    /// Whether the interval of the difference leaves zero out.
+    /// Whether the interval of the difference excludes zero.
     pub fn differs(self) -> bool {
         self.difference_interval().is_some_and(|[low, high]| low > 0.0 || high < 0.0)
     }
 
-    /// How many cases would show a difference of this size with 80 % power on the 5 % level, two-sided, by McNemar's test;
-    /// `None` where the shares are equal.
+    /// Number of cases that would show a difference of this size with 80 % power at the 5 % level, two-sided, by
+    /// McNemar's test; `None` if the shares are equal.
     ///
     /// # Source
     /// R. J. Connor, "Sample size for testing differences in proportions for the paired-sample design", Biometrics 43,
@@ -130,7 +130,7 @@ impl std::iter::Sum for PairedCounts {
 mod tests {
     use super::*;
 
-    /// Digits of the references.
+    /// Precision of the references.
     const TOLERANCE: f64 = 5e-5;
 
     fn counts(both: usize, first_only: usize, second_only: usize, neither: usize) -> PairedCounts {
@@ -139,8 +139,8 @@ mod tests {
 
     #[test]
     fn newcombe_s_interval_agrees_with_known_values() {
-        // The first stands in Newcombe's table II; the second is the one that the R package contingencytables tests
-        // (Cavo et al., 2012); the third was computed in another language.
+        // The first is in Newcombe's table II; the second is tested by the R package contingencytables (Cavo et al.,
+        // 2012); the third was computed in another language.
         for (counts, low, high) in [
             (counts(36, 12, 2, 0), 0.0569, 0.3404),
             (counts(59, 6, 16, 80), -0.1186, -0.0046),

@@ -1,31 +1,31 @@
-//! Records of the pictures of an axis, as the store keeps them.
+//! Records of the pictures of an axis, as stored.
 
 use sdg_simulation::views::Axis;
 use serde::{Deserialize, Serialize};
 
 use super::way::Way;
 
-/// A detection beside the instance of the part that it lies nearest to.
+/// A detection compared with the nearest instance of the part.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PlacedDetection {
-    /// Its score: accepted from 0.5 on.
+    /// Its score; accepted from 0.5.
     pub score: f64,
     /// The network's own score.
     pub network_score: f64,
-    /// How well the demonstration agrees there, where it was asked.
+    /// Agreement of the demonstration there, if it was checked.
     pub agreement: Option<f64>,
-    /// Place beside the instance, in millimetres; `None` without an instance or a place on the table.
+    /// Position error, in millimetres; `None` without an instance or a position on the table.
     pub error_mm: Option<f64>,
-    /// Turn beside the instance, in degrees, modulo the part's symmetry.
+    /// Angle error, in degrees, modulo the part's symmetry.
     pub error_deg: Option<f64>,
-    /// The instance that it found: within 10 mm and 10°, and found by no better detection.
+    /// The instance that it found: within 10 mm and 10°, and not found by a better detection.
     pub found: Option<usize>,
 }
 
-/// A model's detections in a picture: all that it accepts, best first; the best that it refuses where it accepts nothing.
+/// A model's detections in a picture: all accepted ones, best first; the best refused one if none is accepted.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Answer {
-    /// Where there is at most one instance, the best alone.
+    /// If there is at most one instance, only the best.
     pub detections: Vec<PlacedDetection>,
 }
 
@@ -42,55 +42,55 @@ impl Answer {
         self.detections.iter().any(PlacedDetection::is_accepted)
     }
 
-    /// Whether an instance was found.
+    /// Whether this instance was found.
     pub fn has_found(&self, instance: usize) -> bool {
         self.detections.iter().any(|detection| detection.found == Some(instance))
     }
 
-    /// Detections that are accepted and not right.
+    /// Number of accepted detections that are not right.
     pub fn num_wrong(&self) -> usize {
         self.detections.iter().filter(|detection| detection.is_accepted() && detection.found.is_none()).count()
     }
 }
 
-/// In what a look-alike differs from the part.
+/// The difference between a look-alike and the part.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct LookAlike {
-    /// Which kind, in words.
+    /// Its kind, in words.
     pub kind: String,
-    /// Whether size alone tells the two apart, which no picture shows without a camera.
+    /// Whether only the size differs, which is not visible in a picture without a calibrated camera.
     pub differs_in_size_alone: bool,
 }
 
 /// A picture of an axis and a model's detections in it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct AxisPicture {
-    /// Which of the axis' pictures.
+    /// Index among the axis' pictures.
     pub number: u64,
-    /// How much the axis changed.
+    /// Value of the axis' parameter.
     pub parameter: f64,
-    /// What the parameter counts.
+    /// Unit of the parameter.
     pub unit: String,
-    /// The share of each instance of the part that is seen; empty where the part is not there.
+    /// Visible share of each instance; empty without the part.
     pub visible: Vec<f64>,
-    /// What lies there instead of the part.
+    /// The look-alike in place of the part.
     pub look_alike: Option<LookAlike>,
     /// With the check against the demonstration.
     pub verified: Answer,
-    /// The network alone; `None` for a model without one.
+    /// Of the network alone; `None` for a model without one.
     pub alone: Option<Answer>,
 }
 
 /// A model on the pictures of one part and axis.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct AxisRecord {
-    /// One each, in their order.
+    /// One per picture, in order.
     pub pictures: Vec<AxisPicture>,
-    /// Time for this model's detections, and its part of the time for drawing, in seconds of a worker.
+    /// Worker time of this model's detections and its share of rendering, in seconds.
     pub seconds: f64,
 }
 
-/// A case that two models can both be asked for: a picture's number, and the instance of the part in it.
+/// A case for comparing two models: a picture's number, and the instance of the part in it.
 pub type Case = (u64, usize);
 
 impl AxisPicture {
@@ -104,12 +104,12 @@ impl AxisPicture {
 }
 
 impl AxisRecord {
-    /// The detections in each picture made in one way; none for a model without that way.
+    /// The detections in each picture made in one way; empty for a model without that way.
     pub fn answers(&self, way: Way) -> impl Iterator<Item = &Answer> {
         self.pictures.iter().filter_map(move |picture| picture.answer(way))
     }
 
-    /// Each case and whether it was answered right: an instance found, a look-alike refused.
+    /// Each case with whether it was answered correctly: an instance found, a look-alike refused.
     pub fn outcomes(&self, axis: Axis, way: Way) -> Vec<(Case, bool)> {
         let mut outcomes = Vec::new();
         for picture in &self.pictures {

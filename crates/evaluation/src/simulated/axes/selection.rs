@@ -1,22 +1,22 @@
-//! What is measured beyond the paper's protocol: axes of pictures, and grasps under errors, by their names.
+//! The measurements beyond the paper's protocol, by name: axes of pictures, and grasps under errors.
 
 use sdg_simulation::views::Axis;
 use serde::{Deserialize, Serialize};
 
-/// What is wrong with what the robot is told or has, in attempts.
+/// The error of an attempt, in the robot's settings or in the workcell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum GraspCondition {
-    /// Nothing: the paper's protocol.
+    /// None: the paper's protocol.
     NoError,
     /// The demonstration's grasp marks, box and outline.
     Marks,
     /// The height of the marks.
     MarkHeight,
-    /// Where the camera is in the hand.
+    /// The camera's pose in the hand.
     HandEye,
     Friction,
-    /// Nothing is wrong, but the hand shakes after lifting.
+    /// No error, but the hand shakes after lifting.
     Shake,
 }
 
@@ -25,7 +25,7 @@ impl GraspCondition {
     pub const ALL: [Self; 6] =
         [Self::NoError, Self::Marks, Self::MarkHeight, Self::HandEye, Self::Friction, Self::Shake];
 
-    /// The name at the command line and in files.
+    /// The name on the command line and in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::NoError => "no-error",
@@ -37,7 +37,7 @@ impl GraspCondition {
         }
     }
 
-    /// What it is, for a table.
+    /// A description for tables.
     pub fn description(self) -> &'static str {
         match self {
             Self::NoError => "no error (control)",
@@ -50,14 +50,14 @@ impl GraspCondition {
     }
 }
 
-/// Stands for all axes of pictures.
+/// Name of all axes of pictures.
 const ALL_PICTURES: &str = "pictures";
-/// Stands for all grasps under errors, the control among them.
+/// Name of all grasps under errors, including the control.
 const ALL_GRASPS: &str = "grasps";
-/// Stands for everything.
+/// Name of all measurements.
 const EVERYTHING: &str = "all";
 
-/// Axes and conditions, each once, in the order in which they are reported.
+/// Axes and conditions, each once, in the order of the reports.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Selection {
     pub axes: Vec<Axis>,
@@ -65,10 +65,10 @@ pub struct Selection {
 }
 
 impl Selection {
-    /// Reads names; none at all stand for everything.
+    /// Parses names; an empty list selects everything.
     ///
     /// # Errors
-    /// An unknown name, in a sentence with all known ones.
+    /// An unknown name, in a sentence that lists the known ones.
     pub fn parse(names: &[String]) -> Result<Self, String> {
         let mut selection = Self::default();
         let everything = [EVERYTHING.to_owned()];
@@ -92,7 +92,7 @@ impl Selection {
     }
 }
 
-/// Every name that is understood.
+/// All known names.
 fn known() -> Vec<&'static str> {
     let axes = Axis::ALL.into_iter().map(Axis::name);
     let conditions = GraspCondition::ALL.into_iter().map(GraspCondition::name);

@@ -1,4 +1,4 @@
-//! The records of axes and of grasps under errors added up, by model and group of parts.
+//! Sums of the records of axes and of grasps under errors, by model and group of parts.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -19,27 +19,27 @@ use crate::simulated::groups::PartGroup;
 use crate::simulated::records::{AttemptRecord, TeachingRecord};
 use crate::statistics::{Share, wilson_interval};
 
-/// All there is to report. What has not been done yet is missing from the sums, and `remaining` says how much that is.
+/// All results. Remaining units are missing in the sums; `remaining` is their number.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AxesSummary {
-    /// What decides the pictures' results.
+    /// Settings of the pictures' results.
     pub axis_settings: AxisSettings,
-    /// What decides the results of grasps.
+    /// Settings of the grasps' results.
     pub grasp_settings: GraspSettings,
-    /// Units of work that are still to do.
+    /// Number of remaining units.
     pub remaining: usize,
-    /// Seconds of a worker that the results took, teachings among them.
+    /// Worker seconds of the results, including teachings.
     pub seconds: Seconds,
-    /// The paper's parts, and apart from them the held-out ones; a group without parts is missing.
+    /// The paper's parts, and separately the held-out ones; groups without parts are missing.
     pub groups: Vec<GroupSummary>,
 }
 
-/// Seconds of a worker.
+/// Worker seconds.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Seconds {
-    /// Of all teachings whose models were measured.
+    /// Of all teachings of the measured models.
     pub teaching: f64,
-    /// Of pictures: drawing and detecting.
+    /// Of pictures: rendering and detection.
     pub pictures: f64,
     pub grasps: f64,
 }
@@ -52,7 +52,7 @@ impl fmt::Display for Seconds {
 }
 
 impl Seconds {
-    /// All of them.
+    /// The total.
     pub fn total(self) -> f64 {
         self.teaching + self.pictures + self.grasps
     }
@@ -65,39 +65,39 @@ pub struct GroupSummary {
     pub objects: Vec<String>,
     /// Pictures with the part.
     pub axes: Vec<AxisFigures>,
-    /// Pictures with a look-alike in its place.
+    /// Pictures with a look-alike in place of the part.
     pub look_alikes: Vec<LookAlikeFigures>,
     pub grasps: Vec<GraspFigures>,
 }
 
-/// A share and the part it is of.
+/// The share of one part.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PartShare {
     pub object: String,
     pub share: Share,
 }
 
-/// What a model found along an axis.
+/// Results of a model along an axis.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AxisFigures {
     pub axis: &'static str,
     pub model: ModelKind,
     /// With the check or without.
     pub way: Way,
-    /// Instances of the part that were found within 10 mm and 10°, of all in the pictures.
+    /// Instances of the part found within 10 mm and 10°, of all in the pictures.
     pub found: Share,
-    /// Within which shares the true one lies with 95 % confidence (Wilson).
+    /// Its 95 % confidence interval (Wilson).
     pub found_interval: [f64; 2],
-    /// Detections that were accepted and not right.
+    /// Number of accepted detections that are not right.
     pub wrong: usize,
-    /// Pictures that were shown.
+    /// Number of pictures.
     pub pictures: usize,
-    /// Median and nine tenths of the accepted detections' distances to the truth, in millimetres, right or not.
+    /// Median and 90th percentile of the position errors of accepted detections, right or not, in millimetres.
     pub distance_mm: Option<[f64; 2]>,
-    /// The same of their turns, in degrees.
+    /// The same for angle errors, in degrees.
     pub turn_deg: Option<[f64; 2]>,
-    /// The same in the first, the middle and the last third of the axis' pictures: what the axis changes grows from the first
-    /// picture to the last.
+    /// The share found in the first, the middle and the last third of the axis' pictures: the axis' parameter grows
+    /// from the first picture to the last.
     pub thirds: [Third; 3],
     /// The share of each part.
     pub parts: Vec<PartShare>,
@@ -108,11 +108,11 @@ pub struct AxisFigures {
 pub struct Third {
     /// Instances of the part that were found.
     pub found: Share,
-    /// From where to where the axis' parameter goes; `None` of no pictures.
+    /// Range of the axis' parameter; `None` without pictures.
     pub range: Option<[f64; 2]>,
 }
 
-/// How often a model took a look-alike for the part.
+/// How often a model accepted a look-alike as the part.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LookAlikeFigures {
     /// The kind of look-alike, or one of the sums [`Self::SAME_SIZE`] and [`Self::SIZE_ALONE`].
@@ -122,7 +122,7 @@ pub struct LookAlikeFigures {
     pub way: Way,
     /// Pictures in which it was accepted.
     pub accepted: Share,
-    /// Within which shares the true one lies with 95 % confidence (Wilson).
+    /// Its 95 % confidence interval (Wilson).
     pub accepted_interval: [f64; 2],
     /// The share of each part.
     pub parts: Vec<PartShare>,
@@ -131,7 +131,7 @@ pub struct LookAlikeFigures {
 impl LookAlikeFigures {
     /// The sum over look-alikes of the part's size.
     pub const SAME_SIZE: &str = "same size";
-    /// The sum over those that differ in nothing but size, which no picture shows without a camera.
+    /// The sum over look-alikes that differ only in size, which is not visible without a calibrated camera.
     pub const SIZE_ALONE: &str = "size alone";
 
     /// Whether it is one of the sums.
@@ -140,22 +140,22 @@ impl LookAlikeFigures {
     }
 }
 
-/// What became of a model's grasps under an error.
+/// Results of a model's grasps under an error.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct GraspFigures {
     pub condition: GraspCondition,
     pub model: ModelKind,
     /// Attempts that held the part.
     pub held: Share,
-    /// Within which shares the true one lies with 95 % confidence (Wilson).
+    /// Its 95 % confidence interval (Wilson).
     pub held_interval: [f64; 2],
-    /// Of all attempts, those held in which both detections came of a first look.
+    /// Attempts held with both detections from a first look, of all attempts.
     pub held_at_first_look: Share,
-    /// Of all attempts, those held after further looks.
+    /// Attempts held after further looks, of all attempts.
     pub held_after_further_looks: Share,
     /// Failed attempts by the step at which they ended.
     pub failures_by_step: BTreeMap<String, usize>,
-    /// Median and nine tenths of the last detections' distances to the truth, in millimetres.
+    /// Median and 90th percentile of the last detections' position errors, in millimetres.
     pub distance_mm: Option<[f64; 2]>,
     /// The share of each part.
     pub parts: Vec<PartShare>,
@@ -169,16 +169,16 @@ pub fn lowest(parts: &[PartShare]) -> Option<&PartShare> {
     })
 }
 
-/// Median and nine tenths.
+/// Median and 90th percentile.
 fn spread(values: &[f64]) -> Option<[f64; 2]> {
     Some([percentile(values.iter().copied(), 50.0)?, percentile(values.iter().copied(), 90.0)?])
 }
 
 impl AxesSummary {
-    /// Adds up what is in the store.
+    /// Sums the results in the store.
     ///
     /// # Errors
-    /// Records that cannot be read.
+    /// Records cannot be read.
     pub fn collect(evaluation: &AxesEvaluation) -> Result<Self> {
         let mut groups = Vec::new();
         let mut seconds = Seconds::default();
@@ -224,7 +224,7 @@ fn axes(evaluation: &AxesEvaluation, objects: &[&str], seconds: &mut Seconds) ->
     Ok(figures)
 }
 
-/// The records of each part; `None` where teaching led to no model, and no entry where it has not been measured yet.
+/// The records of each part; `None` if teaching gave no model; no entry if it was not measured yet.
 fn records<'o>(
     evaluation: &AxesEvaluation,
     objects: &[&'o str],
@@ -243,7 +243,7 @@ fn records<'o>(
     Ok(records)
 }
 
-/// Where there is no model, every instance was missed.
+/// Without a model, every instance counts as missed.
 fn axis_figures(
     axis: Axis,
     model: ModelKind,
@@ -280,7 +280,7 @@ fn axis_figures(
     }
 }
 
-/// A third of the pictures of all parts that were shown.
+/// A third of the pictures of all parts.
 fn of_third<'r>(third: usize, axis: Axis, way: Way, records: impl Iterator<Item = &'r AxisRecord>) -> Third {
     let mut sum = Third::default();
     for record in records {
@@ -296,7 +296,7 @@ fn of_third<'r>(third: usize, axis: Axis, way: Way, records: impl Iterator<Item 
     sum
 }
 
-/// By kind, then the two sums. A model that could not be taught takes nothing for the part: it is left out.
+/// By kind, followed by the two sums. Models that could not be taught are left out, because they accept nothing.
 fn look_alikes(evaluation: &AxesEvaluation, objects: &[&str], seconds: &mut Seconds) -> Result<Vec<LookAlikeFigures>> {
     let mut figures = Vec::new();
     if !evaluation.selection.axes.contains(&Axis::LookAlikes) {
@@ -402,7 +402,7 @@ fn grasp_figures(condition: GraspCondition, model: ModelKind, by_part: &[(&str, 
     }
 }
 
-/// Of the teachings whose models are measured, each once.
+/// The time of the measured models' teachings, each counted once.
 fn teaching_secs(evaluation: &AxesEvaluation, objects: &[&str]) -> Result<f64> {
     let mut taught: Vec<(ModelKind, Marks)> =
         evaluation.models.iter().map(|model| (model.taught_as(), Marks::Shipped)).collect();

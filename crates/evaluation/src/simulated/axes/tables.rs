@@ -1,4 +1,4 @@
-//! What was measured along each axis and under each error, as tables: the paper's parts, and apart from them the others.
+//! The results of each axis and each error as tables: the paper's parts, and separately the others.
 
 use sdg_grasp::ModelKind;
 use sdg_report::{Cell, Column, Table, Tone};
@@ -11,7 +11,7 @@ use crate::simulated::tables::{Titled, document, incomplete, number, share};
 use crate::statistics::Share;
 use crate::trial::{RIGHT_DEGREES, RIGHT_MM};
 
-/// All tables, group by group, then the quantities that the robot is given.
+/// All tables, group by group, followed by the quantities given to the robot.
 pub fn tables(summary: &AxesSummary) -> Vec<Titled> {
     let mut tables = Vec::new();
     for group in &summary.groups {
@@ -46,18 +46,18 @@ pub fn tables(summary: &AxesSummary) -> Vec<Titled> {
     tables
 }
 
-/// What the reader must know before the first number.
+/// A notice to precede the numbers.
 pub fn notice(summary: &AxesSummary) -> Option<String> {
     incomplete(summary.remaining)
 }
 
-/// The tables as a document of their own; `more` are tables to follow, `facts` what is needed to see the same numbers again.
+/// The tables as a separate document; `more` are additional tables, `facts` the settings for reproducing the numbers.
 pub fn markdown(summary: &AxesSummary, more: Vec<Titled>, facts: &[(&str, String)], command: &str) -> String {
     let tables = tables(summary).into_iter().chain(more);
     document("Axes and grasps under errors", notice(summary), tables, facts, command)
 }
 
-/// Each value once, in the order of first appearance.
+/// Each value once, in order of first appearance.
 fn distinct<T: PartialEq + Copy>(values: impl IntoIterator<Item = T>) -> Vec<T> {
     let mut distinct = Vec::new();
     for value in values {
@@ -91,7 +91,7 @@ fn part_name(object: &str) -> String {
     object.replace('_', " ")
 }
 
-/// The lowest share and its part.
+/// The smallest share and its part.
 fn lowest_shares(parts: &[PartShare]) -> String {
     lowest(parts).map_or("–".to_owned(), |part| format!("{}, {}", part.share, part_name(&part.object)))
 }
@@ -213,7 +213,7 @@ fn look_alikes(group: &GroupSummary) -> (String, String, Table) {
     columns.extend(shown.iter().map(|(way, model)| Column::text(model.letter()).group(way.name())));
     let mut table = Table::new(columns);
     let mut kinds = distinct(group.look_alikes.iter().map(|figures| figures.kind.as_str()));
-    // The two sums last: their order of appearance depends on which kinds the first model met.
+    // The two sums last: their order of appearance depends on the first model's look-alikes.
     let sums = [LookAlikeFigures::SAME_SIZE, LookAlikeFigures::SIZE_ALONE];
     kinds.retain(|kind| !sums.contains(kind));
     for kind in kinds.into_iter().chain(sums) {
@@ -328,7 +328,7 @@ fn grasps_by_part(group: &GroupSummary) -> (String, String, Table) {
         );
         table = table.row(row);
     }
-    ("held, every part".to_owned(), "What the sums above are made of.".to_owned(), table)
+    ("held, every part".to_owned(), "Components of the sums above.".to_owned(), table)
 }
 
 fn share_of(parts: &[PartShare], object: &str) -> Option<Share> {
@@ -345,7 +345,7 @@ fn quantities_from_simulator() -> Titled {
         table = table.row([row.what, row.source, row.error].map(Cell::text).into());
     }
     Titled {
-        title: "What the robot is told from truth".to_owned(),
+        title: "Quantities that the robot gets from the simulator".to_owned(),
         lead: "Everything that the simulated robot knows exactly and a real one would have to measure.".to_owned(),
         table,
     }
@@ -439,7 +439,7 @@ mod tests {
     #[test]
     fn the_two_groups_are_never_added_up() {
         let text = markdown(&summary(0), Vec::new(), &[("seed", "1".to_owned())], "sdg evaluate --axes");
-        // 34 of 40, and apart from them 4 of 40.
+        // 34 of 40, and separately 4 of 40.
         assert!(text.contains("| tilt | 40 | 85.0 (70.9 to 92.9) | 85.0 (70.9 to 92.9) |"), "{text}");
         assert!(text.contains("| tilt | 40 | 10.0 (4.0 to 23.1) | 10.0 (4.0 to 23.1) |"), "{text}");
         assert!(text.contains("The paper's parts: found, network alone") && text.contains("Held-out parts: found"));

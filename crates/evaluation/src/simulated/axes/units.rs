@@ -1,4 +1,4 @@
-//! The units of work of the axes: which there are, what each waits for, and where its results stand. `work.rs` does them.
+//! The work units of the axes: their dependencies and files. `work.rs` runs them.
 
 use anyhow::Result;
 use sdg_grasp::{ModelKind, Preset, Verification};
@@ -16,41 +16,41 @@ use crate::simulated::store::Store;
 /// The models that grasp under errors: the paper's best, and the one without a network.
 pub const GRASPING_MODELS: [ModelKind; 2] = [ModelKind::S, ModelKind::C];
 
-/// What is kept or lost as a whole.
+/// A piece of work that is stored or lost as a whole.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Unit<'a> {
     /// A network is taught on a part.
     Teach(Cell<'a>, Marks),
-    /// All models look at a part's pictures of an axis: each picture is drawn once.
+    /// All models search a part's pictures of an axis: each picture is rendered once.
     Pictures(&'a ObjectSpec, Axis),
-    /// A model grasps a part under an error; kept attempt by attempt.
+    /// A model grasps a part under an error; stored attempt by attempt.
     Grasps(Cell<'a>, &'a ObjectSpec, GraspCondition),
 }
 
-/// Models, parts, axes and errors, and the folder for what becomes of them.
+/// Models, parts, axes and errors, and the folder for the results.
 pub struct AxesEvaluation<'a> {
     pub models: &'a [ModelKind],
     pub objects: &'a [ObjectSpec],
     /// Axes of pictures, and errors in grasps.
     pub selection: &'a Selection,
-    /// Network, training and augmentation: what the store's settings name.
+    /// Network, training and augmentation, as named in the store's settings.
     pub preset: Preset,
     pub store: &'a Store,
-    /// Pictures of each part and axis.
+    /// Number of pictures of each part and axis.
     pub axis_views: u32,
-    /// Edge points that model S compares at each pose of its search, if not as taught.
+    /// Number of edge points that model S compares at each pose of its search, if not as taught.
     pub search_points: Option<u32>,
-    /// Units side by side.
+    /// Number of parallel units.
     pub jobs: usize,
 }
 
 impl AxesEvaluation<'_> {
-    /// How many units are not in the store yet.
+    /// Number of units that are not in the store yet.
     pub fn remaining(&self) -> Result<usize> {
         Ok(self.tasks()?.len())
     }
 
-    /// What the pictures' results depend on.
+    /// The settings of the pictures' results.
     pub fn axis_settings(&self) -> AxisSettings {
         AxisSettings {
             axes: AxisSettings::AXES,
@@ -60,7 +60,7 @@ impl AxesEvaluation<'_> {
         }
     }
 
-    /// What attempts under errors depend on.
+    /// The settings of attempts under errors.
     pub fn grasp_settings(&self) -> GraspSettings {
         GraspSettings {
             errors: GraspSettings::ERRORS,
@@ -70,12 +70,12 @@ impl AxesEvaluation<'_> {
         }
     }
 
-    /// A model's detections in a part's pictures of an axis, if it was run on them.
+    /// A model's detections in a part's pictures of an axis, if available.
     pub fn axis_record(&self, cell: Cell, axis: Axis) -> Result<Option<AxisRecord>> {
         self.store.read_made_with(&axis_file(cell, axis), &self.axis_settings())
     }
 
-    /// The attempts of a model on a part under an error so far.
+    /// The attempts so far of a model on a part under an error.
     pub fn grasps(&self, cell: Cell, condition: GraspCondition) -> Result<Vec<AttemptRecord>> {
         match self.is_in_protocol(condition) {
             true => cell.attempts(Verification::ByShape, self.store),
@@ -83,17 +83,17 @@ impl AxesEvaluation<'_> {
         }
     }
 
-    /// Whether attempts are the same as the paper's protocol makes: then they are shared.
+    /// Whether attempts equal those of the paper's protocol: then they are shared.
     pub(super) fn is_in_protocol(&self, condition: GraspCondition) -> bool {
         condition == GraspCondition::NoError && self.search_points.is_none()
     }
 
-    /// The models that grasp under errors, of those that were asked for.
+    /// The requested models that grasp under errors.
     pub fn grasping_models(&self) -> impl Iterator<Item = ModelKind> {
         GRASPING_MODELS.into_iter().filter(|model| self.models.contains(model))
     }
 
-    /// What is not in the store yet, part by part, so that an interrupted run has whole parts to show.
+    /// The remaining units, part by part, so that an interrupted run has results of complete parts.
     pub(super) fn tasks(&self) -> Result<Vec<Task<Unit<'_>>>> {
         let mut tasks = Vec::new();
         for object in self.objects {
@@ -111,11 +111,11 @@ impl AxesEvaluation<'_> {
     }
 }
 
-/// The tasks of one part, as they are listed.
+/// The tasks of one part, while they are listed.
 struct TaskList<'e, 't> {
     evaluation: &'e AxesEvaluation<'e>,
     object: &'e ObjectSpec,
-    /// Networks that are taught, and the index of the task that does it.
+    /// Networks to be taught, each with the index of its task.
     teachings: Vec<(ModelKind, Marks, usize)>,
     tasks: &'t mut Vec<Task<Unit<'e>>>,
 }
@@ -125,7 +125,7 @@ impl<'e> TaskList<'e, '_> {
         Cell { model, object: &self.object.name }
     }
 
-    /// Shows an axis' pictures, if there is a model that has not seen them.
+    /// Adds an axis' pictures, if a model has not been run on them.
     fn add_pictures(&mut self, axis: Axis) -> Result<()> {
         let mut after = Vec::new();
         let mut is_missing = false;
@@ -143,7 +143,7 @@ impl<'e> TaskList<'e, '_> {
         Ok(())
     }
 
-    /// Tries the attempts that are missing.
+    /// Adds the missing attempts.
     fn add_grasps(&mut self, model: ModelKind, condition: GraspCondition) -> Result<()> {
         let (cell, marks) = (self.cell(model), marks_of(condition));
         let wanted = self.evaluation.store.settings().attempts as usize;
@@ -155,7 +155,7 @@ impl<'e> TaskList<'e, '_> {
         Ok(())
     }
 
-    /// The task that teaches a cell's network, listed where it is not yet; `None` where the network is there.
+    /// The task that teaches a cell's network, added if necessary; `None` if the network exists.
     fn teaching_of(&mut self, cell: Cell<'e>, marks: Marks) -> Result<Option<usize>> {
         if cell.teaching_from(marks, self.evaluation.store)?.is_some() {
             return Ok(None);
@@ -177,7 +177,7 @@ impl std::fmt::Display for Unit<'_> {
         match self {
             Self::Teach(cell, Marks::Shipped) => write!(f, "teach {} {}", cell.model, cell.object),
             Self::Teach(cell, Marks::Jittered) => write!(f, "teach {} {} from jittered marks", cell.model, cell.object),
-            Self::Teach(cell, Marks::InPlanView) => write!(f, "teach {} {} in the list view", cell.model, cell.object),
+            Self::Teach(cell, Marks::InPlanView) => write!(f, "teach {} {} in the plan view", cell.model, cell.object),
             Self::Pictures(object, axis) => write!(f, "{axis} {}", object.name),
             Self::Grasps(cell, _, condition) => write!(f, "grasp {} {}, {}", cell.model, cell.object, condition.name()),
         }
@@ -253,7 +253,7 @@ mod tests {
             search_points: None,
             jobs: 1,
         };
-        // B reads C's network; B does not grasp under errors; jittered marks have a teaching of their own.
+        // B uses C's network; B does not grasp under errors; jittered marks have their own teaching.
         assert_eq!(
             listed(&evaluation)[..6],
             [
@@ -267,7 +267,7 @@ mod tests {
         );
         assert_eq!(listed(&evaluation)[6..8], ["teach C key []", "tilt key [6, 6]"]);
 
-        // The protocol's attempts are the control's, and a part whose teaching failed needs nothing more.
+        // The protocol's attempts are the control's, and a part whose teaching failed needs no more work.
         let attempt = |number| AttemptRecord::failed(number, "detect", "not found".into());
         let done = AttemptsRecord::new(vec![attempt(1), attempt(2)]);
         store.write("cells/C-pendulum.attempts-verified.json", &done).unwrap();
@@ -301,7 +301,7 @@ mod tests {
         };
         assert_eq!(found(paper, ModelKind::B), (Share { count: 1, of: 2 }, 1));
         assert_eq!(found(paper, ModelKind::C), (Share { count: 2, of: 2 }, 0));
-        // Where there is no model every part was missed, and every attempt failed.
+        // Without a model every part counts as missed, and every attempt as failed.
         assert_eq!(found(held_out, ModelKind::C), (Share { count: 0, of: 2 }, 0));
         assert_eq!(held_out.grasps[1].failures_by_step[AttemptRecord::TEACH], 2);
         assert_eq!(paper.grasps[0].held, Share { count: 0, of: 2 });

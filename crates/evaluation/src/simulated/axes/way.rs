@@ -1,4 +1,4 @@
-//! The two ways in which a model is measured.
+//! The two ways of measuring a model.
 
 use sdg_grasp::ModelKind;
 use serde::Serialize;
@@ -16,7 +16,7 @@ impl Way {
     /// Both, in the order of the tables.
     pub const ALL: [Self; 2] = [Self::WithCheck, Self::NetworkAlone];
 
-    /// As tables say it.
+    /// The name in tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::WithCheck => "with the check",
@@ -24,7 +24,7 @@ impl Way {
         }
     }
 
-    /// Whether a model can be measured so: without a network there is nothing but the check.
+    /// Whether a model can be measured in this way: a model without a network only has the check.
     pub fn is_of(self, model: ModelKind) -> bool {
         self == Self::WithCheck || model.has_network()
     }

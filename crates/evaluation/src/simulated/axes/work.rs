@@ -1,4 +1,4 @@
-//! How the units of work of the axes are done.
+//! Runs the work units of the axes.
 
 use std::ops::ControlFlow;
 use std::sync::{Mutex, PoisonError};
@@ -25,24 +25,24 @@ use crate::simulated::one_unit::{NO_MODEL, do_unit};
 use crate::simulated::schedule::run_all;
 use crate::simulated::teaching::Teaching;
 
-/// Pictures of a stratum that are tried until one can be drawn.
+/// Maximum number of pictures of a stratum that are tried.
 const MAX_DRAWINGS: u64 = 8;
 
-/// How a run ended.
+/// Result of a run.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RunEnd {
-    /// Units that are not in the store.
+    /// Number of units that are not in the store.
     pub remaining: usize,
-    /// Those of them that failed, with their errors.
+    /// The errors of the failed units among them.
     pub failures: Vec<String>,
 }
 
 impl AxesEvaluation<'_> {
-    /// Does what is not in the store yet, until `is_interrupted` is true; everything is kept that has ended. A unit that
-    /// fails does not end the others, so that hours of work do not wait for one part: its error is printed, and it is tried again next time.
+    /// Runs the remaining units until `is_interrupted` is true; finished units are kept. A failed unit does not end the
+    /// others, so that hours of work do not depend on one part: its error is printed, and it is tried again next time.
     ///
     /// # Errors
-    /// A store that cannot be read. A teaching that leads to no model is a result.
+    /// The store cannot be read. A teaching without a model is a result.
     pub fn run(&self, is_interrupted: &(dyn Fn() -> bool + Sync), progress: &dyn Progress) -> Result<RunEnd> {
         let tasks = self.tasks()?;
         progress.expect(tasks.len());
@@ -83,7 +83,7 @@ impl AxesEvaluation<'_> {
         })
     }
 
-    /// Shows every model that has not seen them a part's pictures of an axis.
+    /// Runs every model that has not been run yet on a part's pictures of an axis.
     fn detect_in_pictures(
         &self,
         object: &ObjectSpec,
@@ -130,7 +130,7 @@ impl AxesEvaluation<'_> {
         Ok(Some(summary.join("; ")))
     }
 
-    /// Goes on with a cell's attempts under an error.
+    /// Continues a cell's attempts under an error.
     fn grasp(
         &self,
         cell: Cell,
@@ -144,7 +144,7 @@ impl AxesEvaluation<'_> {
             model: &model,
             object,
             attempts: settings.attempts,
-            // The scenes of the paper's protocol: what differs is the error alone.
+            // The scenes of the paper's protocol: only the error differs.
             seed: part_seed(settings.seed, object),
             verification: Verification::ByShape,
             errors: errors_of(condition),
@@ -161,12 +161,12 @@ impl AxesEvaluation<'_> {
     }
 }
 
-/// What is wrong in attempts.
+/// The errors of a condition's attempts.
 fn errors_of(condition: GraspCondition) -> RehearsalErrors {
     let workcell =
         |errors: fn(u64) -> AttemptErrors| RehearsalErrors { of_workcell: Some(errors), ..RehearsalErrors::default() };
     match condition {
-        // Jittered marks are the teaching's error.
+        // The error of jittered marks is in the teaching.
         GraspCondition::NoError | GraspCondition::Marks => RehearsalErrors::default(),
         GraspCondition::MarkHeight => RehearsalErrors { mark_height_m: 0.003, ..RehearsalErrors::default() },
         GraspCondition::HandEye => workcell(AttemptErrors::hand_eye),
@@ -175,8 +175,8 @@ fn errors_of(condition: GraspCondition) -> RehearsalErrors {
     }
 }
 
-/// Draws a picture of an axis. Where a scene leaves no place for camera, cover or instances, the next picture of the same
-/// stratum is drawn.
+/// Renders a picture of an axis. If a scene has no room for camera, cover or instances, the next picture of the same
+/// stratum is used.
 pub(crate) fn draw(object: &ObjectSpec, axis: Axis, number: u64, seed: u64) -> Result<AxisView> {
     let mut impossible = None;
     for round in 0..MAX_DRAWINGS {
@@ -189,7 +189,7 @@ pub(crate) fn draw(object: &ObjectSpec, axis: Axis, number: u64, seed: u64) -> R
         .with_context(|| format!("picture {number}, drawn {MAX_DRAWINGS} times"))
 }
 
-/// A model's detections in a picture, both ways.
+/// A model's detections in a picture, in both ways.
 fn ask(model: &GraspModel, object: &ObjectSpec, number: u64, view: &AxisView) -> Result<AxisPicture> {
     let instances: Vec<Isometry3<f64>> = view.truths.iter().map(|truth| truth.grasp.base_from_object).collect();
     let answer = |verification| -> Result<_> {

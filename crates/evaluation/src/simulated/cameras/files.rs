@@ -1,4 +1,4 @@
-//! The cameras' results as files of the evaluation's folder, and in a few lines.
+//! Writes the results of the cameras to files in the evaluation's folder, and a few lines.
 
 use std::path::{Path, PathBuf};
 
@@ -11,10 +11,11 @@ use crate::machine::machine;
 use crate::simulated::store::Store;
 
 impl CamerasSummary {
-    /// Writes tables and a page; their files. `jobs` units were done side by side, and `command` makes the same results again.
+    /// Writes tables and a page, and returns their files. `jobs` is the number of parallel units, and `command`
+    /// reproduces the results.
     ///
     /// # Errors
-    /// Files that cannot be written.
+    /// Files cannot be written.
     pub fn write(&self, store: &Store, jobs: usize, command: &str, report_folder: &Path) -> Result<[PathBuf; 2]> {
         let settings = store.settings();
         let facts = [
@@ -31,7 +32,7 @@ impl CamerasSummary {
         Ok([store.path("cameras.md"), page(self, &facts, command).write(report_folder)?])
     }
 
-    /// A line for each model on each set.
+    /// One line for each model on each set.
     pub fn lines(&self) -> String {
         let mut text = String::new();
         for row in &self.sets {

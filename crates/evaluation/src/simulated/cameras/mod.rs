@@ -1,4 +1,5 @@
-//! Models taught in the plan view of one calibrated camera, on pictures of others: grasps in metres against the truth.
+//! Models taught in the plan view of one calibrated camera, tested on pictures of others: grasps in metres against the
+//! ground truth.
 //!
 //! ```text
 //! shipped photo and its camera ─ plan view ─ teach ┐
@@ -6,7 +7,7 @@
 //! the axes' pictures  ├─ picture and its camera ───┘
 //! parts of other sizes┘
 //! ```
-//! Teachings and results stand in the same store as the axes'.
+//! Teachings and results are in the same store as those of the axes.
 
 mod files;
 mod records;

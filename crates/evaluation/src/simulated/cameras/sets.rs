@@ -1,4 +1,4 @@
-//! The pictures: of other cameras, of the axes, and of parts of other sizes.
+//! The sets of pictures: of other cameras, of the axes, and of parts of other sizes.
 
 use anyhow::Result;
 use nalgebra::{Isometry3, Vector3};
@@ -8,21 +8,21 @@ use sdg_simulation::views::{Axis, OTHER_CAMERAS, OnTable, other_view};
 
 use crate::simulated::axes::draw;
 
-/// Sizes of the parts that are to be refused, in percent of the part's.
+/// Sizes of parts that must be refused, in percent of the part's size.
 const OTHER_SIZES_PERCENT: [u32; 4] = [80, 90, 110, 125];
 
-/// Pictures that are told apart in the tables.
+/// A set of pictures with its own row in the tables.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PictureSet {
     /// Taken by one of [`OTHER_CAMERAS`].
     Camera(usize),
-    /// The wrist camera's, harder along an axis.
+    /// Of the wrist camera, along an axis of difficulty.
     Axis(Axis),
-    /// By all cameras in turn, with a part of another size in the part's place.
+    /// Of all cameras in turn, with a part of another size in place of the part.
     OtherSizes,
 }
 
-/// A picture with the truth about it.
+/// A picture with its ground truth.
 pub(super) struct Shown {
     pub view: CameraView,
     /// Poses of the part's instances in the base frame.
@@ -30,7 +30,7 @@ pub(super) struct Shown {
 }
 
 impl PictureSet {
-    /// All of them, in the order in which they are reported.
+    /// All sets, in the order of the reports.
     pub fn all() -> Vec<Self> {
         let axes = Axis::ALL.into_iter().filter(|axis| *axis != Axis::LookAlikes).map(Self::Axis);
         (0..OTHER_CAMERAS.len()).map(Self::Camera).chain(axes).chain([Self::OtherSizes]).collect()
@@ -45,7 +45,7 @@ impl PictureSet {
         }
     }
 
-    /// Draws a picture.
+    /// Renders a picture.
     pub(super) fn draw(self, part: &ObjectSpec, number: u64, of: u64, seed: u64) -> Result<Shown> {
         let (on_table, camera) = match self {
             Self::Axis(axis) => {
@@ -66,7 +66,7 @@ impl PictureSet {
 }
 
 impl Shown {
-    /// Height of the camera over the table in metres, and its tilt from straight down in degrees.
+    /// Height of the camera over the table in metres, and its tilt from vertical in degrees.
     pub fn height_and_tilt(&self) -> (f64, f64) {
         let camera = self.view.camera.world_from_camera;
         let down = -(camera * Vector3::z()).z;

@@ -1,4 +1,4 @@
-//! What was found, and how far beside the truth.
+//! Detection rates and errors.
 
 use anyhow::Result;
 use sdg_geometry::percentile;
@@ -11,23 +11,23 @@ use super::units::CamerasEvaluation;
 use crate::simulated::cell::Cell;
 use crate::statistics::Share;
 
-/// Parts whose marks lie higher over the table than this show walls to a camera beside them, in metres.
+/// Height of the marks over the table, in metres, above which a part's walls are visible from the side.
 pub(super) const HIGH_M: f64 = 0.010;
 
-/// Errors of what was found.
+/// Errors of found instances.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ErrorFigures {
-    /// Median distance to the truth in the marks' plane, in millimetres.
+    /// Median position error in the marks' plane, in millimetres.
     pub median_mm: f64,
-    /// What 95 % stay within.
+    /// 95th percentile of the position error.
     pub p95_mm: f64,
-    /// Median turn, in degrees, modulo the part's symmetry; without parts whose turn cannot be seen.
+    /// Median angle error, in degrees, modulo the part's symmetry; without parts whose angle is not visible.
     pub median_deg: Option<f64>,
-    /// What 95 % stay within.
+    /// 95th percentile of the angle error.
     pub p95_deg: Option<f64>,
-    /// How many lie within the radius that the detection gave for 68 %.
+    /// Number of errors within the detection's 68 % radius.
     pub within_sigma_mm: Share,
-    /// How many are turned by no more than the detection gave.
+    /// Number of angle errors within the detection's sigma.
     pub within_sigma_deg: Share,
 }
 
@@ -39,30 +39,30 @@ pub struct SetFigures {
     pub parts: String,
     /// Instances found, of those in the pictures.
     pub found: Share,
-    /// Pictures without the part in which something was accepted, of those without it.
+    /// Pictures without the part in which something was accepted, of all without it.
     pub accepted: Share,
-    /// Accepted detections that are not right.
+    /// Number of accepted detections that are not right.
     pub wrong: usize,
-    /// Of what was found.
+    /// Errors of the found instances.
     pub errors: Option<ErrorFigures>,
 }
 
-/// Everything that was measured.
+/// All results.
 #[derive(Debug, Clone, Serialize)]
 pub struct CamerasSummary {
-    /// Model by model and set by set, all parts together.
+    /// By model and set, over all parts.
     pub sets: Vec<SetFigures>,
-    /// The same, low and high parts apart.
+    /// The same, for low and high parts separately.
     pub by_height: Vec<SetFigures>,
-    /// The three cameras together, part by part.
+    /// The three cameras together, by part.
     pub by_part: Vec<SetFigures>,
-    /// A worker's seconds on pictures.
+    /// Worker seconds for the pictures.
     pub seconds: f64,
-    /// Units of work that are still to do.
+    /// Number of remaining units.
     pub remaining: usize,
 }
 
-/// The pictures of a part in a set, as a model answered them.
+/// The pictures of a part in a set, with a model's detections.
 struct Shown<'a> {
     object: &'a str,
     is_high: bool,
@@ -73,7 +73,7 @@ struct Shown<'a> {
 }
 
 impl CamerasSummary {
-    /// Reads all that is in the store.
+    /// Reads all results in the store.
     ///
     /// # Errors
     /// Those of the store.

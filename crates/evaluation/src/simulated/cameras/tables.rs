@@ -1,4 +1,4 @@
-//! What was measured with calibrated cameras, as tables and as a page.
+//! The results with calibrated cameras as tables and as a page.
 
 use sdg_report::{Cell, Column, KeyFigure, Report, Section, Table, Tone};
 
@@ -32,7 +32,7 @@ pub fn tables(summary: &CamerasSummary) -> Vec<Titled> {
     ]
 }
 
-/// `of` heads the column that says of which parts a row is, where not all are of all.
+/// `of` is the heading of a column that names the parts of a row, if rows are not of all parts.
 fn table(rows: &[SetFigures], of: Option<&str>) -> Table {
     let mut columns = vec![Column::text("model"), Column::text("pictures")];
     columns.extend(of.map(Column::text));
@@ -48,7 +48,7 @@ fn table(rows: &[SetFigures], of: Option<&str>) -> Table {
     ]);
     let mut table = Table::new(columns);
     for row in rows {
-        // No line break within the share.
+        // Without a line break in the share.
         let whole = |share: crate::statistics::Share| share.to_string().replace(' ', "\u{a0}");
         let found = match row.found.of {
             0 => Cell::text(format!("accepted: {}", whole(row.accepted))),
@@ -76,7 +76,7 @@ fn table(rows: &[SetFigures], of: Option<&str>) -> Table {
     table
 }
 
-/// The tables as a document; `facts` are what is needed to see the same numbers again.
+/// The tables as a document; `facts` are the settings for reproducing the numbers.
 pub fn markdown(summary: &CamerasSummary, facts: &[(&str, String)], command: &str) -> String {
     document("Calibrated cameras", incomplete(summary.remaining), tables(summary), facts, command)
 }
@@ -84,7 +84,7 @@ pub fn markdown(summary: &CamerasSummary, facts: &[(&str, String)], command: &st
 /// The tables as a page.
 pub fn page(summary: &CamerasSummary, facts: &[(&str, String)], command: &str) -> Report {
     let mut report = Report::new("Calibrated cameras").kicker("Evaluation in simulation").lead(
-        "A part taught with one camera, found with others: what is found, and how exact its place is in millimetres.",
+        "A part taught with one camera, detected with others: detection rates, and position errors in millimetres.",
     );
     for row in summary.sets.iter().filter(|row| row.found.of > 0).take(3) {
         if let Some(errors) = row.errors {

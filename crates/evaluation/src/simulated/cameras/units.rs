@@ -1,4 +1,4 @@
-//! The units of work, and how each is done.
+//! The work units, and their implementation.
 
 use std::time::Instant;
 
@@ -21,33 +21,33 @@ use crate::simulated::settings::TeachingSettings;
 use crate::simulated::store::Store;
 use crate::simulated::teaching::Teaching;
 
-/// What is kept or lost as a whole.
+/// A piece of work that is stored or lost as a whole.
 #[derive(Debug, Clone, Copy)]
 enum Unit<'a> {
     /// A network is taught on a part in the plan view.
     Teach(Cell<'a>),
-    /// A model looks at a part's pictures of a set.
+    /// A model searches a part's pictures of a set.
     Pictures(Cell<'a>, &'a ObjectSpec, PictureSet),
 }
 
-/// Models, parts and sets of pictures, and the folder for what becomes of them.
+/// Models, parts and sets of pictures, and the folder for the results.
 pub struct CamerasEvaluation<'a> {
     pub models: &'a [ModelKind],
     pub objects: &'a [ObjectSpec],
     pub sets: &'a [PictureSet],
-    /// Network, training and augmentation: what the store's settings name.
+    /// Network, training and augmentation, as named in the store's settings.
     pub preset: Preset,
     pub store: &'a Store,
-    /// Pictures of each part and set.
+    /// Number of pictures of each part and set.
     pub views: u32,
-    /// Units side by side.
+    /// Number of parallel units.
     pub jobs: usize,
 }
 
-/// Everything that the results of a set depend on, apart from set, model and part.
+/// The settings on which the results of a set depend, besides set, model and part.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 struct CameraSettings {
-    /// How pictures are drawn and scored: raised when either changes.
+    /// Version of rendering and scoring, raised when either changes.
     cameras: u32,
     #[serde(flatten)]
     teaching: TeachingSettings,
@@ -55,10 +55,10 @@ struct CameraSettings {
 }
 
 impl CamerasEvaluation<'_> {
-    /// Does what is not in the store yet, until `is_interrupted` is true.
+    /// Runs the remaining units until `is_interrupted` is true.
     ///
     /// # Errors
-    /// The first error of a unit; a store that cannot be read. A teaching that leads to no model is a result.
+    /// The first error of a unit; the store cannot be read. A teaching without a model is a result.
     pub fn run(&self, is_interrupted: &(dyn Fn() -> bool + Sync), progress: &dyn Progress) -> Result<()> {
         let tasks = self.tasks()?;
         progress.expect(tasks.len());
@@ -67,23 +67,23 @@ impl CamerasEvaluation<'_> {
         run_all(&tasks, self.jobs, (cores / self.jobs.max(1)).max(1), &work)
     }
 
-    /// How many units are not in the store yet.
+    /// Number of units that are not in the store yet.
     pub fn remaining(&self) -> Result<usize> {
         Ok(self.tasks()?.len())
     }
 
-    /// A model's detections in a part's pictures of a set, if it was run on them.
+    /// A model's detections in a part's pictures of a set, if available.
     pub fn record(&self, cell: Cell, set: PictureSet) -> Result<Option<CameraRecord>> {
         self.store.read_made_with(&file(cell, set), &self.settings())
     }
 
-    /// Whether the teaching of a cell led to no model.
+    /// Whether the teaching of a cell gave no model.
     pub(super) fn is_without_model(&self, cell: Cell) -> Result<bool> {
         cell.is_without_model(Marks::InPlanView, self.store)
     }
 
     fn settings(&self) -> CameraSettings {
-        /// The pictures and their scoring of this version.
+        /// The current version of pictures and scoring.
         const CAMERAS: u32 = 1;
         CameraSettings { cameras: CAMERAS, teaching: self.store.settings().teaching(), views: self.views }
     }
@@ -153,7 +153,7 @@ impl CamerasEvaluation<'_> {
     }
 }
 
-/// Accepted detections beside the truth.
+/// Compares accepted detections with the ground truth.
 fn judged(object: &ObjectSpec, number: u64, shown: &Shown, found: &[Found]) -> CameraPicture {
     let num_counted = if shown.instances.len() <= 1 { 1 } else { usize::MAX };
     let accepted: Vec<_> = found

@@ -1,4 +1,4 @@
-//! What keeps units out of the tables: whatever is missing, at work, failed, done twice, or not what its receipt tells of.
+//! Faults of units that prevent the tables: missing, running, failed, duplicate, or different from the receipt.
 
 use std::path::Path;
 
@@ -12,24 +12,24 @@ use super::records::Receipt;
 use super::unit_folder::{UnitFolder, UnitState};
 use super::unit_list::ListedUnit;
 
-/// The right to make the tables of a folder, until it is dropped.
+/// The exclusive right to make the tables of a folder, until it is dropped.
 #[derive(Debug)]
 pub struct Collecting(#[allow(dead_code, reason = "held until it is dropped")] Lock);
 
 impl Collecting {
-    /// Takes that right for this process; `None` where another one makes them.
+    /// Takes this right for the process; `None` if another process has it.
     ///
     /// # Errors
-    /// A folder that cannot be written.
+    /// The folder cannot be written.
     pub fn begin(folder: &Path) -> Result<Option<Self>> {
         Ok(Lock::take(&folder.join(".collect.lock"), Access::Alone)?.map(Self))
     }
 }
 
-/// A line for each unit that must not be counted; none when the tables can be made.
+/// One line for each unit that must not be counted; empty if the tables can be made.
 ///
 /// # Errors
-/// Records that cannot be read.
+/// Records cannot be read.
 pub fn faults(evaluation: &Evaluation, units: &[ListedUnit]) -> Result<Vec<String>> {
     let folder = evaluation.store.folder();
     let mut faults = Vec::new();
@@ -58,11 +58,11 @@ fn why_missing(state: &UnitState) -> String {
             failure.by,
             failure.why
         ),
-        (None, None) => "missing: nobody has begun it".to_owned(),
+        (None, None) => "missing: not begun yet".to_owned(),
     }
 }
 
-/// What of a unit's results is not as its receipt says, or not of these settings and this program.
+/// The first difference between a unit's results and its receipt, these settings or this program.
 fn stale(evaluation: &Evaluation, unit: &ListedUnit, receipt: &Receipt) -> Result<Option<String>> {
     if let Some(difference) = difference(&evaluation.settings_of(unit)?, &receipt.settings)? {
         return Ok(Some(format!("stale: done with other settings ({difference})")));
@@ -75,7 +75,7 @@ fn stale(evaluation: &Evaluation, unit: &ListedUnit, receipt: &Receipt) -> Resul
         let found = sha256_of(&path).with_context(|| path.display().to_string())?;
         if found != *expected {
             return Ok(Some(format!(
-                "stale: {file} is not the file that its receipt tells of (SHA-256: expected {expected}, found {found})"
+                "stale: {file} differs from the file in its receipt (SHA-256: expected {expected}, found {found})"
             )));
         }
     }

@@ -1,4 +1,4 @@
-//! One unit is done in a folder that others work in, too.
+//! Runs one unit in a folder that is shared with other processes.
 
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
@@ -20,10 +20,10 @@ use super::unit_list::{ListedUnit, Work};
 use super::worker::Worker;
 use crate::error::EvaluationError;
 
-/// How a unit ended.
+/// Outcome of a unit.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Ended {
-    /// What came of it, in words.
+    /// Done, with its result in words.
     Done(String),
     /// It was done before.
     Already(Box<Receipt>),
@@ -32,11 +32,11 @@ pub enum Ended {
 }
 
 impl Evaluation<'_> {
-    /// Does a unit with as many threads, unless it is done already, and leaves a receipt or the reason why it failed. Where
-    /// another process does it, that is told and its end waited for.
+    /// Runs a unit with this number of threads, unless it is done already, and writes a receipt or the reason of its
+    /// failure. If another process is running it, this is reported, and its end is waited for.
     ///
     /// # Errors
-    /// What the unit fails with; a unit that waits for another one; one done with other settings.
+    /// The unit's own errors; a dependency is missing; the unit was done with other settings.
     pub fn do_listed(
         &self,
         unit: &ListedUnit,
@@ -97,7 +97,7 @@ impl Evaluation<'_> {
         }
     }
 
-    /// What a unit's files depend on.
+    /// The settings on which a unit's files depend.
     pub(super) fn settings_of(&self, unit: &ListedUnit) -> Result<Value> {
         let settings = self.store.settings();
         Ok(match unit.work {
@@ -106,7 +106,7 @@ impl Evaluation<'_> {
         })
     }
 
-    /// A unit that waits for another one has nothing to work with.
+    /// A unit without its dependencies cannot run.
     fn check_after(&self, unit: &ListedUnit) -> Result<()> {
         let folder = self.store.folder();
         for before in &unit.after {
@@ -143,7 +143,7 @@ impl Evaluation<'_> {
         Ok(summary.into_inner().unwrap_or_else(PoisonError::into_inner))
     }
 
-    /// The files that a unit wrote, with their hashes.
+    /// The files written by a unit, with their hashes.
     fn written_by(&self, unit: &ListedUnit) -> Result<BTreeMap<String, String>> {
         let mut written = BTreeMap::new();
         for file in &unit.files {
@@ -157,7 +157,7 @@ impl Evaluation<'_> {
     }
 }
 
-/// Who has a unit, as far as that is known.
+/// The process that runs a unit, if known.
 fn by_whom(folder: &UnitFolder) -> String {
     let running = folder.read().ok().and_then(|state| state.running);
     running.map_or_else(String::new, |running| format!(", by {}", running.by))

@@ -1,4 +1,5 @@
-//! An evaluation's units done by many processes, on as many machines as see one folder: Slurm's job arrays, or a person.
+//! An evaluation's units done by many processes, on all machines that see one folder: by Slurm's job arrays, or by
+//! hand.
 //!
 //! ```text
 //! all_units ─ names ─┬─ --unit NAME …  ─ UnitFolder: lock, running, receipt or failure ─ Store (shared)
@@ -11,11 +12,11 @@
 //! DIR/units/NAME/failed-*.json   why it failed, by whom
 //! ```
 //!
-//! A **unit** has a name that never changes, and a folder of its own, so that a process reads and writes the same few files
-//! however many units there are. Records carry the SHA-256 of the program besides the settings of the ordinary run; the
-//! shipped demonstrations are compiled into the program, so that its hash stands for theirs, too.
+//! A **unit** has a constant name and its own folder, so that a process reads and writes the same few files for any
+//! number of units. Records contain the SHA-256 of the program besides the settings of the ordinary run; the shipped
+//! demonstrations are compiled into the program, so its hash covers them too.
 //!
-//! Who does what when is not decided here: that is Slurm's part.
+//! The assignment of units to processes is left to Slurm.
 
 mod checking;
 mod doing;

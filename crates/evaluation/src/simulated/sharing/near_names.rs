@@ -1,11 +1,11 @@
-//! The names that a misspelt one may have meant.
+//! Known names similar to a misspelt one.
 
 use strsim::levenshtein;
 
-/// At most this many are told.
+/// Maximum number of names.
 const MAX_NAMES: usize = 3;
 
-/// Those of `known` that `name` resembles most, the nearest first.
+/// The names in `known` that are most similar to `name`, nearest first.
 pub fn near_names<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Vec<&'a str> {
     let mut near: Vec<(usize, &str)> = known.into_iter().map(|known| (levenshtein(name, known), known)).collect();
     near.sort_by_key(|(edits, _)| *edits);

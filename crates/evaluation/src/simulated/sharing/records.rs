@@ -1,4 +1,4 @@
-//! What a process leaves in a unit's folder.
+//! The records of a process in a unit's folder.
 
 use std::collections::BTreeMap;
 
@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use super::worker::Worker;
 
-/// A unit is at work.
+/// A unit is running.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Running {
     pub by: Worker,
@@ -22,17 +22,17 @@ pub struct Receipt {
     pub by: Worker,
     /// Seconds since 1970.
     pub started_secs: u64,
-    /// How long it took.
+    /// Duration.
     pub seconds: f64,
-    /// What came of it, in words.
+    /// The result in words.
     pub summary: String,
-    /// What its files depend on: settings, and the program's SHA-256.
+    /// The settings on which its files depend, and the program's SHA-256.
     pub settings: Value,
-    /// Each file that it wrote, from the evaluation's folder, and its SHA-256.
+    /// The files that it wrote, with paths relative to the evaluation's folder, and their SHA-256.
     pub files: BTreeMap<String, String>,
 }
 
-/// A unit came to nothing.
+/// A unit has failed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Failure {
     pub unit: String,
@@ -40,6 +40,6 @@ pub struct Failure {
     /// Seconds since 1970.
     pub started_secs: u64,
     pub seconds: f64,
-    /// Why, in one line.
+    /// The reason, on one line.
     pub why: String,
 }

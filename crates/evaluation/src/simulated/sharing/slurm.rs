@@ -1,8 +1,8 @@
-//! A script that hands an evaluation's units to Slurm: three job arrays, one after the other.
+//! A script that submits an evaluation's units to Slurm: three consecutive job arrays.
 //!
-//! Teachings; pictures and grasps, when the teachings have ended; speed, each unit alone on a node, when all else has. An array
-//! waits for the end of the one before, not for its success: one teaching that fails keeps no other part's units back, and
-//! those of its own part say what they miss.
+//! Teachings first; pictures and grasps when the teachings have ended; speed, each unit alone on a node, when all
+//! others have ended. An array waits for the end of the previous one, not for its success: a failed teaching does not
+//! block the units of other parts, and the units of its own part report what is missing.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -10,22 +10,22 @@ use std::path::Path;
 use super::unit_list::{ListedUnit, UnitKind};
 use super::worker::{Worker, unix_secs};
 
-/// What one task runs.
+/// The script of one task.
 const UNIT_JOB: &str = include_str!("unit_job.sh");
-/// Tasks of an array: Slurm's default for the greatest index is 1000.
+/// Maximum number of tasks of an array: Slurm's default for the largest index is 1000.
 const MAX_TASKS: usize = 1000;
 
-/// What each task asks of Slurm, and what it runs.
+/// The resources that each task requests from Slurm, and its command.
 #[derive(Debug, Clone)]
 pub struct SlurmJob<'a> {
-    /// The program and its arguments but for --out and --unit.
+    /// The program and its arguments, except --out and --unit.
     pub command: &'a [String],
-    /// The folder of the evaluation, from the root.
+    /// Absolute path of the evaluation's folder.
     pub folder: &'a Path,
     pub cores: u32,
     pub memory_mb: u32,
     pub limit_mins: u32,
-    /// Further arguments of sbatch.
+    /// Additional arguments of sbatch.
     pub sbatch: &'a [String],
 }
 
@@ -52,7 +52,7 @@ pub fn submit_script(job: &SlurmJob, units: &[ListedUnit]) -> String {
         units.len()
     );
     let mut line = |text: std::fmt::Arguments| {
-        // Writing into a string cannot fail.
+        // Writing to a string cannot fail.
         let _ = script.write_fmt(text);
     };
     line(format_args!(" --cpus-per-task={} --mem={}M --time={}", job.cores, job.memory_mb, job.limit_mins));
@@ -92,7 +92,7 @@ pub fn submit_script(job: &SlurmJob, units: &[ListedUnit]) -> String {
     script
 }
 
-/// A word as the shell takes it.
+/// A word quoted for the shell.
 fn quoted(word: &str) -> String {
     let is_plain = |letter: char| letter.is_ascii_alphanumeric() || "-_./,=:+%".contains(letter);
     if !word.is_empty() && word.chars().all(is_plain) {
@@ -101,7 +101,7 @@ fn quoted(word: &str) -> String {
     format!("'{}'", word.replace('\'', r"'\''"))
 }
 
-/// The cores that Slurm gave, or those of the machine.
+/// The number of cores allocated by Slurm, or of the machine.
 pub fn cores() -> usize {
     let given = std::env::var("SLURM_CPUS_PER_TASK").ok().and_then(|cores| cores.parse().ok());
     given.filter(|&cores| cores > 0).unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))

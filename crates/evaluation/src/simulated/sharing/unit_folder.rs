@@ -1,4 +1,4 @@
-//! The folder of one unit: who does it, and what came of it.
+//! The folder of one unit: its processes and results.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -12,44 +12,45 @@ use serde::de::DeserializeOwned;
 use super::records::{Failure, Receipt, Running};
 use super::worker::{Worker, unix_secs};
 
-/// Larger than any record of a unit.
+/// Maximum size of a unit's record.
 const MAX_RECORD_BYTES: u64 = 1 << 20;
-/// How often a lock is asked for that another process has.
+/// Interval of attempts to take a lock that another process holds.
 const LOCK_WAIT: Duration = Duration::from_millis(500);
 const RUNNING: &str = "running.json";
 
-/// Where a unit's records lie.
+/// The folder with a unit's records.
 #[derive(Debug)]
 pub struct UnitFolder(PathBuf);
 
-/// What is known of a unit.
+/// The state of a unit.
 #[derive(Debug, Default)]
 pub struct UnitState {
-    /// More than one where two processes did the same.
+    /// More than one if two processes did the same unit.
     pub receipts: Vec<Receipt>,
-    /// The oldest first.
+    /// Oldest first.
     pub failures: Vec<Failure>,
-    /// Who began it last and has not ended it.
+    /// The process that began it last and has not ended it.
     pub running: Option<Running>,
-    /// Whether that process has gone without a word.
+    /// Whether that process disappeared without a record.
     pub is_abandoned: bool,
 }
 
-/// The right to do a unit, until it is dropped.
+/// The right to run a unit, until it is dropped.
 #[derive(Debug)]
 pub(super) struct Held(#[allow(dead_code, reason = "held until it is dropped")] Lock);
 
 impl UnitFolder {
-    /// That of a unit in an evaluation's folder, which need not exist.
+    /// The folder of a unit in an evaluation's folder; it need not exist.
     pub fn of(evaluation: &Path, unit: &str) -> Self {
         Self(evaluation.join("units").join(unit))
     }
 
-    /// Takes the unit for this process, when whoever has it has ended; `wait` is called all the while, and may give it up by
-    /// `false`: then there is `None`. A file system without locks gives it to everyone: then two receipts tell.
+    /// Takes the unit for this process once its holder has ended; `wait` is called repeatedly, and may return `false`
+    /// to give up: the result is then `None`. A file system without locks grants every request: duplicates are then
+    /// detected by two receipts.
     ///
     /// # Errors
-    /// A folder that cannot be written.
+    /// The folder cannot be written.
     pub(super) fn hold(&self, wait: &mut dyn FnMut() -> bool) -> Result<Option<Held>> {
         fs::create_dir_all(&self.0).with_context(|| format!("{}: cannot make this folder", self.0.display()))?;
         loop {
@@ -61,10 +62,10 @@ impl UnitFolder {
         }
     }
 
-    /// What is there.
+    /// Reads the state.
     ///
     /// # Errors
-    /// Records that cannot be read or are damaged.
+    /// Records cannot be read or are damaged.
     pub fn read(&self) -> Result<UnitState> {
         let mut state = UnitState::default();
         for path in self.entries()? {
@@ -74,7 +75,7 @@ impl UnitFolder {
             } else if name.starts_with("failed-") {
                 state.failures.push(read_record(&path)?);
             } else if name == RUNNING {
-                // It may end between the two readings.
+                // It may end between the two reads.
                 state.running = path
                     .exists()
                     .then(|| read_record(&path))
@@ -87,26 +88,26 @@ impl UnitFolder {
         Ok(state)
     }
 
-    /// Says that this process has begun.
+    /// Records that this process has begun.
     pub(super) fn begin(&self, by: &Worker) -> Result<Running> {
         let running = Running { by: by.clone(), started_secs: unix_secs() };
         self.write(RUNNING, &running)?;
         Ok(running)
     }
 
-    /// Says that it is done.
+    /// Records that the unit is done.
     pub(super) fn finish(&self, receipt: &Receipt) -> Result<()> {
         self.write(&format!("done-{}.json", receipt.by.file_name_part(receipt.started_secs)), receipt)?;
         self.end()
     }
 
-    /// Says that it came to nothing.
+    /// Records that the unit has failed.
     pub(super) fn fail(&self, failure: &Failure) -> Result<()> {
         self.write(&format!("failed-{}.json", failure.by.file_name_part(failure.started_secs)), failure)?;
         self.end()
     }
 
-    /// Takes back [`Self::begin`].
+    /// Revokes [`Self::begin`].
     pub(super) fn end(&self) -> Result<()> {
         let path = self.0.join(RUNNING);
         fs::remove_file(&path).with_context(|| format!("{}: cannot remove", path.display()))
@@ -156,7 +157,7 @@ mod tests {
         let state = unit.read().unwrap();
         assert!(state.running.unwrap().by == worker() && !state.is_abandoned);
         drop(held);
-        // The process went away without a word.
+        // The process disappeared without a record.
         assert!(unit.read().unwrap().is_abandoned);
         assert!(unit.hold(&mut || false).unwrap().is_some());
     }

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# One unit of an evaluation, as a task of Slurm's array. What follows was written by `sdg evaluate --submit slurm`.
-# Arguments: the list of units, and how many of them stand before the first of this array.
+# One unit of an evaluation, as a task of a Slurm array. Written by `sdg evaluate --submit slurm`.
+# Arguments: the list of units, and the number of units before the first one of this array.
 set -u
 folder=@FOLDER@
 list=$1 before=$2
@@ -11,8 +11,8 @@ fi
 unit=$(sed -n "$((SLURM_ARRAY_TASK_ID + before + 1))p" "$folder/slurm/$list.units")
 @COMMAND@ --out "$folder" --unit "$unit" && exit 0
 status=$?
-# A unit that failed for the first time is tried once more, on another node where there is one. The task goes back into the
-# queue, so that the arrays that wait for this one go on waiting. SIGTERM is how Slurm ends what it puts back.
+# A unit that failed for the first time is tried once more, on another node if there is one. The task is requeued, so that arrays
+# that depend on this one keep waiting. Slurm sends SIGTERM to requeued tasks.
 shopt -s nullglob
 failures=("$folder/units/$unit"/failed-*.json)
 if [ "${#failures[@]}" -eq 1 ] && scontrol --version >/dev/null 2>&1; then

@@ -1,4 +1,4 @@
-//! All units of an evaluation by name, whether they are done or not.
+//! All units of an evaluation by name, finished or not.
 
 use std::fmt;
 use std::path::Path;
@@ -12,10 +12,10 @@ use serde::{Deserialize, Serialize};
 use super::super::cell::{Cell, Marks, attempts_of};
 use super::super::units::Unit;
 
-/// Larger than the plan of a hundred thousand units.
+/// Maximum size of a plan: larger than one of a hundred thousand units.
 const MAX_LIST_BYTES: u64 = 64 << 20;
 
-/// Which kind of work a unit is: the first word of its name.
+/// The kind of work of a unit: the first word of its name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum UnitKind {
@@ -26,7 +26,7 @@ pub enum UnitKind {
 }
 
 impl UnitKind {
-    /// All, in the order of the plan.
+    /// All kinds, in the order of the plan.
     pub const ALL: [Self; 4] = [Self::Teach, Self::Look, Self::Grasp, Self::Time];
 
     /// The first word of its units' names.
@@ -39,7 +39,7 @@ impl UnitKind {
         }
     }
 
-    /// Whether its units render pictures: all but teachings do, which take shipped photos.
+    /// Whether its units render pictures: all but teachings do, which use shipped photos.
     pub fn is_simulated(self) -> bool {
         self != Self::Teach
     }
@@ -57,26 +57,27 @@ impl fmt::Display for UnitKind {
     }
 }
 
-/// What there is to do.
+/// The work of a unit.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Work<'a> {
     Unit(Unit<'a>),
-    /// How long all models take on a part.
+    /// The speed of all models on a part.
     Time(&'a ObjectSpec),
 }
 
-/// A unit of work under its name.
+/// A unit of work with its name.
 #[derive(Debug, Clone)]
 pub struct ListedUnit<'a> {
     pub name: String,
     /// Names of the units that must be done before.
     pub after: Vec<String>,
-    /// The files that it may write, from the evaluation's folder. A part without a model leaves none of some.
+    /// The files that it may write, relative to the evaluation's folder. For a part without a model, some are not
+    /// written.
     pub(super) files: Vec<String>,
     pub(super) work: Work<'a>,
 }
 
-/// All units: teachings, pictures, grasps, grasps without the check, speed. Each stands behind those that it waits for.
+/// All units: teachings, pictures, grasps, grasps without the check, speed. Each follows its dependencies.
 pub fn all_units<'a>(models: &[ModelKind], objects: &'a [ObjectSpec], unverified: bool) -> Vec<ListedUnit<'a>> {
     let mut networks: Vec<ModelKind> = Vec::new();
     for network in models.iter().map(|model| model.taught_as()) {
@@ -134,7 +135,7 @@ pub fn all_units<'a>(models: &[ModelKind], objects: &'a [ObjectSpec], unverified
     units
 }
 
-/// A plan as a folder keeps it, so that whoever watches need not know the arguments.
+/// A plan stored in a folder, so that `--watch` does not need the arguments.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct UnitList {
     pub units: Vec<SavedUnit>,
@@ -153,15 +154,15 @@ impl UnitList {
         Self { units: units.iter().map(saved).collect() }
     }
 
-    /// Keeps it in an evaluation's folder, unless it is there.
+    /// Stores the plan in an evaluation's folder, unless it exists.
     ///
     /// # Errors
-    /// A folder that cannot be written.
+    /// The folder cannot be written.
     pub fn save(&self, folder: &Path) -> Result<()> {
         let mut bytes = serde_json::to_vec(self)?;
         bytes.push(b'\n');
         let plans = folder.join("plans");
-        // Of one content there is one file, whoever writes it, and however often.
+        // One file per content, whoever writes it, and however often.
         let path = plans.join(format!("{:016x}.json", fnv1a(&bytes)));
         if path.exists() {
             return Ok(());
@@ -170,10 +171,10 @@ impl UnitList {
         Ok(write_atomically(&path, &bytes)?)
     }
 
-    /// All units of all plans of a folder; none without a plan.
+    /// All units of all plans of a folder; empty without a plan.
     ///
     /// # Errors
-    /// Plans that cannot be read.
+    /// Plans cannot be read.
     pub fn read_all(folder: &Path) -> Result<Self> {
         let plans = folder.join("plans");
         let mut all = Self { units: Vec::new() };
@@ -190,7 +191,7 @@ impl UnitList {
     }
 }
 
-/// Tells contents apart; not a secret (FNV-1a, 64 bits).
+/// Distinguishes contents; not cryptographic (FNV-1a, 64 bits).
 fn fnv1a(bytes: &[u8]) -> u64 {
     bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3))
 }
@@ -227,7 +228,7 @@ mod tests {
         ] {
             assert!(listed.iter().any(|unit| unit == expected), "{expected} of {listed:?}");
         }
-        // S has no network that could do without the check.
+        // S has no network that could work without the check.
         assert!(!listed.iter().any(|unit| unit.starts_with("grasp-S-pendulum-unverified")));
         assert_eq!(units.len(), 4 + 2 + 6 + 4 + 2);
         for (i, unit) in units.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! How far the units of a folder are, for `--watch`.
+//! Progress of the units in a folder, for `--watch`.
 
 use std::collections::HashMap;
 use std::fmt;
@@ -11,33 +11,33 @@ use super::unit_folder::UnitFolder;
 use super::unit_list::{SavedUnit, UnitKind, UnitList};
 use super::worker::{Worker, unix_secs};
 
-/// After so many failures nobody tries again: a job of Slurm's is put back once.
+/// Number of failures after which a unit is not tried again: Slurm requeues a job once.
 const MAX_TRIES: usize = 2;
-/// So many units that run, and so many that failed, are listed.
+/// Maximum number of listed running units, and of listed failed units.
 const MAX_LISTED: usize = 12;
 
-/// Watches a folder; what was done once is not read again.
+/// Watches a folder; finished units are not read again.
 #[derive(Debug)]
 pub struct Watch {
     folder: PathBuf,
-    /// Seconds that each took.
+    /// Duration in seconds of each finished unit.
     done: HashMap<String, f64>,
 }
 
-/// How far the units of a folder are.
+/// Progress of the units in a folder.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Progress {
     pub units: usize,
     pub done: usize,
     pub running: Vec<RunningUnit>,
     pub failed: Vec<FailedUnit>,
-    /// Neither done nor begun.
+    /// Number of units neither done nor begun.
     pub waiting: usize,
-    /// With as many at work as now; none before the first is done.
+    /// Estimated seconds left with the current number of running units; `None` before the first is done.
     pub seconds_left: Option<f64>,
-    /// Of each kind, how many are done and how many there are.
+    /// Number of finished and of all units of each kind.
     pub kinds: Vec<KindProgress>,
-    /// Whether nothing will change any more: all are done, have failed twice, or wait for one that has.
+    /// Whether nothing will change any more: all units are done, have failed twice, or wait for a failed one.
     pub is_settled: bool,
 }
 
@@ -52,7 +52,7 @@ pub struct KindProgress {
 pub struct RunningUnit {
     pub unit: String,
     pub by: Worker,
-    /// How long it has been at work.
+    /// Time since its start.
     pub seconds: u64,
 }
 
@@ -61,13 +61,13 @@ pub struct FailedUnit {
     pub unit: String,
     pub by: Worker,
     pub why: String,
-    /// How often.
+    /// Number of failures.
     pub tries: usize,
 }
 
 impl Watch {
     /// # Errors
-    /// A folder without units.
+    /// The folder has no units.
     pub fn new(folder: &Path) -> Result<Self> {
         if UnitList::read_all(folder)?.units.is_empty() {
             bail!("{}: expected a folder in which units of an evaluation are done, found no plan", folder.display());
@@ -75,10 +75,10 @@ impl Watch {
         Ok(Self { folder: folder.to_owned(), done: HashMap::new() })
     }
 
-    /// How far it is now.
+    /// The current progress.
     ///
     /// # Errors
-    /// Records that cannot be read.
+    /// Records cannot be read.
     pub fn progress(&mut self) -> Result<Progress> {
         let plan = UnitList::read_all(&self.folder)?;
         let (mut running, mut failed, mut waiting) = (Vec::new(), Vec::new(), Vec::new());
@@ -131,7 +131,8 @@ impl Watch {
         })
     }
 
-    /// What is left takes as long as units of its kind took, or as all took where none of its kind is done.
+    /// Estimates the remaining time from the durations of finished units of the same kind, or of all units if there are
+    /// none.
     fn seconds_left(&self, plan: &UnitList, running: usize) -> Option<f64> {
         let mean = |kind: Option<UnitKind>| {
             let of_kind = self.done.iter().filter(|(name, _)| kind.is_none() || UnitKind::of(name) == kind);
@@ -147,7 +148,7 @@ impl Watch {
 }
 
 impl fmt::Display for Progress {
-    /// A screen; its first line stands alone.
+    /// A screen; its first line is complete by itself.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
@@ -183,7 +184,7 @@ impl fmt::Display for Progress {
     }
 }
 
-/// What the list had no room for.
+/// A line for units that are not listed.
 fn more(f: &mut fmt::Formatter<'_>, listed: usize) -> fmt::Result {
     if listed > MAX_LISTED { writeln!(f, "  and {} more", listed - MAX_LISTED) } else { Ok(()) }
 }

@@ -1,4 +1,4 @@
-//! Which process does a unit: machine, process, Slurm's job; and which program it is.
+//! The process that runs a unit: machine, process, Slurm job; and its program.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -8,13 +8,13 @@ use anyhow::{Context, Result};
 use sdg_weights_conversion::sha256_of;
 use serde::{Deserialize, Serialize};
 
-/// A process that does units.
+/// A process that runs units.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Worker {
-    /// Slurm's name of the node, or the machine's.
+    /// Slurm's name of the node, or the machine's name.
     pub host: String,
     pub pid: u32,
-    /// Slurm's job, where it is one.
+    /// Slurm's job, if it is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub job: Option<String>,
 }
@@ -28,7 +28,7 @@ impl Worker {
         Self { host: host.unwrap_or_else(|| "unknown".to_owned()), pid: std::process::id(), job: set("SLURM_JOB_ID") }
     }
 
-    /// What tells it from every other process, as a part of a file's name.
+    /// A unique part of a file name for this process.
     pub(super) fn file_name_part(&self, started_secs: u64) -> String {
         let is_plain = |letter: char| letter.is_ascii_alphanumeric() || letter == '-' || letter == '.';
         let host: String = self.host.chars().map(|letter| if is_plain(letter) { letter } else { '_' }).collect();
@@ -51,12 +51,12 @@ pub(super) fn unix_secs() -> u64 {
     SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs())
 }
 
-/// The SHA-256 of the program that runs.
+/// The SHA-256 of the running program.
 ///
 /// # Errors
-/// A program that cannot be read.
+/// The program's file cannot be read.
 pub fn own_sha256() -> Result<String> {
-    // The file that runs, where another one has taken its name since.
+    // The running file, even if another one has replaced it by name since.
     let running = PathBuf::from("/proc/self/exe");
     let path = if running.exists() { running } else { std::env::current_exe().context("the program's own path")? };
     sha256_of(&path).with_context(|| format!("{}: the program's own file", path.display()))

@@ -1,16 +1,16 @@
-//! What every evaluation's document and page have in common: whether it is complete, and how to see the same numbers again.
+//! Common parts of all documents and pages: whether they are complete, and how to reproduce the numbers.
 
 use sdg_report::Section;
 
 use super::titled::Titled;
 
-/// What the reader must know before the first number, where units of work are still to do.
+/// A notice to precede the numbers, if units of work remain.
 pub fn incomplete(remaining: usize) -> Option<String> {
     (remaining > 0)
-        .then(|| format!("Not complete: {remaining} units of work are still to do. The same command goes on."))
+        .then(|| format!("Not complete: {remaining} units of work are still to do. The same command continues."))
 }
 
-/// Tables as a document in Markdown; `facts` and `command` are what is needed to see the same numbers again.
+/// Tables as a document in Markdown; `facts` and `command` are for reproducing the numbers.
 pub fn document(
     title: &str,
     notice: Option<String>,
@@ -35,7 +35,7 @@ pub fn document(
 /// The same at the end of a page.
 pub fn this_run(facts: &[(&str, String)], command: &str) -> Section {
     Section::new("This run")
-        .lead("Everything needed to see the same numbers again.")
+        .lead("Settings for reproducing the numbers.")
         .facts(facts.iter().map(|(name, value)| (*name, value.clone())))
         .command(command)
 }

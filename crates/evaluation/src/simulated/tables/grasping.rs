@@ -1,4 +1,4 @@
-//! Attempts: how many held, and where the others ended.
+//! Attempts: the number of held parts, and the steps at which the others ended.
 
 use sdg_report::{Cell, Column, Table, Tone};
 
@@ -80,7 +80,7 @@ pub(super) fn by_part(summary: &Summary) -> Titled {
     }
 }
 
-/// Where attempts ended that failed.
+/// The steps at which failed attempts ended.
 pub(super) fn failures(summary: &Summary) -> Titled {
     let steps: Vec<&str> = AttemptRecord::steps().collect();
     let mut columns = vec![Column::text("model"), Column::text("failed")];

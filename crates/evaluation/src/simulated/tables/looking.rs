@@ -1,4 +1,4 @@
-//! Pictures: how far beside the truth detections are, and how many false alarms there are.
+//! Pictures: errors of detections, and false alarms.
 
 use sdg_report::{Cell, Column, Table, Tone};
 
@@ -6,7 +6,7 @@ use super::titled::{Titled, number, share, ways};
 use crate::simulated::summary::Summary;
 use crate::trial::{RIGHT_DEGREES, RIGHT_MM};
 
-/// Detections beside the simulator's truth.
+/// Detections compared with the simulator's ground truth.
 pub(super) fn accuracy(summary: &Summary) -> Titled {
     let mut table = Table::new(vec![
         Column::text("model"),
@@ -44,7 +44,7 @@ pub(super) fn accuracy(summary: &Summary) -> Titled {
     }
 }
 
-/// Seen where it is not.
+/// Detections in pictures without the part.
 pub(super) fn false_alarms(summary: &Summary) -> Titled {
     let mut table =
         Table::new(vec![Column::text("model"), Column::text("false alarms"), Column::text("false alarms, alone")]);

@@ -1,4 +1,4 @@
-//! The models: what they are, what teaching them takes, and which could not be taught.
+//! The models: their structure, the cost of teaching them, and failed teachings.
 
 use sdg_grasp::ModelKind;
 use sdg_report::{Cell, Column, Table};
@@ -8,7 +8,7 @@ use crate::simulated::paper;
 use crate::simulated::records::TeachingRecord;
 use crate::simulated::summary::{ModelSummary, Summary};
 
-/// The paper's Table II: what a model costs.
+/// The paper's Table II: costs of a model.
 pub(super) fn costs(summary: &Summary) -> Titled {
     let mut table = Table::new(vec![
         Column::text("model"),
@@ -55,7 +55,7 @@ pub(super) fn costs(summary: &Summary) -> Titled {
     Titled { title: "Teaching, size and speed".to_owned(), lead, table }
 }
 
-/// Which models are readings of one network, in a sentence.
+/// A sentence on models that share one network.
 fn shared_networks(summary: &Summary) -> Option<String> {
     let sharing: Vec<String> = summary
         .models
@@ -91,7 +91,7 @@ pub(super) fn models(summary: &Summary) -> Titled {
     }
 }
 
-/// Network and output for the place, network and method for the turn, human input.
+/// Network and output for the position, network and method for the angle, human input.
 fn description(model: ModelKind) -> [&'static str; 5] {
     match model {
         ModelKind::A => ["Faster R-CNN", "box", "CNN on the box's crop", "classes of the angle", "box, grasp line"],
@@ -106,7 +106,7 @@ fn description(model: ModelKind) -> [&'static str; 5] {
     }
 }
 
-/// Teachings that led to nothing.
+/// Teachings without a model.
 pub(super) fn not_taught(summary: &Summary) -> Titled {
     let mut table = Table::new(vec![Column::text("part"), Column::text("model"), Column::text("why")]);
     for cell in &summary.cells {
@@ -122,7 +122,7 @@ pub(super) fn not_taught(summary: &Summary) -> Titled {
     }
 }
 
-/// Samples of the detector, and crops of the orientation CNN where there is one.
+/// Samples of the detector, and crops of the orientation CNN if there is one.
 fn samples(model: &ModelSummary) -> String {
     match (model.samples, model.crops) {
         (Some(samples), Some(crops)) => format!("{samples:.0} + {crops:.0}"),
@@ -131,7 +131,7 @@ fn samples(model: &ModelSummary) -> String {
     }
 }
 
-/// Minutes and seconds, as the paper writes them.
+/// Minutes and seconds, in the paper's notation.
 fn minutes(secs: f64) -> String {
     let secs = secs.round() as u64;
     if secs == 0 { "under 0:01".to_owned() } else { format!("{}:{:02}", secs / 60, secs % 60) }

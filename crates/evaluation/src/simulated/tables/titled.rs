@@ -1,26 +1,26 @@
-//! A table with its heading, and cells that several tables have.
+//! A table with its heading, and cells used in several tables.
 
 use sdg_report::{Cell, Table, Tone};
 
 use crate::simulated::summary::{Figures, ModelSummary};
 use crate::statistics::Share;
 
-/// A table under its heading.
+/// A table with its heading.
 pub struct Titled {
     pub title: String,
-    /// What is to be seen, in a sentence or two.
+    /// One or two sentences on its contents.
     pub lead: String,
     pub table: Table,
 }
 
-/// With the check and, where there is a network, without it.
+/// With the check and, for models with a network, without it.
 pub(super) fn ways(model: &ModelSummary) -> impl Iterator<Item = (String, &Figures)> {
     debug_assert_eq!(model.alone.is_some(), model.model.has_network());
     let alone = model.alone.as_ref().map(|figures| (format!("{}, alone", model.model), figures));
     std::iter::once((model.model.to_string(), &model.verified)).chain(alone)
 }
 
-/// A share as text, in a tone unless it is plain; nothing counted is a dash.
+/// A share as text, with a tone unless it is plain; a dash if nothing was counted.
 pub(crate) fn share(share: Share, tone: Tone) -> Cell {
     match (share.of, tone) {
         (0, _) => Cell::text("–"),

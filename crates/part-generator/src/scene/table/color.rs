@@ -1,20 +1,20 @@
-//! The colours of a table top, a row of the picture at a time.
+//! The colours of a table top, one row of the picture at a time.
 
 use super::{Layer, Pattern, Sheet, Table};
 use crate::tiles::floor;
 
-/// A layer with fewer texels for a pixel is read at every second pixel only.
+/// Texels per pixel below which a layer is read only at every second pixel.
 const MAX_SMOOTH_TEXELS: f32 = 0.35;
 
-/// A layer with more texels for a pixel needs nothing between its texels.
+/// Texels per pixel above which a layer needs no interpolation.
 const MIN_FINE_TEXELS: f32 = 0.6;
 
-/// The least light that a table scatters back.
+/// Minimum albedo of a table.
 const MIN_ALBEDO: f32 = 0.004;
 
 impl Table {
-    /// Writes the colours at places of the table, in linear light; `mm_per_px` smooths lines. `turned` is scratch space of
-    /// any length. The fourth channel is unused.
+    /// Writes the colours at positions of the table, in linear light; `mm_per_px` smooths lines. `turned` is scratch
+    /// space of any length. The fourth channel is unused.
     pub fn colors(&self, places: &[[f32; 2]], mm_per_px: f32, turned: &mut Vec<[f32; 2]>, out: &mut [[f32; 4]]) {
         let [sin, cos] = self.sin_cos;
         turned.clear();
@@ -36,7 +36,7 @@ impl Table {
     #[inline(always)]
     fn print(&self, x: f32, y: f32, mm_per_px: f32, color: &mut [f32; 4]) {
         let per_px = 1.0 / mm_per_px;
-        // How much of a pixel lies within `half` of a line at distance `d`.
+        // Share of a pixel within `half` of a line at distance `d`.
         let inside = |d: f32, half: f32| ((half - d) * per_px + 0.5).clamp(0.0, 1.0) * (2.0 * half * per_px).min(1.0);
         let to_line = |v: f32, pitch: f32| (v - pitch * floor(v / pitch + 0.5) as f32).abs();
         match &self.pattern {
@@ -48,7 +48,7 @@ impl Table {
             }
             Pattern::Checks { pitch, color: other } => {
                 let (u, v) = (x / pitch, y / pitch);
-                // Distance to the next edge, signed by the square's colour.
+                // Distance to the next edge, with the sign of the square's colour.
                 let odd = (floor(u) + floor(v)) & 1 == 1;
                 let d = to_line(x, *pitch).min(to_line(y, *pitch));
                 let share = (d * per_px + 0.5).clamp(0.0, 1.0);
@@ -93,7 +93,7 @@ impl Table {
         }
     }
 
-    /// Slopes of the top's grain at a place.
+    /// Slopes of the top's grain at a position.
     #[inline]
     pub fn slopes(&self, place: [f32; 2]) -> [f32; 2] {
         let [sin, cos] = self.sin_cos;
@@ -115,7 +115,7 @@ impl Sheet {
 }
 
 impl Layer {
-    /// Adds the layer at places in the table's own directions.
+    /// Adds the layer at positions in the table's own directions.
     fn add_to(&self, places: &[[f32; 2]], mm_per_px: f32, out: &mut [[f32; 4]]) {
         let [red, green, blue] = self.color;
         let color = [red, green, blue, 0.0];
@@ -137,7 +137,7 @@ impl Layer {
             places.iter().zip(out).for_each(|(place, out)| add(out, between(place)));
             return;
         }
-        // Pairs of pixels: the second value is the mean of its neighbours'.
+        // Pairs of pixels: the second value is the mean of its neighbours.
         let Some(first) = places.first() else { return };
         let mut value = between(first);
         for (k, pair) in out.chunks_mut(2).enumerate() {
@@ -151,7 +151,7 @@ impl Layer {
     }
 }
 
-/// Changes a colour towards another.
+/// Mixes a colour with another.
 #[inline(always)]
 fn mix(color: &mut [f32; 4], other: &[f32; 3], share: f32) {
     for k in 0..3 {
@@ -159,7 +159,7 @@ fn mix(color: &mut [f32; 4], other: &[f32; 3], share: f32) {
     }
 }
 
-/// About the sine of a whole number of turns and a piece: two parabolas.
+/// Approximates the sine of a number of turns by two parabolas.
 #[inline(always)]
 fn wave(turns: f32) -> f32 {
     let t = turns - floor(turns + 0.5) as f32;
