@@ -1,11 +1,11 @@
-//! What can be wrong with a grasp model, its file or its grasps.
+//! Errors of a grasp model, its file or its grasps.
 
 /// Why a model could not be taught, read or used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum GraspError {
-    /// A letter or name that is no model's.
+    /// A letter or name of no model.
     #[error(transparent)]
     UnknownModel(#[from] sdg_demonstration::UnknownModel),
     /// A preset that this version lacks.
@@ -18,11 +18,11 @@ pub enum GraspError {
     /// A device that no version has.
     #[error("expected a device out of {}, found \"{found}\"", .known.join(", "))]
     UnknownBackend {
-        /// The names that exist.
+        /// The existing names.
         known: Vec<&'static str>,
         found: String,
     },
-    /// A device that was not compiled in.
+    /// A device whose backend was not compiled in.
     #[error(
         "expected a device out of {}, which this build has; found \"{asked}\"",
         .built.join(", ")
@@ -34,7 +34,7 @@ pub enum GraspError {
     /// Bytes that are no grasp model.
     #[error("expected a grasp model file of this project, found {found}")]
     NotAModel {
-        /// What the bytes are, as far as their beginning shows.
+        /// The kind of the bytes, as far as their start shows.
         found: String,
     },
     /// A grasp model file of another version.
@@ -42,14 +42,14 @@ pub enum GraspError {
         "expected a grasp model of format version {expected}, found version {found}: it was written by another sdg"
     )]
     OtherVersion { expected: u32, found: String },
-    /// A grasp model file that contradicts itself or was cut short.
+    /// A grasp model file that is inconsistent or was truncated.
     #[error("the grasp model file is damaged: expected {expected}, found {found}")]
     Damaged {
         /// What was expected.
         expected: String,
         found: String,
     },
-    /// An image that holds nothing to look at.
+    /// An image that is too small.
     #[error("expected an image of at least {least} × {least} pixels, found {width} × {height}")]
     ImageTooSmall { least: u32, width: u32, height: u32 },
     /// A region that cannot be searched.

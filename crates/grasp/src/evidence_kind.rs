@@ -17,17 +17,17 @@ pub enum EvidenceKind {
     Size,
     /// The share outside the picture.
     Outside,
-    /// Resemblance of other things.
+    /// Resemblance of other objects.
     Resemblance,
-    /// The network that knows parts from background.
+    /// The network that distinguishes parts from background.
     Likeness,
-    /// The network that knows parts from their look-alikes.
+    /// The network that distinguishes parts from their look-alikes.
     Details,
     /// Table where the part should be.
     Table,
-    /// Outline without edge.
+    /// Outline without an edge.
     Rim,
-    /// Edges that the photo does not have.
+    /// Edges that are absent from the photo.
     Added,
     /// A better fit of the mirror image.
     Mirror,
@@ -54,7 +54,7 @@ impl EvidenceKind {
         }
     }
 
-    /// The reason in words where it speaks against a detection.
+    /// The reason in words if it speaks against a detection.
     pub fn objection(self) -> &'static str {
         match self {
             Self::Network => "the network does not see the part there",
@@ -74,23 +74,23 @@ impl EvidenceKind {
         }
     }
 
-    /// Whether it says where part and picture differ also where it speaks for the part less than it could.
+    /// Whether its places of difference are shown also if it supports the part less than it could.
     pub(crate) fn is_local(self) -> bool {
         !matches!(self, Self::Network | Self::Resemblance | Self::Likeness | Self::Details)
     }
 }
 
-/// What would help where a refused detection is the part after all; the words are the caller's, who has options or buttons.
+/// The advice for a refused detection that is the part after all; the caller words it with its options or buttons.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Advice {
-    /// A wider tolerance of size, or with a calibrated camera a look at its file and the height of the marks.
+    /// A wider size tolerance or, with a calibrated camera, a check of its file and of the height of the marks.
     CheckSize,
     /// A further photo in darker light.
     DarkerPhoto,
     /// A further photo in brighter light.
     BrighterPhoto,
-    /// Uncover the part, or a further photo from this side.
+    /// Uncover the part, or take a further photo from this side.
     Uncover,
     /// A further photo from this side.
     OtherSide,
