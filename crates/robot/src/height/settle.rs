@@ -1,11 +1,11 @@
-//! Told and measured: the more certain of both, unless they contradict each other.
+//! Combines the given and the measured height: the more certain of both, unless they contradict each other.
 
 use super::triangulation::MeasuredHeight;
 
-/// Told and measured heights may differ by so many standard deviations of their difference.
+/// Largest difference of given and measured height, in standard deviations of their difference.
 const MAX_SIGMAS: f64 = 3.0;
 
-/// A height of the marks that was told; z of the base.
+/// A given height of the marks; z of the base.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ToldHeight {
     /// Height, m.
@@ -14,12 +14,12 @@ pub struct ToldHeight {
     pub sigma_m: f64,
 }
 
-/// Where a height is from.
+/// Source of a height.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum HeightSource {
     /// From two pictures.
     Measured,
-    /// Told.
+    /// Given by the user.
     Told,
 }
 
@@ -40,14 +40,15 @@ pub struct SettledHeight {
     pub height_m: f64,
     /// Its standard deviation, m.
     pub sigma_m: f64,
-    /// Where it is from.
+    /// Its source.
     pub source: HeightSource,
 }
 
-/// The more certain of both heights; the measured one where both are as certain.
+/// The more certain of both heights; the measured one if both are equally certain.
 ///
 /// # Errors
-/// Why there is none, in one sentence: neither is there (`why_not` measured), or they differ by more than three standard deviations.
+/// The reason why there is none, in one sentence: both are missing (`why_not` measured), or they differ by more than
+/// three standard deviations.
 pub fn settle(
     told: Option<ToldHeight>,
     measured: Option<MeasuredHeight>,

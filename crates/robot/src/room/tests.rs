@@ -2,7 +2,7 @@ use super::*;
 use crate::place::{Place, PlaceKind};
 use nalgebra::Point2;
 
-/// As the fingers let go unless told otherwise.
+/// The fingers as they release a part, unless stated otherwise.
 const MARGIN_M: f64 = 0.020;
 
 fn tray(pitch_mm: [f64; 2], yaw_rad: f64) -> Place {
@@ -25,7 +25,7 @@ fn bar() -> PartShape {
 }
 
 fn check(pitch_mm: [f64; 2], part: &PartShape, symmetry: RotationalSymmetry) -> Result<()> {
-    // In the middle, and turned: the tray's own axes count.
+    // At the centre, and turned: the tray's own axes count.
     tray(pitch_mm, 0.7).goal(6).unwrap().check_room(part, symmetry, MARGIN_M)
 }
 
@@ -54,7 +54,7 @@ fn parts_themselves_need_room() {
 
 #[test]
 fn a_round_part_is_let_go_where_there_is_room() {
-    // Rows of 60 mm are too narrow for fingers between them, columns of 100 mm are not.
+    // Rows of 60 mm are too narrow for fingers between them, columns of 100 mm are wide enough.
     let narrow = [100.0, 60.0];
     let found = check(narrow, &disc(0.052), RotationalSymmetry::None).unwrap_err().to_string();
     assert!(found.contains("expected a pitch of 100 x 79 mm"), "{found}");
@@ -65,7 +65,7 @@ fn a_round_part_is_let_go_where_there_is_room() {
     // Fingers along the rows, not across them.
     let kept = goal.with_room_for_fingers(&disc(0.052), 0.072, turns, |&turn_rad| goal.base_from_part(0.0, turn_rad));
     assert_eq!(kept, [0.25 * TAU, 0.75 * TAU]);
-    // 60 mm both ways: along the diagonals only.
+    // 60 mm along both axes: only the diagonals have room.
     check([60.0, 60.0], &disc(0.052), RotationalSymmetry::Full).unwrap();
     assert!(check([60.0, 60.0], &disc(0.052), RotationalSymmetry::Fold(4)).is_err());
 }
@@ -89,7 +89,7 @@ fn a_tall_part_meets_the_thicker_root_of_the_fingers() {
 fn alone_there_is_always_room() {
     let single = Place { kind: PlaceKind::Pose, ..tray([1.0, 1.0], 0.0) };
     single.goal(1).unwrap().check_room(&disc(0.07), RotationalSymmetry::None, MARGIN_M).unwrap();
-    // A row: nothing is beside it across.
+    // A row: it has no neighbours across.
     let kind = PlaceKind::Tray { cells: [3, 1], pitch_m: [0.1, 0.01] };
     Place { kind, ..single }.goal(2).unwrap().check_room(&bar(), RotationalSymmetry::None, MARGIN_M).unwrap();
 }

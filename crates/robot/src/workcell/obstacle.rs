@@ -88,7 +88,7 @@ fn obstacle(source: &Source<'_>, section: &Spanned<ObstacleSection>) -> Result<O
                 return Err(source.error(rpy.span().start, "rpy_deg: expected with box, cylinder and capsule only"));
             }
             let onto = UnitQuaternion::rotation_between_axis(&Vector3::z_axis(), &direction);
-            // Straight down there are many turns; any will do.
+            // Vertically down, many turns are possible; any will do.
             let half_turn = || UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
             (Shape::Plane, onto.unwrap_or_else(half_turn))
         }

@@ -44,7 +44,7 @@ fn a_whole_file_is_read() {
     assert_eq!(cell.grasp_config().load.unwrap().mass_kg, 0.2);
 }
 
-/// Each line of the file spoilt once: the error names that line, what was expected and what was found.
+/// Each line of the file made invalid once: the error names that line, the expected and the found value.
 #[test]
 fn errors_name_the_line() {
     for (line, from, to, expected) in [
