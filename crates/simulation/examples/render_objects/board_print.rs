@@ -1,4 +1,4 @@
-//! What is printed and etched on the circuit board, and the colours of the plastics that stand on it.
+//! The print and the tracks of the circuit board, and the colours of its plastic components.
 
 use nalgebra::{Point2, Vector2};
 use rand::{Rng, SeedableRng};
