@@ -76,8 +76,8 @@ pub enum PlanViewError {
     },
 }
 
-/// Number of grid points at which the picture is evaluated, fine enough that no corner of the plane is missed by more
-/// than a percent.
+/// Steps of the grid at which the picture is evaluated, along each side: fine enough that no corner of the plane is
+/// missed by more than a percent.
 const GRID: u32 = 32;
 /// If a pixel covers more than this many times the best pixel's length, towards the horizon, the picture shows too
 /// little to find parts. Chosen by hand.

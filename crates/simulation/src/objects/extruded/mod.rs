@@ -32,7 +32,7 @@ const MAX_ABOVE_TCP_M: f64 = 0.03;
 const NUM_STRIPS: usize = 40;
 /// Minimum width of a box; narrower ones give no contact. Chosen by hand.
 const MIN_BOX_M: f64 = 1e-4;
-/// Maximum texture size; a larger one would not be visible from the camera.
+/// Maximum size of the texture: the camera would not resolve a larger one.
 const MAX_TEXTURE_PX: u32 = 1024;
 /// Distance inside the outline from which the walls take the photo's colour, in pixels: on the line itself half of the
 /// colour is the table's.
