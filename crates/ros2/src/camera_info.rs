@@ -1,4 +1,4 @@
-//! camera_info: a camera's intrinsics beside its pictures.
+//! camera_info: a camera's intrinsics, sent with its pictures.
 
 use sdg_geometry::{PinholeCamera, PlumbBob};
 
@@ -7,14 +7,14 @@ use crate::messages::{CameraInfo, Header};
 
 /// The first pixel's centre is (0, 0) in ROS and (0.5, 0.5) here.
 const FIRST_CENTER_PX: f64 = 0.5;
-/// Focal lengths and centres that differ by more than this share of the picture are another camera's.
+/// Focal lengths and centres that differ by more than this share of the picture belong to another camera.
 const MAX_DIFFERENCE: f64 = 0.01;
 
 fn refused(expected: impl Into<String>, found: impl ToString) -> RosError {
     RosError::CameraInfo { expected: expected.into(), found: found.to_string() }
 }
 
-/// The camera that a message describes, of pictures as they were taken (not rectified ones).
+/// The camera of a message, for unrectified pictures.
 ///
 /// # Errors
 /// An uncalibrated camera, a lens that is not plumb_bob, binning and regions of interest.
@@ -60,7 +60,7 @@ pub fn read_camera_info(message: &CameraInfo) -> Result<PinholeCamera, RosError>
         .ok_or_else(|| refused("a camera matrix fx 0 cx 0 fy cy 0 0 1", format!("{k:?} for {width} × {height} pixels")))
 }
 
-/// Refuses a camera that is not the one which a file describes: other pictures, or intrinsics that differ by more than a hundredth of
+/// Refuses a camera that differs from the one in a file: in picture size, or in intrinsics by more than a hundredth of
 /// the picture.
 ///
 /// # Errors
