@@ -111,7 +111,7 @@ impl Checkpoint {
                 let pickle = pickle::load(source, source.whole())?;
                 if pickle.end != source.len() {
                     let found = format!("{} more", source.len() - pickle.end);
-                    return Err(WeightsError::damaged("pickle", "no bytes behind its end", found));
+                    return Err(WeightsError::damaged("pickle", "no bytes after its end", found));
                 }
                 Self::from_pickle(format, &pickle, None)?
             }

@@ -34,11 +34,11 @@ pub(crate) fn strip_wrapper(name: &str) -> &str {
 /// The meaning of a name.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Renamed {
-    /// A parameter of ours.
+    /// A parameter of this project's network.
     To(String),
     /// Known, and not needed: it follows from the configuration.
     NotNeeded,
-    /// No parameter of ours corresponds to it.
+    /// No parameter of this project's network corresponds to it.
     Unknown,
 }
 

@@ -127,7 +127,7 @@ fn broken_stacks_end_in_errors() {
     }
     assert_refused("odd", b"\x80\x02}(NNNu.", &["keys and values in turn"]);
     assert_refused("call", b"\x80\x02NN\x85R.", &["a class or function to call"]);
-    assert_refused("behind the end", cat(&[&fixture("arrays_protocol2.pkl"), b"x"]), &["no bytes behind its end"]);
+    assert_refused("behind the end", cat(&[&fixture("arrays_protocol2.pkl"), b"x"]), &["no bytes after its end"]);
 }
 
 #[test]

@@ -97,7 +97,7 @@ pub enum CalibrationError {
     )]
     Paper { paper: &'static str, columns: u32, rows: u32, square_mm: f64, fits_mm: f64 },
     /// A file that `sdg camera board` did not write.
-    #[error("expected a board as `sdg camera board` writes it, found a file that does not tell its squares")]
+    #[error("expected a board as `sdg camera board` writes it, found a file without the size of its squares")]
     NoBoardFile,
     /// No grid of corners in the picture.
     #[error(
@@ -114,8 +114,9 @@ pub enum CalibrationError {
     },
     /// A grid of corners whose placement on the board is unknown.
     #[error(
-        "expected enough of the board to know which of its squares are seen, found {corners} corners and no place on the board that its dots \
-         agree with: show more of it, or print it with `sdg camera board`; a checkerboard without dots must be seen whole"
+        "expected enough of the board to identify the visible squares, found {corners} corners and no place on the \
+         board that matches its dots: show more of it, or print it with `sdg camera board`; a checkerboard without \
+         dots must be seen whole"
     )]
     BoardUnclear { corners: usize },
     /// A checkerboard without dots that has other squares, or is not completely visible.
@@ -147,8 +148,9 @@ pub enum CalibrationError {
     },
     /// Pictures that do not determine the focal length.
     #[error(
-        "expected pictures that show the board tilted in several directions, found {found}: their poses are alike and leave the focal \
-         length open{}; tilt the board by 20 to 40 degrees to the left, to the right, upwards and downwards", .hint
+        "expected pictures that show the board tilted in several directions, found {found}: their poses are similar \
+         and do not determine the focal length{}; tilt the board by 20 to 40 degrees to the left, to the right, \
+         upwards and downwards", .hint
     )]
     PosesAlike {
         found: String,
@@ -206,8 +208,9 @@ pub enum CalibrationError {
     },
     /// A board of another size than given.
     #[error(
-        "expected a board of the size that was told, found squares of {:.2} ± {:.2} mm instead of {:.2} mm: by the robot's metres the board seems \
-         {:.1} % of that size, which leaves {left_px:.2} px; measure the 100 mm line below the board, or its squares, and tell what they measure",
+        "expected a board of the given size, found squares of {:.2} ± {:.2} mm instead of {:.2} mm: by the robot's \
+         metres the board seems {:.1} % of that size, which leaves {left_px:.2} px; measure the 100 mm line below the \
+         board, or its squares, and give the measured size",
         1000.0 * .told_m * .scale, 1000.0 * .told_m * .sigma, 1000.0 * .told_m, 100.0 * .scale
     )]
     OtherBoardScale {

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! Board ─ Sheet (SVG, PDF) ─ printed, photographed ─ find_board: corners to 0.03 px, each with its place on the board
-//!   ├─ PictureTaker        a camera's frames        ─ which of them are worth a picture
+//!   ├─ PictureTaker        a camera's frames        ─ selection of frames as pictures
 //!   ├─ calibrate           many pictures            ─ focal length, centre, lens, with errors and advice
 //!   ├─ locate_sheet        one, on the table        ─ where the camera is over the table
 //!   └─ calibrate_hand_eye  many, with robot poses   ─ where the camera is on the robot, or beside it

@@ -269,6 +269,6 @@ fn mistaken_readings_of_the_poses_are_named() {
     }
     let error = solve(Mount::Hand, &mixed).unwrap_err().to_string();
     println!("{error}");
-    assert!(error.contains("each picture stands with its own pose"), "{error}");
+    assert!(error.contains("each picture is listed with its own pose"), "{error}");
     assert!(with(&|pose| *pose, Mount::Base).contains("the mount to be the other one"));
 }

@@ -125,7 +125,7 @@ fn no_reading_is_proposed_that_leaves_many_pixels() {
         Isometry3::from_parts(Vector3::new(x, -y, z).into(), p.rotation)
     };
     let text = refusal(Mount::Hand, &changed(&views, &mirrored));
-    assert!(text.contains("each picture stands with its own pose") && !text.contains("which leaves"), "{text}");
+    assert!(text.contains("each picture is listed with its own pose") && !text.contains("which leaves"), "{text}");
 }
 
 #[test]

@@ -259,7 +259,7 @@ mod tests {
     fn correlation_is_one_where_the_maps_are_the_same_and_finds_a_shift() {
         let network = ComparisonConfig::edge().init(&Device::flex(), 5).unwrap();
         let map = Tensor::<4>::random([1, 48, 16, 16], burn::tensor::Distribution::Normal(0.0, 1.0), &Device::flex());
-        // What the picture shows one cell to the right.
+        // The picture's content shifted one cell to the right.
         let moved = Tensor::cat(vec![map.clone().narrow(3, 15, 1), map.clone().narrow(3, 0, 15)], 3);
         let strongest = |other: &Tensor<4>| {
             let values = cosines(map.clone(), other.clone(), network.config.reach, SQUARE_EPSILON)

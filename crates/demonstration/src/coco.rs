@@ -79,7 +79,7 @@ fn category_of<'a, 'b>(annotation: &Node, categories: &'b [Node<'a>]) -> Result<
     match of_id.find(|other| keypoints(other) != keypoints(first)) {
         Some(other) => Err(Error::Malformed {
             place: format!("{}.id", other.place),
-            expected: "a number of its own".into(),
+            expected: "a unique number".into(),
             found: format!("{}, as {} has, with other keypoints", id.value, first.place),
         }),
         None => Ok(Some(first)),

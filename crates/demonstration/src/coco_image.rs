@@ -48,7 +48,7 @@ pub(crate) fn choose_image<'a>(images: &[Node<'a>], image: &ImageFacts) -> Resul
         {
             return Err(Error::Malformed {
                 place: format!("{}.id", chosen.place),
-                expected: "a number of its own".into(),
+                expected: "a unique number".into(),
                 found: format!("{id}, as {} has", other.place),
             });
         }
@@ -136,7 +136,7 @@ mod tests {
         let mut twice = of(["other.jpg", "image.jpg"]);
         twice["images"][1]["id"] = json!(1);
         let found = read_named(&twice, Some("image.jpg")).unwrap_err().to_string();
-        assert!(found.contains("images[1].id: expected a number of its own"), "{found}");
+        assert!(found.contains("images[1].id: expected a unique number"), "{found}");
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! YOLO-pose labels: a text file per image, a line per object, all values as shares of the image's width and height.
 //!
 //! ```text
-//! class  centre_x centre_y width height  x y v  x y v …      without visibilities where data.yaml says so: x y  x y …
+//! class  centre_x centre_y width height  x y v  x y v …      without visibilities if data.yaml has none: x y  x y …
 //! ```
 //!
 //! Labels are in a `data.yaml`; classes are indices into its `names`, and its `kpt_shape` defines the format of a line.

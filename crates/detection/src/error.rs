@@ -17,7 +17,9 @@ pub enum DetectionError {
         found: String,
     },
     /// A configuration cannot be read.
-    #[error("detector configuration: expected every value, or `kind` and what differs from its preset: {reason}")]
+    #[error(
+        "detector configuration: expected all values, or `kind` and the values that differ from its preset: {reason}"
+    )]
     ConfigFile {
         /// The unreadable part, and its position.
         reason: String,

@@ -57,7 +57,7 @@ pub struct ScoredKeypoint {
     pub x: f64,
     /// Pixels, y down.
     pub y: f64,
-    /// As [`crate::config::KeypointScore`] says.
+    /// See [`crate::config::KeypointScore`].
     pub score: f64,
 }
 

@@ -19,6 +19,6 @@ pub(crate) async fn read<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
 /// Both at once, with one wait for the device.
 pub(crate) async fn read_both<const D: usize, const E: usize>(a: Tensor<D>, b: Tensor<E>) -> [Vec<f32>; 2] {
     let read = Transaction::default().register(a).register(b).execute_async().await;
-    let read: [_; 2] = read.expect("what the device computes can be read").try_into().expect("two were asked for");
+    let read: [_; 2] = read.expect("what the device computes can be read").try_into().expect("two were requested");
     read.map(|data| data.try_to_vec_as::<f32>().expect("a float tensor reads as f32"))
 }

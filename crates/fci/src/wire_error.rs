@@ -25,6 +25,6 @@ pub enum WireError {
     #[error("a message of {min} to {max} bytes was expected, its header says {found}")]
     MessageSize { min: u32, max: u32, found: u32 },
     /// A number without a meaning.
-    #[error("{found} is no {field}")]
+    #[error("{found} is not a valid {field}")]
     Value { field: &'static str, found: u32 },
 }

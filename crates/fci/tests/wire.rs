@@ -256,7 +256,7 @@ fn fuzzed_message(mut bytes: Vec<u8>, kind: HeaderKind, rng: &mut Pcg64Mcg) -> O
     mutate(&mut bytes, rng);
     let mut stream = Watched { bytes: &bytes, largest_buffer: 0 };
     let message = read_message(&mut stream, kind);
-    // A header may announce 4 MB: no buffer is larger than the received data plus a step, or than the message.
+    // A header may announce 4 MB: a buffer is never larger than the received data plus a step, nor than the message.
     let announced = bytes.get(..kind.size()).and_then(|bytes| Header::decode(bytes, kind).ok());
     let size = announced.map_or(kind.size(), |header| header.size as usize);
     assert!(stream.largest_buffer <= size.min(8192), "{} of {size}", stream.largest_buffer);

@@ -81,7 +81,7 @@ impl GraspLine {
     /// # Source
     /// OpenDR single_demo_grasp: the two clicked points and ten between them.
     pub fn keypoints(&self, count: usize) -> Vec<Keypoint> {
-        assert!(count >= 2, "a line has two ends, so at least two keypoints; asked for {count}");
+        assert!(count >= 2, "a line needs at least two keypoints, found {count}");
         (0..count)
             .map(|k| {
                 let t = k as f64 / (count - 1) as f64;

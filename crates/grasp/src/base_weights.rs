@@ -145,7 +145,7 @@ fn first_misfit(report: &ImportReport) -> Option<String> {
     if let Some(name) = report.missing.first() {
         return Some(format!("no {name} ({} missing)", report.missing.len()));
     }
-    report.unused.first().map(|name| format!("{name}, which the network has not"))
+    report.unused.first().map(|name| format!("{name}, which the network does not have"))
 }
 
 #[cfg(test)]
@@ -239,6 +239,6 @@ mod tests {
         let mut unused = whole;
         let value = unused.parameters[bias].clone();
         unused.parameters.insert("roi_heads.mask_head.deconv.bias".to_owned(), value);
-        assert!(refused(&unused).contains("which the network has not"), "{}", refused(&unused));
+        assert!(refused(&unused).contains("which the network does not have"), "{}", refused(&unused));
     }
 }

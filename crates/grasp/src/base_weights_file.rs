@@ -4,7 +4,7 @@
 //! metadata   format          "sdg base weights 1"
 //!            preset          the preset that they are for
 //!            reinitialized   names of the parameters that teaching draws anew   (JSON)
-//!            anything else that tells how they were made: commit, seed, steps, parts, licence
+//!            further information about their creation: commit, seed, steps, parts, licence
 //! tensors    NAME            f16: the detector's parameters
 //!            imprint.*       f16: what makes its last layers of a part's views
 //!            orientation.*, orientation_imprint.*   f16: the same of the orientation CNN

@@ -58,17 +58,17 @@ impl EvidenceKind {
     pub fn objection(self) -> &'static str {
         match self {
             Self::Network => "the network does not see the part there",
-            Self::Edges => "too few of the part's edges are there",
+            Self::Edges => "too few of the part's edges are found",
             Self::Surface => "the surface looks different: another side, print, gloss or light",
             Self::Hue => "it has another colour: another part, or other light",
             Self::Visible => "too little of it is visible",
             Self::Size => "it has another size",
             Self::Outside => "too much of it lies outside the picture",
-            Self::Resemblance => "other things look much like this part",
+            Self::Resemblance => "other objects look similar to this part",
             Self::Likeness => "photo and picture, laid over each other, do not show the same part",
-            Self::Details => "a feature or print of the part is not there, or is elsewhere",
+            Self::Details => "a feature or print of the part is missing, or is elsewhere",
             Self::Table => "bare table is seen where the part should be",
-            Self::Rim => "a part of its outline is not there",
+            Self::Rim => "a part of its outline is missing",
             Self::Added => "there is more inside its outline than in the photo",
             Self::Mirror => "the mirror image fits better",
         }

@@ -58,8 +58,8 @@ impl GraspModel {
         self.network.as_ref().map_or(ModelKind::S, Network::kind)
     }
 
-    /// The same network read as another model; `None` if the two are not taught alike (see [`ModelKind::taught_as`]).
-    /// Its calibration stays, although the network's errors were judged with the first reading.
+    /// The same network read as another model; `None` if the two are not taught in the same way (see
+    /// [`ModelKind::taught_as`]). The calibration is kept, although it was fitted to the errors of the first reading.
     pub fn read_as(self, kind: ModelKind) -> Option<Self> {
         if self.kind() == kind {
             return Some(self);

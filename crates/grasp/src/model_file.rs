@@ -304,7 +304,7 @@ fn describe(bytes: &[u8]) -> String {
         return "an empty file".to_owned();
     }
     let kind = known.iter().find(|(magic, _)| bytes.starts_with(magic)).map(|(_, name)| (*name).to_owned());
-    kind.unwrap_or_else(|| format!("{} bytes that are no safetensors file, or only the start of one", bytes.len()))
+    kind.unwrap_or_else(|| format!("{} bytes that are not a safetensors file, or only its beginning", bytes.len()))
 }
 
 fn to_json<T: Serialize>(value: &T) -> String {

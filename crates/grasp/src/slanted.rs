@@ -2,7 +2,7 @@
 //! searched, and the detections are mapped back.
 //!
 //! ```text
-//! level search ─ best places ─ how much they are shortened ─ slant ─ picture made level ─ search ─ worth more? ─ brought back
+//! level search ─ best places ─ their shortening ─ slant ─ rectified picture ─ search ─ better? ─ transformed back
 //! ```
 //! All parts lie on one plane, so that a few sure places determine the slant for all. A single shortened part leaves
 //! open which end of the slant is the far one; the slant with the better agreement of the place with the photo is used.

@@ -26,7 +26,12 @@ use crate::simd::{Isa, widest};
 /// # Panics
 /// If the shapes differ.
 pub fn cosines(one: Tensor<4>, other: Tensor<4>, reach: usize, epsilon: f32) -> Tensor<4> {
-    assert!(one.dims() == other.dims(), "cosines: expected maps alike, found {:?} and {:?}", one.dims(), other.dims());
+    assert!(
+        one.dims() == other.dims(),
+        "cosines: expected maps of the same shape, found {:?} and {:?}",
+        one.dims(),
+        other.dims()
+    );
     let params = CosineParams { reach, epsilon };
     Tensor::from_dispatch(Dispatch::kernel_cosines(one.into_dispatch(), other.into_dispatch(), params))
 }

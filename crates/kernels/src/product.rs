@@ -27,7 +27,7 @@ pub(crate) struct Operand<'a> {
     pub(crate) outer: usize,
 }
 
-/// The operations on a sum before it is written: `relu(sum · scale + bias + residual)`, as far as present.
+/// The operations on a sum before it is written: `relu(sum · scale + bias + residual)`; absent terms are left out.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Epilogue<'a> {
     /// A factor for each column.

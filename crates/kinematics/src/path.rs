@@ -235,7 +235,7 @@ impl Follower<'_> {
         let away = self.away_from_limits(q);
         let rate = inverse * self.line.twist() + away - inverse * (jacobian * away);
         if rate.amax() > self.options.max_rate_rad_m {
-            return Err(self.blocked(s, "the arm is stretched to its end or at another singularity"));
+            return Err(self.blocked(s, "the arm is fully stretched or at another singularity"));
         }
         Ok(rate)
     }
@@ -244,7 +244,7 @@ impl Follower<'_> {
         (jacobian * jacobian.transpose())
             .cholesky()
             .map(|factor| jacobian.transpose() * factor.inverse())
-            .ok_or_else(|| self.blocked(s, "the arm is stretched to its end or at another singularity"))
+            .ok_or_else(|| self.blocked(s, "the arm is fully stretched or at another singularity"))
     }
 
     fn away_from_limits(&self, q: &JointVector) -> JointVector {

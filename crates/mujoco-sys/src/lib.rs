@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! /usr/include/mujoco/*.h ── bindgen (ahead of time) ──> src/bindings.rs ──┐
-//! libmujoco.so.2.2.2 ── loaded when first asked for (library.rs) ─────────┴─> sdg-simulation
+//! libmujoco.so.2.2.2 ── loaded on the first request (library.rs) ──────────┴─> sdg-simulation
 //! ```
 //!
 //! The bindings were generated from the Debian headers and are committed, so that a build needs no

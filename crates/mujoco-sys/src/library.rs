@@ -86,7 +86,7 @@ macro_rules! functions {
             /// MuJoCo's function of this name.
             ///
             /// # Safety
-            /// As MuJoCo's documentation says.
+            /// See MuJoCo's documentation.
             ///
             /// # Panics
             /// Unless [`crate::load`] has succeeded.

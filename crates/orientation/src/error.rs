@@ -11,10 +11,10 @@ pub enum OrientationError {
     #[error("orientation CNN: {field} must be {expected}, found {found}")]
     Config { field: &'static str, expected: String, found: String },
     /// An image has no pixels.
-    #[error("an image to crop needs at least 1x1 pixels, found {width}x{height}")]
+    #[error("an image for cropping needs at least 1x1 pixels, found {width}x{height}")]
     EmptyImage { width: u32, height: u32 },
     /// A box that gives no crop.
-    #[error("a box to crop by needs finite corners and a positive area, found ({x1}, {y1}) to ({x2}, {y2})")]
+    #[error("a box for cropping needs finite corners and a positive area, found ({x1}, {y1}) to ({x2}, {y2})")]
     BadBox { x1: f64, y1: f64, x2: f64, y2: f64 },
     /// A crop of another size than the network's input.
     #[error("the orientation CNN reads crops of {expected}x{expected} pixels, found {width}x{height}")]

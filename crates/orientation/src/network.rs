@@ -184,7 +184,7 @@ impl OrientationCnn {
 /// # Panics
 /// Without a crop, or with crops of several sizes.
 pub fn crop_batch(crops: &[RgbImage], device: &Device) -> Tensor<4> {
-    let (width, height) = crops.first().expect("a batch has a crop at least").dimensions();
+    let (width, height) = crops.first().expect("a batch has at least one crop").dimensions();
     let num_pixels = (width * height) as usize;
     let mut values = vec![0f32; crops.len() * 3 * num_pixels];
     for (crop, planes) in crops.iter().zip(values.chunks_exact_mut(3 * num_pixels)) {

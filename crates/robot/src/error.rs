@@ -14,25 +14,25 @@ use crate::watch::StopReason;
 #[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum RobotError {
     /// A motion violates a limit; it was not started.
-    #[error("the motion was not begun: {0}")]
+    #[error("the motion was not started: {0}")]
     Unsafe(#[from] Violation),
     /// No motion can be planned.
     #[error(transparent)]
     Planning(#[from] KinematicsError),
     /// There is no path around the obstacles of the cell.
-    #[error("no way through the cell: {0}")]
+    #[error("no path through the cell: {0}")]
     NoWay(#[from] PlanError),
     /// The arm was stopped on its path.
     #[error("the arm was stopped: {0}")]
     Stopped(StopReason),
     /// The motion was blocked.
-    #[error("the arm was held up: {0}")]
+    #[error("the arm was blocked: {0}")]
     Blocked(String),
     /// The arm stopped by itself.
     #[error("the arm stopped itself: {0}")]
     Reflex(String),
     /// The arm does not move because it stopped before.
-    #[error("nothing moves until a person has looked and runs `sdg robot recover`: {0}")]
+    #[error("nothing moves until a person has checked the arm and runs `sdg robot recover`: {0}")]
     Latched(String),
     /// Arm or hand never answered.
     #[error("{peer} could not be reached: {why}")]

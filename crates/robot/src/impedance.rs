@@ -6,7 +6,7 @@
 //! ```
 //! J is the tcp's Jacobian in the base frame, e the deviation of the tcp from its desired pose (m, and half of a
 //! rotation vector, rad), v_d the desired twist, D = 2 √(K m) for a mass m of the tcp. Gravity is not included: the
-//! robot adds it, also for the load that it was told of.
+//! robot adds it, also for the load that was given to it.
 //!
 //! A spring is not exact: at 150 N/m an unreported part of 0.7 kg pulls the tcp down by 46 mm, and joint friction of 1
 //! Nm costs about 20 mm. In free air the integral compensates both; during contact it would press with increasing

@@ -28,7 +28,7 @@ pub struct Robot<'a, A: Arm> {
     limits: SafetyLimits,
     watch: Watch,
     latched: Option<String>,
-    /// The load that the hand was told of.
+    /// The load that was given to the hand.
     load: Load,
     /// The place where the hand last came down by contact, until it has moved up from there.
     felt_below: Option<FeltBelow>,

@@ -87,7 +87,7 @@ impl PlaceGoal {
                 true => format!("parts in neighbouring cells would overlap by {:.1} mm", -near * 1e3),
                 false => format!("parts in neighbouring cells are {:.1} mm apart", near * 1e3),
             };
-            return Some(format!("{what}, at least {:.0} mm are asked for", PART_ROOM_M * 1e3));
+            return Some(format!("{what}, at least {:.0} mm are required", PART_ROOM_M * 1e3));
         }
         let near =
             turns_rad.iter().map(|&turn_rad| self.finger_gap_m(part, &self.base_from_part(0.0, turn_rad), opening_m));
@@ -102,7 +102,7 @@ impl PlaceGoal {
         };
         Some(format!(
             "the part is {:.0} mm wide between the fingers; {:.0} mm thick and open to {:.0} mm to let it go, they {comes} a part in a \
-             neighbouring cell{turned} and at least {:.0} mm are asked for",
+             neighbouring cell{turned} and at least {:.0} mm are required",
             part.jaw_width_m() * 1e3,
             thickness_m(part) * 1e3,
             opening_m * 1e3,

@@ -72,7 +72,7 @@ pub struct Way {
     /// Motions in sequence, each from rest to rest: one, unless the arm has to stop at a waypoint; none if it is there
     /// already.
     pub motions: Vec<Trajectory>,
-    /// The straight approach, if one was asked for.
+    /// The straight approach, if one was requested.
     pub approach: Option<JointPath>,
     /// The pose that is reached.
     pub goal_idx: usize,

@@ -1,7 +1,7 @@
 //! Coming down with a compliant tcp until a contact is measured by its force.
 //!
 //! ```text
-//! stand, to learn what is felt in free air ─> down at a constant speed ─> felt: press with a force ─> stand, told
+//! stand, to measure the forces in free air ─> down at a constant speed ─> felt: press with a force ─> stand, report
 //!      └ stiff, with integral action ────────────────┘ └ nothing felt     └ soft along z
 //! ```
 //! The force is the robot's own estimate of the external force; the height is the measured one.

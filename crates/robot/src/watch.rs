@@ -25,7 +25,7 @@ impl fmt::Display for StopReason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Interrupted => f.write_str("a person asked for it"),
-            Self::Implausible(what) => write!(f, "its state cannot be: {what}"),
+            Self::Implausible(what) => write!(f, "its state is implausible: {what}"),
             Self::Watchdog(what) => write!(f, "watchdog: {what}"),
             Self::Mode(mode) => write!(f, "the arm is in mode \"{}\"", mode.name()),
         }
@@ -114,7 +114,7 @@ impl Watch {
     }
 
     fn implausible(&self, state: &ArmState) -> Option<StopReason> {
-        let quantities = [(state.q, "is at"), (state.dq, "moves at"), (state.q_commanded, "is led to")];
+        let quantities = [(state.q, "is at"), (state.dq, "moves at"), (state.q_commanded, "is commanded to")];
         for (values, verb) in quantities {
             if let Some(joint_idx) = (0..NUM_JOINTS).find(|&idx| !values[idx].is_finite()) {
                 let (joint, value) = (joint_idx + 1, values[joint_idx]);
@@ -192,7 +192,7 @@ mod tests {
             (state(0.001, jumped), "joint 3 jumped by 1.000 rad within 1 ms"),
             (state(0.001, nan), "joint 5 is at NaN"),
             (led_to(jumped), "the reference of joint 3 jumped by 1.000 rad within 1 ms"),
-            (led_to(nan), "joint 5 is led to NaN"),
+            (led_to(nan), "joint 5 is commanded to NaN"),
             (state(0.050, ready_pose()), "no state of the arm for 50 ms"),
         ] {
             let mut watch = Watch::default();

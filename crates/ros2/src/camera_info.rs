@@ -68,7 +68,7 @@ pub fn read_camera_info(message: &CameraInfo) -> Result<PinholeCamera, RosError>
 pub fn check_same_camera(of_file: &PinholeCamera, sent: &PinholeCamera) -> Result<(), RosError> {
     let size = |camera: &PinholeCamera| format!("{} × {} pixels", camera.width, camera.height);
     if (of_file.width, of_file.height) != (sent.width, sent.height) {
-        return Err(refused(format!("{}, as the camera's file has", size(of_file)), size(sent)));
+        return Err(refused(format!("{}, as in the camera's file", size(of_file)), size(sent)));
     }
     let allowed = MAX_DIFFERENCE * f64::from(of_file.width.max(of_file.height));
     for (name, expected, found) in [
@@ -78,7 +78,7 @@ pub fn check_same_camera(of_file: &PinholeCamera, sent: &PinholeCamera) -> Resul
         ("cy", of_file.cy, sent.cy),
     ] {
         if (expected - found).abs() > allowed {
-            let expected = format!("{name} = {expected:.1} ± {allowed:.1} px, as the camera's file has");
+            let expected = format!("{name} = {expected:.1} ± {allowed:.1} px, as in the camera's file");
             return Err(refused(expected, format!("{found:.1}")));
         }
     }
@@ -143,7 +143,7 @@ mod tests {
         let file = PinholeCamera::WRIST;
         let larger = PinholeCamera { width: 1280, height: 720, ..file };
         let error = check_same_camera(&file, &larger).unwrap_err().to_string();
-        assert_eq!(error, "camera_info: expected 640 × 480 pixels, as the camera's file has, found 1280 × 720 pixels");
+        assert_eq!(error, "camera_info: expected 640 × 480 pixels, as in the camera's file, found 1280 × 720 pixels");
         check_same_camera(&file, &PinholeCamera { fx: 555.0, ..file }).unwrap();
         let error = check_same_camera(&file, &PinholeCamera { fy: 600.0, ..file }).unwrap_err().to_string();
         assert!(error.contains("fy = 550.0 ± 6.4 px") && error.contains("600.0"), "{error}");

@@ -106,7 +106,7 @@ pub fn read_image(message: &Image) -> Result<RgbImage, PictureError> {
             return yuyv_to_rgb(&swapped, *width, *height, used).map_err(|found| refused("whole rows", found));
         }
     };
-    RgbImage::from_raw(*width, *height, pixels).ok_or_else(|| refused("as many pixels as the size says", "fewer"))
+    RgbImage::from_raw(*width, *height, pixels).ok_or_else(|| refused("as many pixels as its size states", "fewer"))
 }
 
 /// A compressed message's picture: JPEG or PNG, by its first bytes.

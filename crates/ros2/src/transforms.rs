@@ -140,7 +140,7 @@ impl Transforms {
             let (apart, side) = if known < secs { (secs - known, "before") } else { (known - secs, "after") };
             let limit = self.max_age_secs;
             (apart > limit).then(|| {
-                format!("stale: \"{frame}\" was last heard of {apart:.2} s {side} the picture, at most {limit:.2} s are allowed")
+                format!("stale: \"{frame}\" was last received {apart:.2} s {side} the picture, at most {limit:.2} s are allowed")
             })
         };
         match (after.checked_sub(1).and_then(|before| poses.get(before)), poses.get(after)) {
@@ -207,7 +207,7 @@ mod tests {
         let error = transforms.lookup("base", "camera", at(12.0)).unwrap_err().to_string();
         assert_eq!(
             error,
-            "no transform from \"camera\" to \"base\": stale: \"hand\" was last heard of 1.00 s before the picture, at most \
+            "no transform from \"camera\" to \"base\": stale: \"hand\" was last received 1.00 s before the picture, at most \
              0.50 s are allowed"
         );
         assert!(transforms.lookup("base", "camera", at(9.0)).unwrap_err().to_string().contains("after the picture"));

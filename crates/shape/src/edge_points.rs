@@ -185,7 +185,7 @@ fn spread_out(candidates: &[EdgeCandidate], max_points: usize, pixel_size: f64) 
             }
         }
         // A full set may lack weak regions that the next larger distance would reach; it never has far fewer points
-        // than asked for. The shares trade time for an even spread; chosen by hand.
+        // than requested. The shares trade time for an even spread; chosen by hand.
         if kept.len() >= max_points * 9 / 10 || distance < 0.5 * pixel_size {
             return kept;
         }

@@ -27,7 +27,8 @@ pub enum ShapeError {
     },
     /// The part has too few edges for recognition.
     #[error(
-        "expected at least {expected} edge points inside the outline, found {found}: the part hardly differs from what surrounds it; photograph it on a plain background of another brightness, or mark it where it is"
+        "expected at least {expected} edge points inside the outline, found {found}: the part hardly differs from its \
+         surroundings; photograph it on a plain background of another brightness, or correct its marks"
     )]
     TooFewEdges { expected: usize, found: usize },
     /// A file of weights does not contain those of the network that compares photo and picture.

@@ -57,7 +57,7 @@ impl ShapeTemplate {
     /// background's edges inside it count as the part's.
     ///
     /// # Errors
-    /// [`ShapeError`] for an outline that is no area or outside the image, for a part without edges,
+    /// [`ShapeError`] for an outline without an area or outside the image, for a part without edges,
     /// and for a configuration out of range.
     pub fn new(image: &RgbImage, outline: &Polygon, config: &ShapeConfig) -> Result<Self, ShapeError> {
         Self::with_inner_edges(image, outline, config, 1.0)

@@ -115,7 +115,7 @@ impl RotationEstimator {
     }
 
     /// Reads a template: an image of the part, and the part's mask if there is one. Without a mask, the whole
-    /// image is taken for the part.
+    /// image is mistaken for the part.
     ///
     /// # Errors
     /// A mask of another size than the image; a template with neither keypoints nor a mask.

@@ -171,7 +171,7 @@ impl Arm for Workcell {
             if (found_m - told_m).abs() >= HAND_THERE_M {
                 let (told_mm, found_mm) = (told_m * 1e3, found_m * 1e3);
                 return Err(RobotError::Hand(format!(
-                    "it was to open to {told_mm:.0} mm and stands at {found_mm:.0} mm"
+                    "the opening should be {told_mm:.0} mm, but is {found_mm:.0} mm"
                 )));
             }
         }
@@ -197,7 +197,7 @@ impl Arm for Workcell {
 
     fn recover(&mut self) -> Result<()> {
         if self.fault() == Some(ArmFaultKind::Reflex) {
-            return Err(RobotError::Reflex("what caused it is still there".to_owned()));
+            return Err(RobotError::Reflex("its cause is still present".to_owned()));
         }
         self.is_in_reflex = false;
         Ok(())

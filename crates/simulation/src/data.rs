@@ -274,7 +274,7 @@ impl Data {
         let contacts = unsafe { std::slice::from_raw_parts(raw.contact, raw.ncon as usize) };
         contacts.iter().enumerate().filter(|(_, contact)| contact.efc_address >= 0).map(|(index, contact)| {
             let mut force = [0.0; 6];
-            // SAFETY: the index is below `ncon` and the output has the six entries asked for.
+            // SAFETY: the index is below `ncon` and the output has the six requested entries.
             unsafe { mj::mj_contactForce(self.model.as_ptr(), self.ptr, index as i32, force.as_mut_ptr()) };
             Contact {
                 geom1: Id::new(contact.geom1 as usize),

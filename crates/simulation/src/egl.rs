@@ -38,7 +38,7 @@ pub(crate) fn load() -> Result<()> {
 fn open() -> std::result::Result<Surfaceless, String> {
     // SAFETY: loading libEGL runs its initialisers only; Debian's has no precondition.
     let egl = unsafe { Egl::load_required() }.map_err(|error| format!("libEGL.so.1 could not be loaded ({error})"))?;
-    // SAFETY: the default display is what the surfaceless platform expects, with an empty list of
+    // SAFETY: the surfaceless platform expects the default display, with an empty list of
     // attributes.
     let display =
         unsafe { egl.get_platform_display(PLATFORM_SURFACELESS_MESA, egl::DEFAULT_DISPLAY, &[egl::ATTRIB_NONE]) }

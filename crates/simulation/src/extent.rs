@@ -142,7 +142,7 @@ mod tests {
                 num_held += 1;
             }
         }
-        assert!(num_held > 100, "{num_held} shapes were looked at");
+        assert!(num_held > 100, "{num_held} shapes were examined");
     }
 
     /// Tests the fit of the planner's capsules: they contain all visible shapes of a link, and extend beyond the link's

@@ -49,7 +49,7 @@ impl Gripper {
     }
 
     /// Starts to move to an opening (m) at a speed of the opening (m/s), each finger pressing with `force_n` at most; openings
-    /// below zero press on what is between the fingers.
+    /// below zero press on an object between the fingers.
     pub fn drive(&mut self, opening_m: f64, speed_m_s: f64, force_n: f64) {
         let beyond = MAX_FINGER_FORCE_N / STIFFNESS_N_M;
         *self = Self {

@@ -38,7 +38,7 @@ impl PlanningProblem {
         let mut rng = Pcg64Mcg::seed_from_u64(seed);
         let obstacles = random_obstacles(rng.random_range(1..=8), rng.random());
         let model = CollisionModel::new(&ArmGeometry::panda(), obstacles.clone(), HAND_OPENING_MAX_M)
-            .expect("random obstacles make sense");
+            .expect("random obstacles are valid");
         let limits = JointLimits::panda();
         let mut checker = Checker::new(&model, Self::FREE_M);
         let mut free = || loop {

@@ -163,7 +163,7 @@ impl Renderer {
             }
         })?;
         if gl.currentBuffer != mj::mjFB_OFFSCREEN as i32 {
-            return Err(SimulationError::Rendering { reason: "OpenGL made no offscreen framebuffer".into() });
+            return Err(SimulationError::Rendering { reason: "OpenGL created no offscreen framebuffer".into() });
         }
         scene.flags[mj::mjRND_SHADOW as usize] = u8::from(config.shadow_size > 0);
         scene.flags[mj::mjRND_REFLECTION as usize] = u8::from(config.reflections);

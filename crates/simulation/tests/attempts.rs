@@ -15,7 +15,7 @@ use sdg_simulation::{
     WorkcellConfig, marked_grasp,
 };
 
-/// Finds as the function says, and stores the camera's poses.
+/// Finds by the function, and stores the camera's poses.
 struct Looking<F> {
     find: F,
     views: Vec<CameraView>,

@@ -141,7 +141,7 @@ fn no_motion_begins_on_a_detection_that_is_older_than_a_second() {
     let mut robot = Robot::new(&mut arm, Workcell::safety_limits(), Watch::default());
     let report = grasp(&mut robot, &mut finder, &mut (), mount, &GraspConfig::default()).unwrap();
     let GraspOutcome::Failed { step: GraspStep::Detect, why } = &report.outcome else { panic!("{report:?}") };
-    assert_eq!(why, "the detection is 1.2 s old when the arm is to move, at most 1.0 s are allowed");
+    assert_eq!(why, "the detection is 1.2 s old when the arm should move, at most 1.0 s are allowed");
     assert_eq!(report.looks, [1, 0], "the way to the part was not begun");
     assert_stands_still(robot.arm(), &positions);
 }

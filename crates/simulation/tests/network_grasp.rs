@@ -29,7 +29,7 @@ fn a_part_is_grasped_over_the_network_in_lockstep() {
     assert!(twin.is_lifted());
     assert_eq!(report.looks, [1, 1]);
     drop(arm);
-    // The robot was told its load, and measures no further force.
+    // The load was given to the robot, which measures no further force.
     let client = Client::connect(&server.robot_address().to_string(), &RobotConfig::default()).unwrap();
     let state = client.state();
     assert_eq!((state.load_mass, state.load_center), (mass_kg, TIPS_IN_FLANGE_M));

@@ -104,7 +104,7 @@ fn assert_stops_in_time(states: &[ArmState], is_faulty: impl Fn(&ArmState) -> bo
 fn a_position_that_is_no_number_stops_the_arm() {
     let mut line = Line::new(changing(20, |state| state.q[3] = f64::NAN), all_pass());
     let (text, states) = line.stopped();
-    assert_eq!(text, "the arm was stopped: its state cannot be: joint 4 is at NaN");
+    assert_eq!(text, "the arm was stopped: its state is implausible: joint 4 is at NaN");
     assert_stops_in_time(&states, |state| state.q[3].is_nan());
     assert_eq!(line.arm.state().unwrap().mode, ArmMode::Idle);
 }
@@ -113,7 +113,7 @@ fn a_position_that_is_no_number_stops_the_arm() {
 fn a_position_that_jumps_by_a_radian_stops_the_arm() {
     let mut line = Line::new(changing(20, |state| state.q[3] += 1.0), all_pass());
     let (text, states) = line.stopped();
-    assert!(text.starts_with("the arm was stopped: its state cannot be: joint 4 jumped by 1.0"), "{text}");
+    assert!(text.starts_with("the arm was stopped: its state is implausible: joint 4 jumped by 1.0"), "{text}");
     assert_stops_in_time(&states, |state| state.q[3] - state.q_commanded[3] > 0.9);
     assert_eq!(line.arm.state().unwrap().mode, ArmMode::Idle);
 }
@@ -121,8 +121,8 @@ fn a_position_that_jumps_by_a_radian_stops_the_arm() {
 #[test]
 fn a_reference_that_cannot_be_stops_the_arm_and_is_not_followed() {
     for (value, expected) in [
-        (f64::NAN, "the arm was stopped: its state cannot be: joint 4 is led to NaN"),
-        (1.0, "the arm was stopped: its state cannot be: the reference of joint 4 jumped by 1.0"),
+        (f64::NAN, "the arm was stopped: its state is implausible: joint 4 is commanded to NaN"),
+        (1.0, "the arm was stopped: its state is implausible: the reference of joint 4 jumped by 1.0"),
     ] {
         let mut line = Line::new(changing(20, move |state| state.q_desired[3] += value), all_pass());
         let (text, _) = line.stopped();

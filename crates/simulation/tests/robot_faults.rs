@@ -74,8 +74,8 @@ fn nothing_is_wrong_without_a_fault() {
 #[test]
 fn a_state_that_cannot_be_stops_the_arm_for_good() {
     for (kind, expected) in [
-        (ArmFaultKind::NotANumber, "the arm was stopped: its state cannot be: joint 4 is at NaN"),
-        (ArmFaultKind::Jump, "the arm was stopped: its state cannot be: joint 4 jumped by 1.00"),
+        (ArmFaultKind::NotANumber, "the arm was stopped: its state is implausible: joint 4 is at NaN"),
+        (ArmFaultKind::Jump, "the arm was stopped: its state is implausible: joint 4 jumped by 1.00"),
     ] {
         // In the first motion.
         let mut cell = cell(Some(ArmFault { at_secs: 0.3, kind }));
@@ -117,7 +117,7 @@ fn a_program_that_starts_anew_finds_the_arm_in_reflex() {
 #[test]
 fn a_hand_that_does_nothing_is_noticed() {
     // It fails before it opens to the part's width, and after that, before it closes.
-    for (at_secs, expected) in [(0.5, "the hand failed: it was to open to"), (3.0, "do not press")] {
+    for (at_secs, expected) in [(0.5, "the hand failed: the opening should be"), (3.0, "do not press")] {
         let mut cell = cell(Some(ArmFault { at_secs, kind: ArmFaultKind::HandStuck }));
         let mut robot = Robot::new(&mut cell, Workcell::safety_limits(), Watch::default());
         match run(&mut robot) {
@@ -180,7 +180,7 @@ fn a_motion_from_elsewhere_is_not_begun() {
     let slow = JointLimits::panda().scaled(0.1, 0.1, 0.1).unwrap();
     let motion = Trajectory::point_to_point(&start, &ready_pose(), &slow).unwrap();
     let error = robot.follow(motion).unwrap_err().to_string();
-    assert!(error.contains("starts 1.000 rad from where joint 2 is"), "{error}");
+    assert!(error.contains("starts 1.000 rad from the position of joint 2 is"), "{error}");
     // It was not started, so that no person needs to check it.
     assert_eq!(robot.latched(), None);
     let motion = some_motion(&mut robot);

@@ -18,7 +18,7 @@ pub enum TrainingError {
         /// The learning rate of that step.
         learning_rate: f64,
     },
-    /// The observer asked to stop before there was a network to keep.
+    /// The observer requested a stop before there was a network to keep.
     #[error("stopped at step {step}, before the first validation: there is no model to keep")]
     StoppedTooEarly { step: usize },
     /// The held-back samples could not be examined.

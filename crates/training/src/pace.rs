@@ -11,7 +11,7 @@ pub enum Ending {
     EarlyStop,
     /// The time budget was used up.
     TimeBudget,
-    /// The observer asked to stop.
+    /// The observer requested a stop.
     Interrupted,
 }
 

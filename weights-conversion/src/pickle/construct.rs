@@ -105,7 +105,7 @@ pub(crate) fn storage(arena: &mut Arena, id: Value, at: u64) -> Result<Value> {
         return Err(damaged(at, "a storage's key of at most 64 bytes", format!("{} bytes", key.len())));
     }
     if !matches!(view, [] | [Value::None]) {
-        return Err(damaged(at, "a storage of its own", "a view of another storage, as torch before 0.4 wrote"));
+        return Err(damaged(at, "a separate storage", "a view of another storage, as torch before 0.4 wrote"));
     }
     let storage = StorageRef { key: key.into(), element, num_elements };
     Ok(arena.add(Object::Storage(Box::new(storage))))

@@ -116,7 +116,7 @@ impl Sheet {
         Ok(Self { board, paper, shapes })
     }
 
-    /// `sdg-board squares=9x6 square_mm=25 paper=a4`: what both files say of themselves.
+    /// `sdg-board squares=9x6 square_mm=25 paper=a4`: the description in both files.
     pub fn facts(&self) -> String {
         let (columns, rows, square_m) = (self.board.columns(), self.board.rows(), self.board.square_m());
         format!(

@@ -1,7 +1,7 @@
 //! Robot poses that contradict the pictures: finds the error that explains it.
 //!
 //! ```text
-//! robot errors small, board's size as told ─ no question
+//! robot errors small, board's size as given ─ no question
 //!   ├─ board's size a parameter: falls the robot's error by much, and is the size another? ─ OtherBoardScale
 //!   └─ robot errors suspect ─ other readings of all poses    readings.rs, euler.rs ─ HandEyeDisagrees
 //!                           ─ a few poses wrong, exchanged   mixed_up.rs           ─ WrongPoses
@@ -88,7 +88,7 @@ pub(super) fn checked<'a>(evidence: &Evidence<'a>, robot: &[Isometry3<f64>]) -> 
     let found = if rms_px.is_finite() {
         format!("{rms_px:.1} px between them where the board alone leaves {board_rms_px:.2} px")
     } else {
-        "no place of the camera that explains both".to_owned()
+        "no pose of the camera that explains both".to_owned()
     };
     match best {
         Some(Explanation { rms_px: left, kind }) => Err(refusal(kind, left, found, evidence)),
@@ -96,7 +96,7 @@ pub(super) fn checked<'a>(evidence: &Evidence<'a>, robot: &[Isometry3<f64>]) -> 
             turns?;
             let hint = match turns_that_differ(evidence, robot) {
                 Some(differ) => format!(": {differ}"),
-                None => ": check that each picture stands with its own pose, that the robot stood still, and that neither board nor \
+                None => ": check that each picture is listed with its own pose, that the robot stood still, and that neither board nor \
                          camera was moved"
                     .to_owned(),
             };
@@ -231,8 +231,9 @@ fn turns_that_differ(evidence: &Evidence, robot: &[Isometry3<f64>]) -> Option<St
     let [robot_turn, board_turn] = *turns.get(turns.len() / 2)?;
     ((robot_turn - board_turn).abs() > MAX_TURN_DIFFERENCE_RAD).then(|| {
         format!(
-            "between pictures the flange turns by other angles than the board (typically by {:.0} degrees where the board turns by {:.0}): \
-             check that each picture stands with its own pose, and how the rotations were made (order of Euler angles, degrees or radians)",
+            "between pictures the flange turns by other angles than the board (typically by {:.0} degrees where the \
+             board turns by {:.0}): check that each picture is listed with its own pose, and how the rotations were \
+             made (order of Euler angles, degrees or radians)",
             robot_turn.to_degrees(),
             board_turn.to_degrees()
         )

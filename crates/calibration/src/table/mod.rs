@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! corners ─┬─ with intrinsics: the pose that minimises reprojection, its errors        sheet_pose.rs
-//!          └─ without: homography, focal length where the tilt tells it, else a guess  focal.rs
+//!          └─ without: homography, focal length if the tilt determines it, else a guess  focal.rs
 //! ```
 //! A homography alone gives positions on the table. For positions above the table the focal length matters;
 //! [`FocalCost`] has the size of that effect.

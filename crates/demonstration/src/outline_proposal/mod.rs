@@ -3,7 +3,7 @@
 //! ```text
 //! photo, box ─ frame: box and surroundings, shrunk ─ L*a*b*
 //!    │
-//!    └─ guesses of the part: what the surroundings do not explain, lit or in shadow; what is light; what is dark
+//!    └─ guesses of the part: areas not explained by the surroundings, lit or in shadow; light areas; dark areas
 //!         │
 //!         ├─▶ two ColorMixtures ─ evidence of each pixel ─ minimal_cut ─┐   a few rounds for each guess
 //!         └───────────────────────────◀─────────────────────────────────┤

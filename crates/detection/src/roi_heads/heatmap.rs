@@ -40,7 +40,7 @@ pub struct ReadKeypoint {
     pub x: f32,
     /// Pixels, y down.
     pub y: f32,
-    /// As [`KeypointScore`] says.
+    /// See [`KeypointScore`].
     pub score: f32,
 }
 

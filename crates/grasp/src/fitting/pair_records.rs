@@ -17,7 +17,7 @@ const CLEAR: u8 = 2;
 /// The data of a pair besides its pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PairFacts {
-    /// The use of the example: numbers of the trainer.
+    /// The use of the example, as a number defined by the trainer.
     pub stream: u8,
     /// Index of the part.
     pub part_idx: u16,

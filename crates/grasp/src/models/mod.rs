@@ -94,7 +94,7 @@ impl Network {
         self.comparison.as_ref().map(|_| consistency::USUAL_THRESHOLD)
     }
 
-    /// The same detector, read as another model that is taught alike.
+    /// The same detector, read as another model that is taught in the same way.
     pub(crate) fn read_as(self, kind: ModelKind) -> Option<Self> {
         let reading = match (self.reading, kind) {
             (Reading::BoxAndKeypoints | Reading::Keypoints, ModelKind::B) => Reading::BoxAndKeypoints,

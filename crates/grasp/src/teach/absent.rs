@@ -2,8 +2,8 @@
 //!
 //! ```text
 //! pictures ─┬─ AbsentSamples: every 12th sample is a window of one of them, without objects
-//!           ├─ highest_scores: what the network alone says there ─ calibration of its score
-//!           └─ calibrated: what the finished model accepts there, against what it accepts on held-back samples of the part
+//!           ├─ highest_scores: of the network alone there ─ calibration of its score
+//!           └─ calibrated: highest scores of the finished model there, and its scores on held-back samples of the part
 //!                          ─ log-odds that every score has less
 //! ```
 

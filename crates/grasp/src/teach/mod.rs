@@ -6,7 +6,7 @@
 //!        ├─ Augmenter ─ frames, windows ─ train ─ detector ─┐
 //!        │      ├─ held-back samples ── validation ─────────┴─ calibrate ─ GraspModel
 //!        │      └─ scenes without the part ────────────────────────┘│
-//! pictures without the part ─ some of the samples, and the score of what is found in them ─┘
+//! pictures without the part ─ some of the samples, and the scores of detections in them ─┘
 //!        └─ (model S: nothing to train) ──────────────────────────────────────┘
 //! ```
 

@@ -29,7 +29,7 @@ impl Start {
         }
     }
 
-    /// The same with the shipped weights read, if they are asked for and the preset starts from them.
+    /// The same with the shipped weights read, if they are requested and the preset starts from them.
     ///
     /// # Errors
     /// [`GraspError::NeedsBaseWeights`] if the preset starts from weights and this build contains none.

@@ -77,7 +77,7 @@ impl ArmDynamics {
     /// For a negative mass or numbers that are not finite.
     pub fn with_load(mut self, mass_kg: f64, center_in_flange_m: [f64; 3]) -> Self {
         assert!(mass_kg >= 0.0 && mass_kg.is_finite(), "a mass is not negative, found {mass_kg} kg");
-        assert!(center_in_flange_m.iter().all(|x| x.is_finite()), "{center_in_flange_m:?} m is no place");
+        assert!(center_in_flange_m.iter().all(|x| x.is_finite()), "{center_in_flange_m:?} m is not a finite position");
         let load = LinkInertia::new(mass_kg, center_in_flange_m, [0.0; 3]);
         self.links[NUM_JOINTS - 1].add(&load, &Isometry3::translation(0.0, 0.0, self.flange_offset_m));
         self

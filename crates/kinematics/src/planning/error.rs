@@ -40,7 +40,7 @@ pub enum PlanError {
         depth_m: f64,
     },
     /// The start is in collision, or closer to something than the margin.
-    #[error("the start is not free: {nearest}; at least {:.1} mm are asked for", .margin_m * 1e3)]
+    #[error("the start is not free: {nearest}; at least {:.1} mm are required", .margin_m * 1e3)]
     StartBlocked {
         /// The body that is too close.
         nearest: Proximity,
@@ -49,8 +49,8 @@ pub enum PlanError {
     },
     /// Every configuration that reaches the goal is in collision, or closer to something than the margin.
     #[error(
-        "the goal is not free: {num_configurations} configurations reach it, and in the best of them {nearest}; at least {:.1} mm are \
-         asked for",
+        "the goal is not free: {num_configurations} configurations reach it, and in the best of them {nearest}; at \
+         least {:.1} mm are required",
         .margin_m * 1e3
     )]
     GoalBlocked {
@@ -62,7 +62,7 @@ pub enum PlanError {
         margin_m: f64,
     },
     /// The straight approach ends early from every configuration that reaches its start.
-    #[error("the approach can be followed for {:.0} % of its way at best: {why}", .share * 100.0)]
+    #[error("at most {:.0} % of the approach can be followed: {why}", .share * 100.0)]
     ApproachBlocked {
         /// The largest free share of the approach, 0 to 1.
         share: f64,

@@ -63,7 +63,7 @@ const FOLLOWED_AGAIN: f64 = 0.98;
 fn first_blocked(checker: &mut Checker<'_>, path: &JointPath) -> Option<(f64, String)> {
     let margin_mm = checker.margin_m() * 1e3;
     let why = |checker: &Checker<'_>, q: &JointVector| {
-        format!("{}, at least {margin_mm:.1} mm are asked for", checker.model().nearest(q))
+        format!("{}, at least {margin_mm:.1} mm are required", checker.model().nearest(q))
     };
     let waypoints: Vec<&JointVector> = path.waypoints().collect();
     if !checker.is_free(waypoints[0]) {

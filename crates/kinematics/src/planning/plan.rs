@@ -64,7 +64,7 @@ pub struct Plan {
     /// The path through them with rounded corners. Usually one; several, each starting where the one before ends, if at
     /// a waypoint no rounding is free and the arm must stop; none if start and end are the same.
     pub ways: Vec<RoundedPath>,
-    /// The straight end, if one was asked for.
+    /// The straight end, if one was requested.
     pub approach: Option<JointPath>,
     /// The index of the reached goal pose.
     pub goal_idx: usize,
@@ -263,7 +263,7 @@ impl ArmGeometry {
             goals.iter().map(|goal| goal * Translation3::new(0.0, 0.0, -approach.length_m)).collect();
         let mut on_approach = Checker::new(approach.model, checker.margin_m());
         let (mut kept, mut paths) = (Vec::new(), Vec::new());
-        let mut best = (0.0, "nothing of it is free".to_owned());
+        let mut best = (0.0, "no part of it is free".to_owned());
         for goal in free_configurations(self, checker, start, &before)? {
             let line = checked_line(self, &mut on_approach, &goal.q, &goals[goal.pose_idx])
                 .map_err(|cause| PlanError::Kinematics { what: "the approach".to_owned(), cause })?;

@@ -1,8 +1,8 @@
 //! The commands of a motion, for a robot that may lose some of them.
 //!
 //! ```text
-//! robot's time since the last state ─ Playback ─ where the trajectory is at that time ──────────┐
-//! state: q_d, dq_d, ddq_d ─ not what was sent last? ─ the difference, led back to zero smoothly ┴ sum ─ rate limit ─ command
+//! robot's time since the last state ─ Playback ─ the trajectory's position at that time ─┐
+//! state: q_d, dq_d, ddq_d ─ difference from the last command, reduced to zero smoothly ──┴ sum ─ rate limit ─ command
 //! ```
 //! A command that comes too late is lost, and the robot continues without it at constant acceleration. The trajectory
 //! continues by the robot's time, and the next command must lead from the robot's position back to the trajectory's

@@ -82,7 +82,7 @@ fn execute(hand: &mut Hand, command: HandCommand) -> Result<()> {
     match command {
         HandCommand::Move { opening_m, speed_m_s } => match hand.move_to(opening_m, speed_m_s).map_err(failed)? {
             true => Ok(()),
-            false => Err(RobotError::Hand(format!("it did not come to {:.0} mm", opening_m * 1e3))),
+            false => Err(RobotError::Hand(format!("it did not reach {:.0} mm", opening_m * 1e3))),
         },
         HandCommand::Grasp { width_m, speed_m_s, force_n } => {
             let [thinner_m, wider_m] = GRASP_TOLERANCE_M;

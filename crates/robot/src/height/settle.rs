@@ -63,7 +63,7 @@ pub fn settle(
         (None, Some(measured)) => return Ok(by_measurement(measured)),
         (None, None) => {
             let why = why_not.unwrap_or("no picture was taken for it");
-            return Err(format!("the height of the part was not measured, and none was told: {why}"));
+            return Err(format!("the height of the part was not measured, and none was given: {why}"));
         }
     };
     let [apart_mm, told_mm, measured_mm] =
@@ -72,7 +72,7 @@ pub fn settle(
     if apart_mm > max_mm {
         let [told_sigma_mm, measured_sigma_mm] = [told.sigma_m, measured.sigma_m].map(|sigma| sigma * 1e3);
         return Err(format!(
-            "expected marks at the told height of {told_mm:.1} ± {told_sigma_mm:.1} mm, measured {measured_mm:.1} ± \
+            "expected marks at the given height of {told_mm:.1} ± {told_sigma_mm:.1} mm, measured {measured_mm:.1} ± \
              {measured_sigma_mm:.1} mm: at most {max_mm:.1} mm apart are allowed, found {apart_mm:.1} mm"
         ));
     }
@@ -105,12 +105,12 @@ mod tests {
         // 3 √(0.6² + 0.8²) = 3 mm.
         assert!(settle(told(16.0, 0.6), measured(18.99, 0.8), None).is_ok());
         let why = settle(told(16.0, 0.6), measured(19.01, 0.8), None).unwrap_err();
-        assert!(why.contains("told height of 16.0 ± 0.6 mm, measured 19.0 ± 0.8 mm: at most 3.0 mm apart"), "{why}");
+        assert!(why.contains("given height of 16.0 ± 0.6 mm, measured 19.0 ± 0.8 mm: at most 3.0 mm apart"), "{why}");
     }
 
     #[test]
     fn without_any_height_the_reason_is_told() {
         let why = settle(None, None, Some("the second picture does not show the part")).unwrap_err();
-        assert!(why.ends_with("none was told: the second picture does not show the part"), "{why}");
+        assert!(why.ends_with("none was given: the second picture does not show the part"), "{why}");
     }
 }

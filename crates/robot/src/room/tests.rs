@@ -34,9 +34,9 @@ fn across_the_marked_line_fingers_need_room_for_themselves() {
     // Half of 20 mm, 10 mm opened, 15 mm of finger, 2 mm, and half of the next: 47 mm.
     check([100.0, 47.0], &bar(), RotationalSymmetry::None).unwrap();
     let found = check([100.0, 46.0], &bar(), RotationalSymmetry::None).unwrap_err().to_string();
-    let expected = "\"tray, cell 6\": expected a pitch of 100 x 47 mm, found 100 x 46 mm: the part is 20 mm wide between the fingers; \
-                    15 mm thick and open to 40 mm to let it go, they come within 1.0 mm of a part in a neighbouring cell and at least 2 mm \
-                    are asked for";
+    let expected = "\"tray, cell 6\": expected a pitch of 100 x 47 mm, found 100 x 46 mm: the part is 20 mm wide \
+                    between the fingers; 15 mm thick and open to 40 mm to let it go, they come within 1.0 mm of a \
+                    part in a neighbouring cell and at least 2 mm are required";
     assert_eq!(found, expected);
 }
 
@@ -45,7 +45,7 @@ fn parts_themselves_need_room() {
     check([94.0, 60.0], &bar(), RotationalSymmetry::None).unwrap();
     let found = check([93.0, 60.0], &bar(), RotationalSymmetry::None).unwrap_err().to_string();
     assert!(found.contains("expected a pitch of 94 x 60 mm, found 93 x 60 mm"), "{found}");
-    assert!(found.contains("parts in neighbouring cells are 3.0 mm apart, at least 4 mm are asked for"), "{found}");
+    assert!(found.contains("parts in neighbouring cells are 3.0 mm apart, at least 4 mm are required"), "{found}");
     // Too narrow along both.
     let found = check([80.0, 15.0], &bar(), RotationalSymmetry::None).unwrap_err().to_string();
     assert!(found.contains("expected a pitch of 94 x 47 mm, found 80 x 15 mm"), "{found}");

@@ -30,7 +30,7 @@ impl fmt::Display for SelfCollision {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [one, other] = self.bodies;
         let (found_mm, min_mm) = (self.distance_m * 1e3, self.min_m * 1e3);
-        write!(f, "{one} and {other} of the arm are {found_mm:.0} mm apart, at least {min_mm:.0} mm are asked for")
+        write!(f, "{one} and {other} of the arm are {found_mm:.0} mm apart, at least {min_mm:.0} mm are required")
     }
 }
 

@@ -8,7 +8,7 @@ use crate::safety::self_collision::SelfCollision;
 #[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum Violation {
     /// The motion does not start at the arm's position.
-    #[error("it starts {apart_rad:.3} rad from where joint {joint} is, at most {max_rad:.3} are allowed")]
+    #[error("it starts {apart_rad:.3} rad from the position of joint {joint}, at most {max_rad:.3} are allowed")]
     StartsElsewhere {
         /// Joint number, 1 to 7.
         joint: usize,
@@ -62,9 +62,7 @@ pub enum Violation {
         max_m: f64,
     },
     /// Hand, wrist or elbow come too close to the table.
-    #[error(
-        "at {time_secs:.3} s the {part} is {found_mm:.0} mm above the table, at least {min_mm:.0} mm are asked for"
-    )]
+    #[error("at {time_secs:.3} s the {part} is {found_mm:.0} mm above the table, at least {min_mm:.0} mm are required")]
     Table {
         time_secs: f64,
         /// Finger tips, hand, wrist or elbow.
@@ -75,8 +73,8 @@ pub enum Violation {
     },
     /// A hand that came down by contact, lower than the limits allow, does not move straight up.
     #[error(
-        "at {time_secs:.3} s the hand, lower than the limits allow after it came down by contact, is {beside_mm:.1} mm beside the way \
-         straight up and {down_mm:.1} mm lower than before"
+        "at {time_secs:.3} s the hand, lower than the limits allow after it came down by contact, is {beside_mm:.1} \
+         mm beside the vertical path and {down_mm:.1} mm lower than before"
     )]
     Leaving { time_secs: f64, beside_mm: f64, down_mm: f64 },
     /// The arm comes too close to itself.

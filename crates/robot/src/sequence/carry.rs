@@ -91,7 +91,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         }
         let [x, y] = goal.at_m;
         let why = why.unwrap_or_default();
-        Err(Stop::Failed(GraspStep::Carry, format!("no way to \"{}\" at ({x:.2}, {y:.2}) m: {why}", goal.name)))
+        Err(Stop::Failed(GraspStep::Carry, format!("no path to \"{}\" at ({x:.2}, {y:.2}) m: {why}", goal.name)))
     }
 
     /// The path to above one of the aims, and which; else the reason why there is none.
@@ -139,7 +139,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
     fn go_above_place(&mut self, carried: Carried) -> Steps<()> {
         let path: JointPath = match carried {
             Carried::Around(way) => self.travel(way, GraspStep::Carry)?.ok_or_else(|| {
-                Stop::Failed(GraspStep::Carry, "the way around the obstacles has no approach".to_owned())
+                Stop::Failed(GraspStep::Carry, "the path around the obstacles has no approach".to_owned())
             })?,
             Carried::Straight(approach) => {
                 self.move_freely(&approach.pregrasp.q, GraspStep::Carry)?;

@@ -81,7 +81,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         let CheckedLine { share, path, blocked_by } = line;
         Ok(path.ok_or_else(|| {
             let why = blocked_by.unwrap_or_default();
-            format!("{:.0} % of the straight way can be followed: {why}", share * 100.0)
+            format!("{:.0} % of the straight path can be followed: {why}", share * 100.0)
         }))
     }
 
@@ -117,7 +117,7 @@ fn held(closed: &HandState, now: &HandState) -> Result<(), String> {
     }
     if !now.is_grasping {
         let force = now.force_n.map_or_else(String::new, |force_n| format!(" with {force_n:.0} N"));
-        return Err(format!("the fingers are at {now_mm:.1} mm and do not press on the part as told{force}"));
+        return Err(format!("the fingers are at {now_mm:.1} mm and do not press on the part as commanded{force}"));
     }
     Ok(())
 }

@@ -105,7 +105,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         Err(Stop::Failed(
             GraspStep::Detect,
             format!(
-                "the detection is {age_secs:.1} s old when the arm is to move, at most {max_secs:.1} s are allowed"
+                "the detection is {age_secs:.1} s old when the arm should move, at most {max_secs:.1} s are allowed"
             ),
         ))
     }

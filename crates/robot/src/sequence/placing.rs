@@ -1,9 +1,9 @@
 //! Puts the held part down, by contact instead of height, and checks it with a look.
 //!
 //! ```text
-//! held ─> carry ─> straight down, softly at the end, until the place is felt ─> open, up ─> look ─> within the tolerance
-//!           ▲                                                                                └ beside it: take it again,
-//!           └────────────────── aim with where the part was in the hand ◄───────────────────────┘ so many times
+//! held ─> carry ─> straight down, compliant at the end, until contact ─> open, up ─> look ─> within the tolerance
+//!           ▲                                                                        └ outside: take it again,
+//!           └── aim with the part's pose in the hand ◄───────────────────────────────┘ a limited number of times
 //! ```
 //! Fingers do not hold a part along the line across which they close: some parts slide there when the fingers close.
 //! The look measures this offset, and the next placement compensates it.
@@ -159,7 +159,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
             && let Some(other) = self.known.lying.all().iter().find(|other| other.overlaps(&placed))
         {
             let p = other.base_from_part.translation;
-            let why = format!("in \"{}\" lies a part already, at ({:.3}, {:.3}) m", goal.name, p.x, p.y);
+            let why = format!("\"{}\" already contains a part, at ({:.3}, {:.3}) m", goal.name, p.x, p.y);
             return Err(Stop::Failed(GraspStep::Detect, why));
         }
         // After a part was taken from a cell's place, nothing else lies there.
@@ -222,7 +222,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
                 None => found.base_from_tcp.translation.z + goal.surface_m - self.robot.limits().table_height_m,
             };
             self.known.surface_m = self.cell.config.height.map(|_| goal.surface_m);
-            // It was looked at from above, with other parts beside it: the hand opens no wider than for releasing.
+            // The part was seen from above, with other parts next to it: the hand opens no wider than for releasing.
             self.known.opening_margin_m = placing.release_margin_m;
             self.take(&target)?;
         }
@@ -232,7 +232,8 @@ impl<A: Arm> Sequence<'_, '_, A> {
     fn put_down(&mut self, aim: &Aim, placing: &PlacingConfig) -> Steps<()> {
         let touch_down = TouchDown { max_way_m: SOFT_WAY_M + BELOW_M, ..placing.touch_down };
         let Some(touched) = self.touch_down(&touch_down, GraspStep::PutDown)? else {
-            let why = "the arm does not yield, and a place is felt; the part is still held".to_owned();
+            let why =
+                "this arm is not compliant, so it cannot put a part down by contact; the part is still held".to_owned();
             return Err(Stop::Failed(GraspStep::PutDown, why));
         };
         let hand = self.robot.hand()?;

@@ -71,7 +71,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         let why = first_error.unwrap_or_default();
         Err(Stop::Failed(
             GraspStep::Approach,
-            format!("no straight way down to ({:.2}, {:.2}, {:.3}) m: {why}", p.x, p.y, p.z),
+            format!("no straight path down to ({:.2}, {:.2}, {:.3}) m: {why}", p.x, p.y, p.z),
         ))
     }
 
@@ -160,7 +160,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
 }
 
 fn no_approach() -> Stop {
-    Stop::Failed(GraspStep::Approach, "the way around the obstacles has no approach".to_owned())
+    Stop::Failed(GraspStep::Approach, "the path around the obstacles has no approach".to_owned())
 }
 
 /// A pose higher up.

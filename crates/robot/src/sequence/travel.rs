@@ -66,7 +66,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         if clearance.lowest_m < allowed {
             return Err(Stop::Failed(
                 step,
-                format!("the way there passes {:.0} mm over the table", clearance.lowest_m * 1e3),
+                format!("the path there passes {:.0} mm over the table", clearance.lowest_m * 1e3),
             ));
         }
         self.robot.set_contact_sensitivity(ContactSensitivity::Free)?;

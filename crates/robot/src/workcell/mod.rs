@@ -5,16 +5,16 @@
 //!
 //! [robot]
 //! model = "panda"                   # or "fr3"
-//! address = "172.16.0.2"            # may be left out; --robot says it too
+//! address = "172.16.0.2"            # may be left out; --robot sets it too
 //!
 //! [tool]                            # may be left out
 //! fingertip_beyond_tcp_mm = 9.0     # how far the finger tips reach beyond the tcp
 //! grasp_force_n = 40.0
-//! part_mass_kg = 0.2                # told to the controller while the part is held
+//! part_mass_kg = 0.2                # given to the controller while the part is held
 //! part_radius_mm = 60               # the part reaches so far from its grasp: it is kept off the obstacles, too
 //!
 //! [camera]
-//! file = "camera.yaml"              # beside this file; --camera says it too
+//! file = "camera.yaml"              # beside this file; --camera sets it too
 //! mounting = "hand"                 # or "base"
 //!
 //! [table]
@@ -35,14 +35,14 @@
 //! [[obstacle]]                      # any number; motions are planned around them
 //! name = "fixture"
 //! box_mm = [200, 100, 300]          # or cylinder_mm = [diameter, length], along z; capsule_mm = [diameter, length over all];
-//! at_mm = [500, 300, 150]           # or plane_normal = [x, y, z], out of what is solid; its middle, in the base frame
+//! at_mm = [500, 300, 150]           # or plane_normal = [x, y, z], out of the solid; middle in the base frame
 //! rpy_deg = [0, 0, 30]              # roll, pitch, yaw; may be left out
 //!
 //! [[place]]                         # one pose for a part: sdg grasp --place shelf
 //! name = "shelf"
 //! at_mm = [450, 300]                # x, y of the part's grasp, base frame
 //! yaw_deg = 90                      # direction of its marked line; may be left out
-//! height_mm = 0                     # of what it stands on, above the table; may be left out
+//! height_mm = 0                     # of its base, above the table; may be left out
 //!
 //! [[tray]]                          # a grid of cells: sdg grasp --place tray:7; yaw_deg and height_mm as above
 //! name = "tray"

@@ -66,7 +66,7 @@ pub(super) fn places(
             return Err(source.expected(name, "name", "a name without \":\"", format!("\"{}\"", place.name)));
         }
         if read.iter().any(|other| other.name == place.name) {
-            return Err(source.expected(name, "name", "a name of its own", format!("a second \"{}\"", place.name)));
+            return Err(source.expected(name, "name", "a unique name", format!("a second \"{}\"", place.name)));
         }
         room.check(&place).map_err(|why| source.error(at, why))?;
         read.push(place);

@@ -223,7 +223,9 @@ impl Arm for TrajectoryArm {
             }
             GoalEnd::Succeeded | GoalEnd::Aborted => Err(RobotError::Reflex(said.trim_end().to_owned())),
             GoalEnd::Cancelled => Err(RobotError::Stopped(StopReason::Interrupted)),
-            GoalEnd::Unknown => Err(self.lost(format!("{} forgot the motion: was it restarted?", self.motions.name()))),
+            GoalEnd::Unknown => {
+                Err(self.lost(format!("{} no longer knows the motion: was it restarted?", self.motions.name())))
+            }
         }
     }
 
@@ -297,7 +299,7 @@ impl Arm for TrajectoryArm {
             }
             (HandCommand::Move { .. }, GoalEnd::Succeeded) => self.hand(),
             (HandCommand::Move { opening_m: told_m, .. }, GoalEnd::Aborted) => Err(RobotError::Hand(format!(
-                "it was to open to {:.0} mm and stands at {:.0} mm",
+                "the opening should be {:.0} mm, but is {:.0} mm",
                 told_m * 1e3,
                 opening_m * 1e3
             ))),

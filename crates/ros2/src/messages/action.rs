@@ -1,4 +1,5 @@
-//! Actions of control_msgs: FollowJointTrajectory and GripperCommand. What all actions have in common comes from `ros2-client`.
+//! Actions of control_msgs: FollowJointTrajectory and GripperCommand. The part common to all actions comes from
+//! `ros2-client`.
 
 use super::geometry::{Transform, Twist};
 use super::{Header, structure};

@@ -500,7 +500,7 @@ fn check_config(config: &SearchConfig) -> Result<(), ShapeError> {
     let within = |scale: f64| (SCALE_BOUNDS.0..=SCALE_BOUNDS.1).contains(&scale);
     let checks = [
         ("scales", "from 0.5 on", least, within(least)),
-        ("scales", "up to 2, and no less than they begin with", largest, within(largest) && largest >= least),
+        ("scales", "up to 2, and no less than the lower end", largest, within(largest) && largest >= least),
         ("min_agreement", "in [0, 1]", config.min_agreement, (0.0..=1.0).contains(&config.min_agreement)),
         (
             "num_points",

@@ -75,7 +75,7 @@ pub fn pliers() -> Part {
                       riveted pivot; dipped red handles with black inlays",
         pieces: vec![
             Piece { name: "steel", mesh: centred_texture(steel, SPAN), density: STEEL, material: "ground" },
-            // Most of the lower lap stands within the other pieces.
+            // Most of the lower lap is inside the other pieces.
             Piece { name: "lap", mesh: lower_lap.textured_from_above(0.03), density: 0.3 * STEEL, material: "oiled" },
             Piece {
                 name: "rivet",
@@ -158,7 +158,7 @@ fn jaw(cut_radius: f64) -> Vec<Point2<f64>> {
     outline
 }
 
-/// What leads from the joint into the handle at +y, from above, counter-clockwise, cut out by a circle about the pivot.
+/// The piece from the joint into the handle at +y, from above, counter-clockwise, cut out by a circle about the pivot.
 fn tang(cut_radius: f64) -> Vec<Point2<f64>> {
     let mut outline: Vec<_> = [
         (-0.0003, JOINT_HALF_WIDTH),

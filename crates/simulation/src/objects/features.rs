@@ -1,7 +1,7 @@
 //! The features of a part: groups of connected pieces of its meshes that can be moved.
 //!
 //! ```text
-//! meshes ─> pieces ─> what touches what ─> from the largest piece outwards: each piece with all that stands on it
+//! meshes ─> pieces ─> contacts between pieces ─> from the largest piece outwards: each piece with all pieces on it
 //! ```
 
 use nalgebra::{Point3, Vector3};

@@ -11,7 +11,7 @@ pub const OBJECT_FORMAT: u32 = 1;
 /// The widest part that the Panda's hand can take, in metres.
 pub const LARGEST_JAW_WIDTH_M: f64 = HAND_OPENING_MAX_M;
 
-/// `object.json` as it is written.
+/// The content of `object.json`.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Metadata {

@@ -89,7 +89,7 @@ impl TableCameraConfig {
         Ok(())
     }
 
-    /// The part beside it, if one is asked for.
+    /// The part beside it, if one is requested.
     pub(super) fn part_beside(&self, part: &ObjectSpec) -> Result<Option<ObjectSpec>> {
         let Some(beside) = &self.beside else { return Ok(None) };
         let kind = match beside.as_str() {

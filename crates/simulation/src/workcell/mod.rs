@@ -50,7 +50,7 @@ pub struct Workcell {
     pub(crate) hand_command: Option<HandCommand>,
     /// Whether the arm has stopped itself.
     pub(crate) is_in_reflex: bool,
-    /// The load that the controller was told of.
+    /// The load that was given to the controller.
     pub(crate) load: Load,
     /// The vertical force on the hand, and its maximum since the last call, N.
     pub(crate) felt_n: f64,

@@ -76,7 +76,7 @@ pub struct ValidationRecord {
     pub steps_done: usize,
     /// Since the start of the run.
     pub elapsed_secs: f64,
-    /// What the validation measured.
+    /// The validation's measurements.
     pub validation: Validation,
 }
 

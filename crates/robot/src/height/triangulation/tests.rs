@@ -61,7 +61,7 @@ fn pictures_that_tell_no_height_are_refused() {
     assert_eq!(why, "expected two pictures from places at least 80 mm apart sideways, found 0.0 mm");
     assert!(refused(&at(0.5, 0.3), &at(0.579, 0.3)).ends_with("found 79.0 mm"));
     assert!(triangulate(&at(0.46, 0.3), &at(0.541, 0.3), 0.0).is_ok());
-    // A vertical distance of one metre is no sideways distance.
+    // A vertical distance of one metre is not a sideways distance.
     assert!(refused(&at(0.5, 0.3), &at(0.5, 0.9)).contains("at least 80 mm apart"));
     // From afar lines of sight are parallel.
     assert!(refused(&at(0.45, 1.2), &at(0.55, 1.2)).starts_with("expected lines of sight whose slopes differ"));

@@ -114,7 +114,7 @@ fn where_nothing_is_seen_of_the_surface_the_other_direction_is_tried() {
 fn a_picture_that_does_not_show_the_part_is_the_reason() {
     let (report, _, num_sights) = grasped(&config(None), &[true, false], true);
     let GraspOutcome::Failed { step: GraspStep::Detect, why } = report.outcome else { panic!("{report:?}") };
-    assert!(why.ends_with("none was told: the second picture does not show the part"), "{why}");
+    assert!(why.ends_with("none was given: the second picture does not show the part"), "{why}");
     assert_eq!(num_sights, 5);
     let (report, ..) = grasped(&config(None), &[false], true);
     let GraspOutcome::Failed { why, .. } = report.outcome else { panic!("{report:?}") };
@@ -141,7 +141,7 @@ fn a_told_height_is_used_where_there_is_no_other_and_refused_where_it_contradict
 
     let (report, ..) = grasped(&config(told(0.030)), &[], true);
     let GraspOutcome::Failed { step: GraspStep::Detect, why } = report.outcome else { panic!("{report:?}") };
-    assert!(why.starts_with("expected marks at the told height of 30.0 ± 1.0 mm, measured 36.0"), "{why}");
+    assert!(why.starts_with("expected marks at the given height of 30.0 ± 1.0 mm, measured 36.0"), "{why}");
     let (report, ..) = grasped(&config(told(0.0355)), &[], true);
     assert_eq!(report.height.unwrap().settled.unwrap().source, HeightSource::Measured);
 }

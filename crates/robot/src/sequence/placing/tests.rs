@@ -196,7 +196,7 @@ fn a_place_out_of_reach_is_said_before_the_part_is_carried() {
     let far = Place { at_m: [0.9, -0.6], ..tray() };
     let report = run(&mut cell, &config(), &far.goal(1).unwrap(), &PlacingConfig::default());
     let PlacingOutcome::Failed { step: GraspStep::Carry, why } = &report.outcome else { panic!("{report:?}") };
-    assert!(why.contains("no way to \"tray, cell 1\"") && why.contains("out of reach"), "{why}");
+    assert!(why.contains("no path to \"tray, cell 1\"") && why.contains("out of reach"), "{why}");
 }
 
 #[test]

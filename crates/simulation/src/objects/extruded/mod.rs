@@ -1,8 +1,8 @@
 //! A user's own part: its outline in a photo, extruded to its height, with the photo on top.
 //!
 //! ```text
-//! outline ─┬─ slabs between neighbouring corners ─ triangles, textured by the photo ── what is seen
-//!          └─ strips across the marked line ─ boxes ── what is touched, and what it weighs
+//! outline ─┬─ slabs between neighbouring corners ─ triangles, textured by the photo ── appearance
+//!          └─ strips across the marked line ─ boxes ── contacts and mass
 //! ```
 //! Boxes instead of a convex hull, so that the jaws can also close on a waist between two wide ends. Properties that
 //! the photo does not show are assumed: walls are vertical, and the density is uniform.
