@@ -33,7 +33,7 @@ impl Problem<NUM_INTRINSICS> for Bundle<'_> {
                 let weight = if length <= self.robust_px { 1.0 } else { self.robust_px / length };
                 block.add(&residual, &projected.by_intrinsics, &(projected.by_point * by_twist(&p)), weight);
                 if weight < 1.0 {
-                    // Huber's 2 b |r| - b² as the weighted square b |r|.
+                    // Huber's 2 b |r| - b², not the weighted square b |r|.
                     block.cost += self.robust_px * (length - self.robust_px);
                 }
             }
