@@ -92,7 +92,7 @@ const AXES: [&str; 3] = ["x", "y", "z"];
 pub(super) struct Recomposition {
     pub(super) composed: Composition,
     pub(super) meant: Composition,
-    /// The angles' factor: radians that were taken for degrees are larger by 180 / π.
+    /// The angles' factor: radians that were taken for degrees are larger by the factor 180 / π.
     pub(super) unit: f64,
 }
 

@@ -35,7 +35,7 @@ const BESIDE_SINGULAR: [f64; 7] = [0.0000, -0.2081, 0.0000, -0.8449, 0.0000, 1.3
 const SINGULAR: [f64; 7] = [0.0000, -0.1924, 0.0000, -0.8038, 0.0000, 1.3663, std::f64::consts::FRAC_PI_4];
 /// Joints 4 and 6 of an arm in self-collision, rad.
 const FOLDED: (f64, f64) = (-3.0, 0.8);
-/// Distance beyond the pose of the stop to which a motion just inside leads, as a share of the remaining path.
+/// Distance before the pose of the stop at which a motion just inside ends, as a share of the path to the folded pose.
 const FOLD_MARGIN: f64 = 0.02;
 
 /// A kind of check, with a motion on either side of it.
