@@ -1,6 +1,6 @@
 //! With feature `buildtime_bindgen`, regenerates the bindings from the installed headers.
 //!
-//! `MUJOCO_INCLUDE_DIR` names another folder that holds `mujoco/mujoco.h`.
+//! `MUJOCO_INCLUDE_DIR` gives another folder that contains `mujoco/mujoco.h`.
 
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");
@@ -32,7 +32,7 @@ fn generate() {
         .derive_default(false)
         .layout_tests(true)
         .merge_extern_blocks(true)
-        // Our error handler unwinds out of MuJoCo instead of letting it end the process.
+        // Our error handler unwinds out of MuJoCo instead of ending the process.
         .override_abi(bindgen::Abi::CUnwind, ".*")
         .use_core()
         .generate_comments(false)

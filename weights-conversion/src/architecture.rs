@@ -1,7 +1,7 @@
-//! The network to fill: which parameters it has, and of which shapes.
+//! The network to fill: its parameters and their shapes.
 //!
 //! Plain numbers, so that names and shapes are known without building the network (and without burn). The owner of
-//! the detector's configuration translates it; `sdg weights` does, and a test there compares with a built detector.
+//! the detector's configuration converts it, as `sdg weights` does; a test there compares it with a built detector.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use crate::error::{Result, WeightsError};
 
-/// Norm after a convolution, as far as parameters go.
+/// Norm after a convolution, as far as it has parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum Norm {
     /// None: the convolution has a bias.
@@ -32,10 +32,10 @@ pub enum Block {
     },
 }
 
-/// Place of the background among the classes, and whose box deltas there are.
+/// Position of the background among the classes, and the classes with box deltas.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum Background {
-    /// Class 0, with box deltas and a mask of its own that nothing uses: torchvision.
+    /// Class 0, with its own unused box deltas and mask: torchvision.
     First,
     /// Class K, without box deltas: Detectron2.
     Last,
@@ -46,7 +46,7 @@ pub enum Background {
 pub struct Backbone {
     /// Channels after the 7×7 stem.
     pub stem_channels: usize,
-    /// Channels that res2 gives; doubled in each later stage.
+    /// Output channels of res2; doubled in each later stage.
     pub res2_channels: usize,
     /// Blocks in res2, res3, res4, res5.
     pub num_blocks: [usize; 4],
@@ -61,7 +61,7 @@ pub struct Backbone {
 pub struct KeypointHead {
     /// Channels of each 3×3 convolution.
     pub conv_channels: Vec<usize>,
-    /// Keypoints of an object.
+    /// Keypoints per object.
     pub num_keypoints: usize,
 }
 
@@ -72,18 +72,18 @@ pub struct MaskHead {
     pub conv_channels: Vec<usize>,
     /// Channels of the transposed convolution.
     pub deconv_channels: usize,
-    /// Masks a box: one for each class (and the background, where it is first).
+    /// Masks per box: one for each class (and the background, if it comes first).
     pub num_masks: usize,
 }
 
-/// What a detector has beside its backbone.
+/// The parts of a detector besides its backbone.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Heads {
     /// Channels of the pyramid.
     pub fpn_channels: usize,
     /// Norm of the pyramid's convolutions.
     pub fpn_norm: Norm,
-    /// Anchors at each place.
+    /// Anchors per position.
     pub num_anchors: usize,
     /// Side of the box head's pooled square.
     pub box_pooled_size: usize,
@@ -91,7 +91,7 @@ pub struct Heads {
     pub fc_channels: usize,
     /// Object classes, without background.
     pub num_classes: usize,
-    /// Place of the background class.
+    /// Position of the background class.
     pub background: Background,
     /// Box deltas for each class, or one set for all.
     pub class_specific_boxes: bool,
@@ -174,7 +174,7 @@ impl Backbone {
     }
 }
 
-/// `[out, in, kernel]` of a convolution, and what stands behind it.
+/// `[out, in, kernel]` of a convolution, and its norm or bias.
 fn list_conv(parameters: &mut Parameters, name: &str, [out, input, kernel]: [usize; 3], norm: Norm) {
     parameters.insert(format!("{name}.weight"), vec![out, input, kernel, kernel]);
     let behind: &[&str] = match norm {
@@ -226,7 +226,7 @@ impl Heads {
     }
 }
 
-/// A row of 3×3 convolutions; gives the channels of the last one.
+/// A sequence of 3×3 convolutions; returns the channels of the last one.
 fn list_convs(parameters: &mut Parameters, name: &str, mut channels: usize, conv_channels: &[usize]) -> usize {
     for (i, &out_channels) in conv_channels.iter().enumerate() {
         list_conv(parameters, &format!("{name}.{i}"), [out_channels, channels, 3], Norm::None);
@@ -265,7 +265,7 @@ mod tests {
         let count = |test: &dyn Fn(&str) -> bool| -> usize {
             parameters.iter().filter(|(name, _)| test(name)).map(|(_, shape)| shape.iter().product::<usize>()).sum()
         };
-        // 25 557 032 less the classifier's 2 049 000.
+        // 25 557 032 minus the classifier's 2 049 000.
         assert_eq!(count(&|name| !name.contains("running_")), 23_508_032);
         assert_eq!(parameters["backbone.bottom_up.res3.0.shortcut.weight"], [512, 256, 1, 1]);
         assert!(!parameters.contains_key("backbone.bottom_up.res3.1.shortcut.weight"));

@@ -11,7 +11,8 @@ use crate::source::{Source, Span};
 use crate::tensor::StoredTensor;
 use crate::torch::{self, Storages};
 
-/// Where checkpoints keep their state dict, beside optimiser and counters: Detectron2 and torchvision; others; Caffe2.
+/// Keys of the state dict in checkpoints that also contain optimiser and counters: Detectron2 and torchvision; others;
+/// Caffe2.
 const STATE_DICT_KEYS: [&str; 3] = ["model", "state_dict", "blobs"];
 
 /// A file's format, recognised by its content.
@@ -21,17 +22,17 @@ pub enum FileFormat {
     NumpyPickle,
     /// torch since 1.6: a zip archive.
     TorchZip,
-    /// torch before 1.6: pickles and storages in a row.
+    /// torch before 1.6: a sequence of pickles and storages.
     TorchLegacy,
     /// safetensors.
     Safetensors,
 }
 
 impl FileFormat {
-    /// Tells the format by the first bytes.
+    /// Recognises the format by the first bytes.
     ///
     /// # Errors
-    /// Bytes of no format that is read here; the message says what they look like.
+    /// Bytes of no supported format; the message gives their apparent format.
     pub fn detect(source: &mut Source) -> Result<Self> {
         let start = source.read_span(Span { offset: 0, len: source.len().min(512) })?;
         if torch::is_legacy(&start) {
@@ -57,7 +58,7 @@ impl fmt::Display for FileFormat {
     }
 }
 
-/// What bytes are that are no checkpoint, for the error's sake.
+/// The kind of bytes that are not a checkpoint, for the error.
 fn describe(start: &[u8]) -> String {
     let known: [(&[u8], &str); 8] = [
         (b"\x89PNG", "a PNG image"),
@@ -87,22 +88,22 @@ fn describe(start: &[u8]) -> String {
 pub struct Checkpoint {
     /// The file's format.
     pub format: FileFormat,
-    /// Who wrote it, where it says so (`__author__`).
+    /// Its author, if the file gives one (`__author__`).
     pub author: Option<String>,
     /// Metadata of a safetensors file.
     pub metadata: BTreeMap<String, String>,
     /// Tensors of the state dict.
     pub tensors: BTreeMap<String, StoredTensor>,
-    /// Entries of the state dict that are no tensors, such as counters.
+    /// Entries of the state dict that are not tensors, such as counters.
     pub not_tensors: Vec<String>,
 }
 
 impl Checkpoint {
-    /// Reads names, shapes and places of all tensors.
+    /// Reads names, shapes and positions of all tensors.
     ///
     /// # Errors
-    /// A file of another format; one that was cut short or altered; one that asks for code to be run, or for more
-    /// memory than it has bytes.
+    /// A file of another format, a truncated or altered one, one that requests the execution of code, or one that
+    /// requests more memory than it has bytes.
     pub fn read(source: &mut Source) -> Result<Self> {
         let format = FileFormat::detect(source)?;
         let checkpoint = match format {
@@ -110,7 +111,7 @@ impl Checkpoint {
                 let pickle = pickle::load(source, source.whole())?;
                 if pickle.end != source.len() {
                     let found = format!("{} more", source.len() - pickle.end);
-                    return Err(WeightsError::damaged("pickle", "no bytes behind its end", found));
+                    return Err(WeightsError::damaged("pickle", "no bytes after its end", found));
                 }
                 Self::from_pickle(format, &pickle, None)?
             }
@@ -134,7 +135,7 @@ impl Checkpoint {
         Ok(checkpoint)
     }
 
-    /// What a checkpoint without tensors has, and how to get at them.
+    /// The content of a checkpoint without tensors, and the way to get them.
     fn found_instead(&self) -> String {
         const SHOWN: usize = 6;
         if self.not_tensors.is_empty() {
@@ -144,8 +145,9 @@ impl Checkpoint {
             self.not_tensors.iter().take(SHOWN).map(|name| format!("`{}`", printable(name))).collect();
         let more = if self.not_tensors.len() > SHOWN { ", …" } else { "" };
         let what = format!("none, but {}{more}", named.join(", "));
-        // Parameters have a point in their names, and their numbers stand in torch's zip beside this pickle or, written by Python's
-        // own pickle, nowhere. Otherwise training keeps the weights, or their mean over its last steps (`model_ema`), beside other things.
+        // Parameters have a point in their names; their numbers are in torch's zip beside this pickle or, if written by
+        // Python's own pickle, nowhere. Otherwise a training checkpoint contains the weights, or their mean over its
+        // last steps (`model_ema`), together with other data.
         match self.not_tensors.iter().find(|name| name.contains("ema")).or(self.not_tensors.first()) {
             Some(name) if !name.contains('.') => format!(
                 "{what}: write the weights alone, in Python: torch.save(torch.load(\"FILE\", weights_only=False)[\"{}\"], \"NEW.pth\")",
@@ -195,7 +197,7 @@ impl Checkpoint {
         Ok(checkpoint)
     }
 
-    /// Many names for the same bytes would make a small file into a large one; a few layers may well share.
+    /// Many names for the same bytes would make a large result from a small file; a few layers may share.
     fn check_total(&self, file_len: u64) -> Result<()> {
         let bytes = |tensor: &StoredTensor| (tensor.len() as u64).saturating_mul(tensor.element().size() as u64);
         let total = self.tensors.values().map(bytes).fold(0, u64::saturating_add);

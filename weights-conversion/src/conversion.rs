@@ -1,4 +1,4 @@
-//! From a checkpoint's tensors to the network's parameters: what goes where, and a report of every name.
+//! From a checkpoint's tensors to the network's parameters: the assignment, and a report of every name.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -13,19 +13,19 @@ use crate::tensor::StoredTensor;
 /// Shapes and values of parameters by name.
 pub type ParameterValues = BTreeMap<String, (Vec<usize>, Vec<f32>)>;
 
-/// Where the names of a backbone's parameters start.
+/// Prefix of the names of a backbone's parameters.
 const BACKBONE: &str = "backbone.bottom_up.";
 /// Box deltas of a class.
 const DELTAS: usize = 4;
 
-/// Where a parameter's values come from.
+/// The source of a parameter's values.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Origin {
-    /// A tensor, as it is.
+    /// A tensor, unchanged.
     Tensor(StoredTensor),
     /// Rows of a tensor in another order; `None` for a row of zeros.
     Rows(StoredTensor, Vec<Option<usize>>),
-    /// A tensor that the file leaves out because all its values are this one.
+    /// A tensor that the file omits because all its values are this one.
     Constant(f32),
 }
 
@@ -36,7 +36,7 @@ pub(crate) struct Planned {
     pub origin: Origin,
 }
 
-/// What will be written, and what became of every name.
+/// The parameters to be written, and the outcome for every name.
 #[derive(Debug)]
 pub struct Conversion {
     pub(crate) parameters: BTreeMap<String, Planned>,
@@ -44,14 +44,14 @@ pub struct Conversion {
 }
 
 impl Conversion {
-    /// Finds a tensor for every parameter of the network, outside the parts that are to stay as initialised.
+    /// Finds a tensor for every parameter of the network, except the parts that keep their initial values.
     ///
-    /// A part is named by the start of its parameters' names, such as `roi_heads.box_predictor`. The result may be
-    /// incomplete: see [`Self::complete`].
+    /// A part is named by the prefix of its parameters' names, such as `roi_heads.box_predictor`. The result may
+    /// be incomplete: see [`Self::complete`].
     ///
     /// # Errors
-    /// Names of no known scheme; a part to re-initialise that the network has not. A backbone alone where the target is
-    /// a detector is no error: only its part is filled.
+    /// Names of an unknown scheme; a part to re-initialise that the network lacks. A backbone alone for a detector as
+    /// target is not an error: only its part is filled.
     pub fn plan(checkpoint: &Checkpoint, target: &Architecture, reinitialized: &[String]) -> Result<Self> {
         let naming = naming_of(checkpoint)?;
         let mut expected = target.parameters();
@@ -125,15 +125,15 @@ impl Conversion {
         Ok(Self { parameters, report })
     }
 
-    /// What became of every name.
+    /// The outcome for every name.
     pub fn report(&self) -> &Report {
         &self.report
     }
 
-    /// Makes sure that nothing is missing and every shape fits.
+    /// Checks that nothing is missing and every shape fits.
     ///
     /// # Errors
-    /// [`WeightsError::Incomplete`] otherwise; [`Self::report`] lists what is wrong.
+    /// [`WeightsError::Incomplete`] otherwise; [`Self::report`] lists the errors.
     pub fn complete(&self) -> Result<()> {
         let Report { missing, mismatched, .. } = &self.report;
         let first = match (mismatched.first(), missing.first()) {
@@ -147,7 +147,7 @@ impl Conversion {
     /// Reads the parameters instead of writing them: shapes and values by name.
     ///
     /// # Errors
-    /// Where [`Self::complete`] finds one; a checkpoint that ends early.
+    /// The errors of [`Self::complete`]; a truncated checkpoint.
     pub fn values(&self, source: &mut Source) -> Result<ParameterValues> {
         self.complete()?;
         let mut parameters = BTreeMap::new();
@@ -171,7 +171,7 @@ impl Conversion {
 /// The checkpoint's naming scheme.
 ///
 /// # Errors
-/// Names of no known scheme.
+/// Names of an unknown scheme.
 pub fn naming_of(checkpoint: &Checkpoint) -> Result<Naming> {
     let names = checkpoint.tensors.keys().map(|name| strip_wrapper(name));
     Naming::detect(names).ok_or_else(|| WeightsError::UnknownNames {
@@ -180,7 +180,8 @@ pub fn naming_of(checkpoint: &Checkpoint) -> Result<Naming> {
     })
 }
 
-/// Whether a checkpoint holds a backbone and no detector: by its naming scheme or, converted before, by its names.
+/// Whether a checkpoint contains a backbone and no detector: by its naming scheme or, if converted before, by its
+/// names.
 pub fn is_backbone_alone(checkpoint: &Checkpoint, naming: Naming) -> bool {
     let all_in_backbone = || checkpoint.tensors.keys().all(|name| strip_wrapper(name).starts_with(BACKBONE));
     naming.is_backbone_alone() || (naming == Naming::Ours && all_in_backbone())
@@ -193,13 +194,13 @@ fn parts_of(expected: &BTreeMap<String, Vec<usize>>) -> Vec<String> {
     parts.into_iter().collect()
 }
 
-/// Whether a parameter belongs to a part: `roi_heads.box` is no part of `roi_heads.box_head.fc1.weight`.
+/// Whether a parameter belongs to a part: `roi_heads.box` does not contain `roi_heads.box_head.fc1.weight`.
 fn is_part_of(name: &str, part: &str) -> bool {
     let part = part.trim_end_matches('.');
     name.strip_prefix(part).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
 }
 
-/// Caffe2's norms have been folded into scale and shift: their mean is 0 and their variance 1, as Detectron2 reads it.
+/// Caffe2's norms have been folded into scale and shift: their mean is 0 and their variance 1, as in Detectron2.
 fn stands_for_missing(naming: Naming, name: &str) -> Option<f32> {
     let folded = naming == Naming::Caffe2Resnet;
     match name.rsplit_once('.')?.1 {
@@ -209,7 +210,7 @@ fn stands_for_missing(naming: Naming, name: &str) -> Option<f32> {
     }
 }
 
-/// Rows that carry classes go where the target has the class; everything else must have the right shape.
+/// Class rows are moved to the target's position of the class; everything else must have the right shape.
 fn arrange(
     name: &str,
     tensor: &StoredTensor,
@@ -225,10 +226,10 @@ fn arrange(
         return None;
     }
     let layer = name.strip_prefix("roi_heads.").and_then(|layer| layer.rsplit_once('.')).map(|(layer, _)| layer);
-    // The number of rows is checked first: the file says it, and the list of rows takes memory.
+    // The number of rows is checked first, because it comes from the file and the list of rows takes memory.
     let moved = match layer.filter(|_| class_rows) {
         Some("box_predictor.cls_score") if rows == num_rows => move_background(rows, to),
-        // One set of deltas for all classes knows no background.
+        // One set of deltas for all classes has no background.
         Some("box_predictor.bbox_pred") if target.heads.as_ref()?.class_specific_boxes => {
             drop_or_add_background(rows, num_rows, DELTAS, to)?
         }
@@ -247,7 +248,7 @@ fn move_background(rows: usize, to: Background) -> Vec<Option<usize>> {
     }
 }
 
-/// The background's own rows stand in front; nothing reads them, so zeros will do.
+/// The background's own rows come first; they are unused, so that zeros suffice.
 fn drop_or_add_background(
     rows: usize,
     num_rows: usize,
@@ -266,7 +267,7 @@ fn drop_or_add_background(
 }
 
 impl Planned {
-    /// Hands the values over in order, some at a time.
+    /// Passes the values in order, in pieces.
     pub(crate) fn stream(&self, source: &mut Source, mut take: impl FnMut(&[f32]) -> Result<()>) -> Result<()> {
         match &self.origin {
             Origin::Tensor(tensor) => tensor.stream(source, take),

@@ -1,4 +1,4 @@
-//! Element types of checkpoints, and from their bytes to `f32`.
+//! Element types of checkpoints, and the conversion of their bytes to `f32`.
 
 use half::slice::HalfFloatSliceExt;
 use half::{bf16, f16};
@@ -20,7 +20,7 @@ pub enum ElementType {
 }
 
 impl ElementType {
-    /// Bytes of an element.
+    /// Bytes per element.
     pub fn size(self) -> usize {
         match self {
             Self::F64 | Self::I64 => 8,
@@ -35,7 +35,7 @@ impl ElementType {
         matches!(self, Self::F64 | Self::F32 | Self::F16 | Self::Bf16)
     }
 
-    /// The name that is printed and that safetensors uses.
+    /// The printed name, as in safetensors.
     pub fn name(self) -> &'static str {
         match self {
             Self::F64 => "F64",
@@ -51,7 +51,7 @@ impl ElementType {
         }
     }
 
-    /// From the name that safetensors uses.
+    /// From the name in safetensors.
     pub(crate) fn from_name(name: &str) -> Option<Self> {
         let all = [
             Self::F64,

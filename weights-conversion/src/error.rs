@@ -1,22 +1,22 @@
-//! What can be wrong with a checkpoint.
+//! Errors of a checkpoint.
 
 use std::io;
 
-/// Why a checkpoint could not be read or converted. Each message says what was expected and found.
+/// The reason why a checkpoint could not be read or converted. Each message gives the expected and the found value.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum WeightsError {
-    /// The file system refused something.
+    /// The file system refused an operation.
     #[error("cannot {action}: {source}")]
     Io { action: &'static str, source: io::Error },
     /// The new file could not be written.
     #[error(transparent)]
     File(#[from] sdg_files::FileError),
-    /// Bytes of no format that is read here.
+    /// Bytes of no supported format.
     #[error("expected a pickled checkpoint (protocol 2 to 5), a torch checkpoint or a safetensors file, found {found}")]
     NotACheckpoint {
-        /// What the bytes are, as far as can be told.
+        /// The kind of the bytes, as far as it can be determined.
         found: String,
     },
     /// A pickle that asks for a function or class which weights do not need.
@@ -29,30 +29,30 @@ pub enum WeightsError {
         name: String,
         offset: u64,
     },
-    /// A file that was cut short, altered, or written by something unknown.
+    /// A file that was truncated, altered, or written by an unknown program.
     #[error("{part}: expected {expected}, found {found}")]
     Damaged {
         /// The part of the file.
         part: String,
-        /// What ought to be there.
+        /// The expected content.
         expected: String,
         found: String,
     },
-    /// A file that asks for more than any checkpoint needs.
+    /// A file that requires more than any checkpoint needs.
     #[error("{what}: expected at most {most}, found {found}")]
     TooLarge {
-        /// What there is too much of.
+        /// The exceeded quantity.
         what: String,
         most: u64,
         found: u64,
     },
-    /// Names of no naming scheme that is known here.
+    /// Names of an unknown naming scheme.
     #[error(
         "expected names as Detectron2, torchvision or Caffe2 write them, found {count} tensors such as {}",
         .examples.join(", ")
     )]
     UnknownNames { count: usize, examples: Vec<String> },
-    /// An architecture that the names do not tell.
+    /// An architecture that the names do not determine.
     #[error("{part}: expected {expected}, found {found}")]
     Architecture {
         /// The part of the network.
@@ -71,14 +71,14 @@ pub enum WeightsError {
         mismatched: usize,
         first: String,
     },
-    /// A part to re-initialise that the network has not.
+    /// A part to re-initialise that the network lacks.
     #[error("expected a part of the network to re-initialise, such as {}, found \"{found}\"", .known.join(", "))]
     UnknownPart { known: Vec<String>, found: String },
     /// A value that weights cannot have.
     #[error("{name}: expected finite values{limit}, found {found}")]
     Value {
         name: String,
-        /// " up to 65504" where half precision is asked for.
+        /// " up to 65504" if half precision is requested.
         limit: &'static str,
         found: f32,
     },
@@ -97,7 +97,7 @@ impl WeightsError {
 /// Result of the fallible functions of this crate.
 pub type Result<T> = std::result::Result<T, WeightsError>;
 
-/// A name from a file, fit for one line: control characters escaped, cut at 120 characters.
+/// A name from a file, suitable for one line: control characters escaped, truncated to 120 characters.
 pub(crate) fn printable(name: &str) -> String {
     let mut line: String = name.chars().take(120).flat_map(char::escape_debug).collect();
     if name.chars().nth(120).is_some() {

@@ -1,4 +1,4 @@
-//! Weights from elsewhere: Detectron2's and torchvision's checkpoints become this project's files.
+//! Weights from other projects: converts Detectron2's and torchvision's checkpoints to this project's files.
 //!
 //! ```text
 //! file ─ format by content ─┬─ pickle of numpy arrays ─┐
@@ -7,11 +7,12 @@
 //! Checkpoint + Architecture ─ naming scheme ─ Conversion: what goes where, and a Report ─ write ─ safetensors
 //! ```
 //!
-//! Values stay in the file until they are written, so a conversion needs the memory of one layer. Checkpoints are
-//! programs for Python's pickle machine and may be hostile: this crate imitates the few functions that weights
-//! need, refuses every other by name, and checks every size before it takes memory.
+//! Values stay in the file until they are written, so that a conversion needs the memory of one layer.
+//! Checkpoints are programs for Python's pickle machine and may be hostile: this crate emulates the few functions
+//! that weights need, refuses every other by name, and checks every size before it allocates memory.
 //!
-//! Left out: running the network (`sdg weights verify` does), downloads, torch's pre-2017 tar files, compressed zips.
+//! Not included: running the network (`sdg weights verify` does this), downloads, torch's pre-2017 tar files,
+//! compressed zips.
 //!
 //! # Example
 //! ```

@@ -1,13 +1,13 @@
-//! Naming schemes: from the names that others write to this project's.
+//! Naming schemes: converts the names of other projects to this project's.
 //!
-//! Ours are Detectron2's, but for `backbone.fpn.` in front of the pyramid's names and lists that count from 0
-//! (`conv_fcn.0` for `conv_fcn1`).
+//! Our names are Detectron2's, with two differences: the prefix `backbone.fpn.` of the pyramid's names, and
+//! lists that count from 0 (`conv_fcn.0` for `conv_fcn1`).
 
 use std::fmt;
 
 use serde::Serialize;
 
-/// Who named the tensors.
+/// The naming scheme of the tensors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Naming {
@@ -19,26 +19,26 @@ pub enum Naming {
     Detectron2Backbone,
     /// A torchvision detector.
     Torchvision,
-    /// A torchvision classifier, of which the backbone is taken.
+    /// A torchvision classifier, of which the backbone is used.
     TorchvisionResnet,
     /// A Caffe2 classifier, such as the MSRA ResNet-50 that Detectron2 starts from.
     Caffe2Resnet,
 }
 
-/// What stands in front of a name without belonging to it: torch's parallel training puts `module.` there, and this
-/// project's grasp models `network.`.
+/// Prefixes that do not belong to a name: torch's parallel training adds `module.`, this project's grasp models
+/// `network.`.
 pub(crate) fn strip_wrapper(name: &str) -> &str {
     name.strip_prefix("module.").or_else(|| name.strip_prefix("network.")).unwrap_or(name)
 }
 
-/// What becomes of a name.
+/// The meaning of a name.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Renamed {
-    /// A parameter of ours.
+    /// A parameter of this project's network.
     To(String),
     /// Known, and not needed: it follows from the configuration.
     NotNeeded,
-    /// Nothing here has a place for it.
+    /// No parameter of this project's network corresponds to it.
     Unknown,
 }
 
@@ -56,7 +56,7 @@ impl fmt::Display for Naming {
 }
 
 impl Naming {
-    /// Tells the scheme by names that only it has.
+    /// Recognises the scheme by names that only it has.
     pub fn detect<'a>(names: impl Iterator<Item = &'a str> + Clone) -> Option<Self> {
         let any = |test: &dyn Fn(&str) -> bool| names.clone().any(test);
         if any(&|n| n.starts_with("backbone.fpn.fpn_")) {
@@ -78,12 +78,12 @@ impl Naming {
         }
     }
 
-    /// Whether the file holds a backbone and no detector.
+    /// Whether the file contains a backbone and no detector.
     pub fn is_backbone_alone(self) -> bool {
         matches!(self, Self::Detectron2Backbone | Self::TorchvisionResnet | Self::Caffe2Resnet)
     }
 
-    /// Whether class 0 is the background, as torchvision has it, and its box deltas stand in the file.
+    /// Whether class 0 is the background, as in torchvision, and its box deltas are in the file.
     pub fn background_is_first(self) -> bool {
         self == Self::Torchvision
     }
@@ -118,10 +118,10 @@ fn resnet_part(name: &str) -> bool {
     ["stem.", "res2.", "res3.", "res4.", "res5."].iter().any(|part| name.starts_with(part))
 }
 
-/// A number up to the next dot, and what follows the dot.
+/// A number up to the next dot, and the text after the dot.
 fn number_and_rest(text: &str) -> Option<(usize, &str)> {
     let (number, rest) = text.split_once('.')?;
-    // Three digits: more layers than any network has, and no overflow.
+    // Three digits: more layers than any network has, without overflow.
     let valid = number.len() <= 3 && number.bytes().all(|byte| byte.is_ascii_digit());
     Some((number.parse().ok().filter(|_| valid)?, rest))
 }
@@ -233,7 +233,7 @@ fn torchvision_resnet(name: &str) -> Option<String> {
     Some(format!("backbone.bottom_up.res{}.{block}.{inner}", layer + 1))
 }
 
-/// Caffe2 writes `res2_0_branch2a_w` and `res2_0_branch2a_bn_s`; its norms are scale (`s`) and shift (`b`) alone.
+/// Caffe2 writes `res2_0_branch2a_w` and `res2_0_branch2a_bn_s`; its norms have only scale (`s`) and shift (`b`).
 fn caffe2_resnet(name: &str) -> Renamed {
     if name.ends_with("_momentum") || matches!(name, "fc1000_w" | "fc1000_b" | "pred_w" | "pred_b") {
         return Renamed::NotNeeded;

@@ -16,7 +16,7 @@ pub struct Applied {
     pub shape: Vec<usize>,
     /// The checkpoint's name.
     pub from: String,
-    /// Whether rows were moved, because the background stands elsewhere.
+    /// Whether rows were moved because the background has another position.
     pub rows_moved: bool,
 }
 
@@ -33,18 +33,18 @@ pub struct Mismatch {
     pub element: &'static str,
 }
 
-/// What became of every name.
+/// The outcome for every name.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Report {
     /// The file's format.
     pub format: String,
-    /// Who named the tensors.
+    /// The naming scheme of the tensors.
     pub naming: Naming,
     /// Parameters that were filled.
     pub applied: Vec<Applied>,
     /// Parameters that the file implies without storing them, and their value.
     pub filled: Vec<(String, f32)>,
-    /// Parameters that stay as initialised, because they were named.
+    /// Parameters that keep their initial values, because they were named.
     pub reinitialized: Vec<String>,
     /// Parameters without a tensor.
     pub missing: Vec<String>,
@@ -77,7 +77,7 @@ impl Report {
         }
     }
 
-    /// The lines of all names but those that were applied as they are.
+    /// The lines of all names except those that were applied unchanged.
     pub fn exceptions(&self) -> impl fmt::Display {
         Exceptions(self)
     }
@@ -105,7 +105,7 @@ impl fmt::Display for Report {
     }
 }
 
-/// The report without what simply fits.
+/// The report without the names that simply fit.
 struct Exceptions<'a>(&'a Report);
 
 impl fmt::Display for Exceptions<'_> {

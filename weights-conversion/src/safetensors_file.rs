@@ -11,7 +11,7 @@ use crate::error::{Result, WeightsError, printable};
 use crate::source::{Source, Span};
 use crate::tensor::{Encoding, Payload, StoredTensor};
 
-/// A detector's header takes some 50 kB. Parsed, `[0,0,…` takes some ten times its bytes in memory.
+/// Maximum size of a header; a detector's is about 50 kB. Parsed, `[0,0,…` takes about ten times its bytes in memory.
 const MAX_HEADER_BYTES: u64 = 4 << 20;
 
 /// Tensors and metadata by name.
@@ -36,7 +36,7 @@ impl<'de> Deserialize<'de> for Header {
     }
 }
 
-/// Reads entry by entry: serde's own way to mix fixed and free keys would hold the header a second time.
+/// Reads entry by entry: serde's own mix of fixed and free keys would store the header a second time.
 struct HeaderVisitor;
 
 impl<'de> Visitor<'de> for HeaderVisitor {
@@ -63,7 +63,7 @@ fn damaged(part: impl fmt::Display, expected: impl Into<String>, found: impl Int
     WeightsError::damaged(format!("safetensors file, {part}"), expected, found)
 }
 
-/// Whether bytes start as a safetensors file of `len` bytes does.
+/// Whether bytes start like a safetensors file of `len` bytes.
 pub(crate) fn is_safetensors(start: &[u8], len: u64) -> bool {
     match start.split_first_chunk::<8>() {
         Some((header_len, rest)) => rest.first() == Some(&b'{') && u64::from_le_bytes(*header_len) <= len - 8,
@@ -71,10 +71,10 @@ pub(crate) fn is_safetensors(start: &[u8], len: u64) -> bool {
     }
 }
 
-/// Reads the header; the tensors' bytes stay where they are.
+/// Reads the header; the tensors' bytes stay in the file.
 ///
 /// # Errors
-/// A header that is no JSON of that form, or that describes other bytes than the file has.
+/// A header that is not JSON of that form, or that does not match the file's bytes.
 pub(crate) fn read(source: &mut Source) -> Result<Content> {
     let mut header_len = [0; 8];
     source.read_at(0, &mut header_len)?;

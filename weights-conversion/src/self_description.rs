@@ -1,23 +1,24 @@
-//! What the names and shapes in a checkpoint say about its network: number of classes, keypoints, masks; depth of a backbone.
+//! Properties of a network from the names and shapes in a checkpoint: number of classes, keypoints, masks; depth of a
+//! backbone.
 
 use crate::architecture::Backbone;
 use crate::checkpoint::Checkpoint;
 use crate::error::{Result, WeightsError};
 use crate::naming::Naming;
 
-/// The second stage that a detector's checkpoint was made for.
+/// The second stage of a detector's checkpoint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SecondStage {
     /// Object classes, without background.
     pub num_classes: usize,
-    /// Keypoints of an object, where there is a keypoint head.
+    /// Keypoints per object, if there is a keypoint head.
     pub num_keypoints: Option<usize>,
     /// Whether there is a mask head.
     pub has_masks: bool,
 }
 
 impl SecondStage {
-    /// Reads the numbers off the shapes of the last layers.
+    /// Reads the numbers from the shapes of the last layers.
     ///
     /// # Errors
     /// A checkpoint without class scores.
@@ -43,7 +44,7 @@ impl SecondStage {
 }
 
 impl Backbone {
-    /// The ResNet whose blocks a checkpoint holds.
+    /// The ResNet whose blocks a checkpoint contains.
     ///
     /// # Errors
     /// Blocks of no ResNet-18, -34 or -50.
@@ -77,7 +78,7 @@ mod tests {
     use crate::source::Span;
     use crate::tensor::{Encoding, Payload, StoredTensor};
 
-    /// Checkpoints with the names and shapes that torchvision's own models have, and no values.
+    /// Checkpoints with the names and shapes of torchvision's own models, without values.
     fn torchvision_models() -> BTreeMap<String, Checkpoint> {
         let names: BTreeMap<String, BTreeMap<String, Vec<usize>>> =
             serde_json::from_str(include_str!("../tests/fixtures/torchvision_names.json")).unwrap();

@@ -1,4 +1,4 @@
-//! Random access to a checkpoint's bytes without holding them: a tensor is a place in the file until it is written.
+//! Random access to a checkpoint's bytes without loading them: a tensor is a position in the file until it is written.
 
 use std::fs::File;
 use std::io::{Cursor, Read, Seek, SeekFrom};
@@ -16,7 +16,7 @@ pub(crate) struct Span {
 }
 
 impl Span {
-    /// The byte behind the last one; spans are made from places inside a file, so this cannot overflow.
+    /// The byte after the last one; spans come from positions inside a file, so that this cannot overflow.
     pub fn end(self) -> u64 {
         self.offset.saturating_add(self.len)
     }
@@ -75,7 +75,7 @@ impl Source {
         sought.map_err(read)
     }
 
-    /// Reads a stretch, after making sure that the file has it.
+    /// Reads a span, after checking that the file contains it.
     pub(crate) fn read_span(&mut self, span: Span) -> Result<Vec<u8>> {
         self.check(span)?;
         let mut bytes = vec![0; span.len as usize];
@@ -83,7 +83,7 @@ impl Source {
         Ok(bytes)
     }
 
-    /// Hands a stretch over piece by piece, at most `piece` bytes at a time.
+    /// Passes a span piece by piece, at most `piece` bytes at a time.
     pub(crate) fn read_pieces(
         &mut self,
         span: Span,
@@ -117,7 +117,7 @@ impl Source {
 /// Bytes read at once while scanning.
 const WINDOW: usize = 16 << 10;
 
-/// Reads a stretch of the file from front to back, skipping what is large.
+/// Reads a span of the file from front to back, skipping large parts.
 pub(crate) struct Scanner<'a> {
     source: &'a mut Source,
     end: u64,
@@ -132,17 +132,17 @@ impl<'a> Scanner<'a> {
         Ok(Self { source, end: span.end(), position: span.offset, window: Vec::new(), window_at: span.offset })
     }
 
-    /// Where the next byte stands.
+    /// The position of the next byte.
     pub fn position(&self) -> u64 {
         self.position
     }
 
-    /// Bytes that are left.
+    /// Number of remaining bytes.
     pub fn left(&self) -> u64 {
         self.end - self.position
     }
 
-    /// Skips `len` bytes and says where they stand.
+    /// Skips `len` bytes and returns their position.
     pub fn skip(&mut self, len: u64) -> Result<Span> {
         if len > self.left() {
             return Err(self.cut_short(len));
@@ -164,7 +164,7 @@ impl<'a> Scanner<'a> {
         Ok(self.take::<1>()?[0])
     }
 
-    /// Fills `bytes` with what comes next.
+    /// Fills `bytes` with the next bytes.
     pub fn fill(&mut self, bytes: &mut [u8]) -> Result<()> {
         if bytes.len() as u64 > self.left() {
             return Err(self.cut_short(bytes.len() as u64));

@@ -1,4 +1,4 @@
-//! A tensor as it stands in a checkpoint: shape, strides, element type, and where its bytes are.
+//! A tensor in a checkpoint: shape, strides, element type, and the position of its bytes.
 
 use crate::element::ElementType;
 use crate::error::{Result, WeightsError};
@@ -9,16 +9,16 @@ const MAX_AXES: usize = 8;
 /// Bytes decoded at once; a multiple of every element's size.
 const PIECE: usize = 1 << 20;
 
-/// How a tensor's bytes are written.
+/// The encoding of a tensor's bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Encoding {
-    /// As they are.
+    /// Unchanged.
     Raw,
-    /// Each byte as the character of that number, in UTF-8: how Python 3 pickles bytes under protocol 2.
+    /// Each byte as the character of that number, in UTF-8, as Python 3 pickles bytes under protocol 2.
     Latin1,
 }
 
-/// A stretch of the file and how it is written.
+/// A span of the file and its encoding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Payload {
     pub span: Span,
@@ -50,7 +50,7 @@ fn row_major(shape: &[usize]) -> Vec<usize> {
 }
 
 impl StoredTensor {
-    /// A dense tensor, last axis innermost (first where `fortran_order`), that fills its payload.
+    /// A dense tensor, last axis innermost (first if `fortran_order`), that fills its payload.
     pub(crate) fn dense(
         part: &str,
         shape: Vec<usize>,
@@ -61,7 +61,7 @@ impl StoredTensor {
         let bytes = checked_bytes(part, &shape, element)?;
         let fits = match payload.encoding {
             Encoding::Raw => payload.span.len == bytes,
-            // A character takes one byte or two.
+            // A character takes one or two bytes.
             Encoding::Latin1 => (bytes..=2 * bytes).contains(&payload.span.len),
         };
         if !fits {
@@ -94,7 +94,7 @@ impl StoredTensor {
         }
         let count = product(&shape).unwrap_or(0) as u64;
         let size = element.size() as u64;
-        // Elements from the first one of the view to behind its last one.
+        // Elements from the first one of the view to after its last one.
         let extent = if count == 0 {
             Some(0)
         } else {
@@ -107,7 +107,7 @@ impl StoredTensor {
             let found = format!("shape {shape:?}, strides {strides:?}, first element {first_element}");
             return Err(damaged(format!("a view into {} bytes", storage.len), found));
         };
-        // A view that repeats elements claims more than the file holds.
+        // A view that repeats elements would represent more than the file contains.
         if extent > available || count > extent {
             let found = format!("shape {shape:?}, strides {strides:?}");
             return Err(damaged(format!("a view of {available} elements, each at most once"), found));
@@ -148,16 +148,16 @@ impl StoredTensor {
     /// Reads all values, last axis innermost.
     ///
     /// # Errors
-    /// Elements that are no floats and so no weights; bytes that are not there.
+    /// Elements that are not floats and therefore not weights; missing bytes.
     pub fn values(&self, source: &mut Source) -> Result<Vec<f32>> {
         self.check_float()?;
         self.numbers(source)
     }
 
-    /// The same for integers too, such as the classes among a reference's outputs.
+    /// The same also for integers, such as the classes among a reference's outputs.
     ///
     /// # Errors
-    /// Bytes that are not there.
+    /// Missing bytes.
     pub fn numbers(&self, source: &mut Source) -> Result<Vec<f32>> {
         let mut values = Vec::with_capacity(self.len());
         self.stream(source, |piece| {
@@ -167,7 +167,7 @@ impl StoredTensor {
         Ok(values)
     }
 
-    /// Hands the values over in order, last axis innermost, some at a time.
+    /// Passes the values in order, last axis innermost, in pieces.
     pub(crate) fn stream(&self, source: &mut Source, mut take: impl FnMut(&[f32]) -> Result<()>) -> Result<()> {
         if self.is_empty() {
             return Ok(());
@@ -257,7 +257,7 @@ impl StoredTensor {
     }
 }
 
-/// Bytes of a dense tensor, unless the shape is one that no file could hold.
+/// Bytes of a dense tensor, unless no file could contain the shape.
 fn checked_bytes(part: &str, shape: &[usize], element: ElementType) -> Result<u64> {
     if shape.len() > MAX_AXES {
         return Err(WeightsError::TooLarge {
@@ -273,10 +273,10 @@ fn checked_bytes(part: &str, shape: &[usize], element: ElementType) -> Result<u6
     Ok(bytes as u64)
 }
 
-/// From UTF-8 back to the bytes whose characters it spells, across pieces.
+/// From UTF-8 back to the encoded bytes, across pieces.
 #[derive(Debug, Default)]
 struct Latin1Decoder {
-    /// The first byte of a character of two.
+    /// The first byte of a character of two bytes.
     first_half: Option<u8>,
 }
 

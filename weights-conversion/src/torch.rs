@@ -1,4 +1,4 @@
-//! torch checkpoints: a pickle of references, and storages beside it.
+//! torch checkpoints: a pickle of references, and separate storages.
 //!
 //! ```text
 //! zip      NAME/data.pkl   NAME/data/0, 1, …   NAME/byteorder
@@ -13,17 +13,17 @@ use crate::source::{Scanner, Source, Span};
 use crate::tensor::StoredTensor;
 use crate::zip_archive::ZipArchive;
 
-/// How a legacy file starts: a pickle of the number 0x1950a86a20f9469cfc6c.
+/// The start of a legacy file: a pickle of the number 0x1950a86a20f9469cfc6c.
 const LEGACY_START: [u8; 14] = *b"\x80\x02\x8a\x0a\x6c\xfc\x9c\x46\xf9\x20\x6a\xa8\x50\x19";
 /// The only version of the legacy format.
 const LEGACY_VERSION: i64 = 1001;
 
-/// Where each storage stands.
+/// The position of each storage.
 pub(crate) struct Storages {
     spans: HashMap<String, Span>,
 }
 
-/// Whether bytes start as torch's legacy format does.
+/// Whether bytes start like torch's legacy format.
 pub(crate) fn is_legacy(start: &[u8]) -> bool {
     start.starts_with(&LEGACY_START)
 }
@@ -35,7 +35,7 @@ fn damaged(part: &str, expected: impl Into<String>, found: impl Into<String>) ->
 /// Reads the zip format.
 ///
 /// # Errors
-/// An archive or a pickle that was cut short, altered, or asks for what weights do not need.
+/// An archive or a pickle that was truncated or altered, or requires globals that weights do not need.
 pub(crate) fn read_zip(source: &mut Source) -> Result<(Pickle, Storages)> {
     let zip = ZipArchive::read(source)?;
     let pickle_name = zip.only_name_ending_with("/data.pkl")?.to_owned();
@@ -62,10 +62,10 @@ pub(crate) fn read_zip(source: &mut Source) -> Result<(Pickle, Storages)> {
     Ok((pickle, Storages { spans }))
 }
 
-/// Reads the format that `torch.save` wrote before version 1.6.
+/// Reads the format of `torch.save` before version 1.6.
 ///
 /// # Errors
-/// Pickles or storages that were cut short, altered, or ask for what weights do not need.
+/// Pickles or storages that were truncated or altered, or require globals that weights do not need.
 pub(crate) fn read_legacy(source: &mut Source) -> Result<(Pickle, Storages)> {
     let whole = source.whole();
     let rest = |end: u64| Span { offset: end, len: whole.end().saturating_sub(end) };
@@ -111,7 +111,7 @@ fn storages_of(pickle: &Pickle) -> impl Iterator<Item = &StorageRef> {
 }
 
 impl Storages {
-    /// A tensor of the pickle, with its bytes found; `None` where the value is no tensor.
+    /// A tensor of the pickle, with the position of its bytes; `None` if the value is not a tensor.
     pub fn tensor(&self, pickle: &Pickle, value: Value, name: &str) -> Result<Option<StoredTensor>> {
         let Some(Object::Tensor(tensor)) = pickle.arena.object(value) else {
             return Ok(None);

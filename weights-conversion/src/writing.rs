@@ -1,12 +1,12 @@
-//! Writing this project's safetensors: streamed, under a temporary name, there whole or not at all.
+//! Writes this project's safetensors: streamed, under a temporary name, so that the file is complete or absent.
 //!
 //! ```text
 //! metadata   weights_version, source_file, source_sha256, source_format, source_names, licence_note, …
 //! tensors    matrices and kernels f32 or f16; vectors (biases, norms) always f32
 //! ```
 //!
-//! Vectors stay in full precision because they are a thousandth of the file, and a stored variance may lie outside
-//! of half precision's range.
+//! Vectors stay in full precision because they are a thousandth of the file, and a stored variance may be outside
+//! half precision's range.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -27,28 +27,28 @@ use crate::error::{Result, WeightsError, printable};
 use crate::naming::Naming;
 use crate::source::Source;
 
-/// The version of the metadata written here.
+/// The version of the written metadata.
 pub const WEIGHTS_VERSION: &str = "1";
 
 /// Element type of matrices and kernels in the written file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum Precision {
-    /// As exact as the source.
+    /// The source's precision.
     F32,
-    /// Half as large.
+    /// Half the size.
     F16,
 }
 
-/// What was written.
+/// A summary of the written file.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Written {
     /// Size of the new file.
     pub bytes: u64,
-    /// SHA-256 of the checkpoint that it was made from.
+    /// SHA-256 of its source checkpoint.
     pub source_sha256: String,
 }
 
-/// What is known of the licence, by who named the tensors; the file itself says nothing.
+/// Known facts about the licence, by naming scheme; the file itself contains none.
 fn licence_note(naming: Naming) -> &'static str {
     match naming {
         Naming::Detectron2 | Naming::Detectron2Backbone | Naming::Caffe2Resnet => {
@@ -62,11 +62,11 @@ fn licence_note(naming: Naming) -> &'static str {
 }
 
 impl Conversion {
-    /// Writes the parameters to `out`; `extra` joins the metadata. The input is hashed meanwhile.
+    /// Writes the parameters to `out`; `extra` is added to the metadata. The input is hashed at the same time.
     ///
     /// # Errors
-    /// Where [`Self::complete`] finds one; values that are not finite, or too large for the precision; a checkpoint
-    /// that ends early; a folder that cannot be written. Whatever stood at `out` before is then unchanged.
+    /// The errors of [`Self::complete`]; values that are not finite, or too large for the precision; a truncated
+    /// checkpoint; a folder that cannot be written. An existing file `out` is then unchanged.
     pub fn write(
         &self,
         checkpoint: &Checkpoint,
@@ -79,7 +79,7 @@ impl Conversion {
         let [from, out] = paths;
         thread::scope(|scope| {
             let hashing = scope.spawn(|| sha256_of(from));
-            // The header comes first in the file and holds the hash, which comes last: its place is kept.
+            // The header comes first in the file and contains the hash, which is known last: its space is reserved.
             let mut file = AtomicFile::create(out)?;
             let metadata = |sha256: &str| self.metadata(checkpoint, from, sha256, extra);
             let header = self.header(&metadata(&"0".repeat(64)), precision);
@@ -123,7 +123,7 @@ impl Conversion {
         metadata
     }
 
-    /// Parameters in the order of the file: the format wants wider elements in front, so that all are aligned.
+    /// Parameters in the order of the file: the format requires wider elements first, so that all are aligned.
     fn in_file_order(&self, precision: Precision) -> impl Iterator<Item = (&String, &Planned, Precision)> {
         let all = move |wanted| {
             self.parameters.iter().filter_map(move |(name, planned)| {
@@ -189,7 +189,7 @@ fn check_values(name: &str, values: &[f32], stored: Precision) -> Result<()> {
         Precision::F32 => (f32::MAX, ""),
         Precision::F16 => (65519.0, " up to 65504, for half precision"),
     };
-    // False for NaN too. No early end inside a piece: this way the loop is vectorised.
+    // False for NaN too. No early exit inside a piece, so that the loop is vectorised.
     let all_fit = values.iter().fold(true, |fit, value| fit & (value.abs() <= most));
     if all_fit {
         return Ok(());

@@ -1,7 +1,7 @@
-//! The part of the zip format that torch uses: entries stored as they are, with checksums, zip64 included.
+//! The part of the zip format that torch uses: entries without compression, with checksums, including zip64.
 //!
-//! Entries are read in place and never unpacked to disk. A name that would climb out of a folder is refused all the
-//! same: no regular writer makes one.
+//! Entries are read in place and never unpacked to disk. A name that leads out of a folder is still refused: no
+//! regular writer makes one.
 
 use std::collections::BTreeMap;
 
@@ -12,9 +12,9 @@ use crate::source::{Scanner, Source, Span};
 const MAX_ENTRIES: u64 = 100_000;
 /// Bytes of the list of entries; some 100 bytes each.
 const MAX_DIRECTORY_BYTES: u64 = 16 << 20;
-/// The end record and the longest comment behind it.
+/// The end record and the longest comment after it.
 const MAX_END_BYTES: u64 = 22 + 0xffff;
-/// Bytes whose checksum is taken at once.
+/// Bytes per step of a checksum.
 const PIECE: usize = 1 << 20;
 
 const END_RECORD: u32 = 0x0605_4b50;
@@ -77,7 +77,7 @@ impl Fields<'_> {
     }
 }
 
-/// Number of entries and place of the directory.
+/// Number of entries and position of the directory.
 fn find_directory(source: &mut Source) -> Result<(u64, Span)> {
     let tail_len = source.len().min(MAX_END_BYTES);
     let tail_at = source.len() - tail_len;
@@ -95,7 +95,7 @@ fn find_directory(source: &mut Source) -> Result<(u64, Span)> {
         let expected = format!("a comment of {comment_len} bytes at the end");
         return Err(damaged(expected, format!("{} bytes", end.0.len())));
     }
-    // A locator in front of the end record leads to the record with wide fields.
+    // A locator before the end record points to the record with wide fields.
     let locator = at.checked_sub(20).map(|locator_at| Fields(&tail[locator_at..at]));
     if let Some(mut locator) = locator
         && locator.u32()? == END_LOCATOR_64
@@ -115,7 +115,7 @@ fn find_directory(source: &mut Source) -> Result<(u64, Span)> {
     Ok((count, Span { offset, len }))
 }
 
-/// Whether a name stays inside the folder it is unpacked to.
+/// Whether a name stays inside the folder to which it is unpacked.
 fn is_inside(name: &str) -> bool {
     let absolute = name.starts_with('/') || name.contains('\\') || name.contains(':') || name.contains('\0');
     !absolute && name.split('/').all(|part| part != "..")
@@ -125,7 +125,7 @@ impl ZipArchive {
     /// Reads the list of entries.
     ///
     /// # Errors
-    /// An archive that was cut short or altered; names that climb out of a folder; entries that overlap.
+    /// A truncated or altered archive; names that lead out of a folder; entries that overlap.
     pub fn read(source: &mut Source) -> Result<Self> {
         let (count, directory) = find_directory(source)?;
         if count > MAX_ENTRIES || directory.len > MAX_DIRECTORY_BYTES {
@@ -143,7 +143,7 @@ impl ZipArchive {
                 return Err(damaged("each name once", format!("{} twice", printable(&name))));
             }
         }
-        // Entries that overlap are how a small file claims to be a large one.
+        // Overlapping entries would let a small file represent a large one.
         if total > source.len() {
             return Err(damaged(format!("entries of at most {} bytes", source.len()), format!("{total} bytes")));
         }
@@ -160,7 +160,7 @@ impl ZipArchive {
         }
     }
 
-    /// Where an entry's bytes stand, after checking their checksum; `None` where there is no such entry.
+    /// The position of an entry's bytes, after checking their checksum; `None` if there is no such entry.
     pub fn locate(&self, source: &mut Source, name: &str) -> Result<Option<Span>> {
         let Some(entry) = self.entries.get(name) else {
             return Ok(None);
@@ -216,7 +216,7 @@ fn read_entry(fields: &mut Fields) -> Result<(String, Entry)> {
         let (kind, len) = (extra.u16()?, extra.u16()?);
         let mut wide = Fields(extra.bytes(len.into())?);
         if kind == 1 {
-            // Wide fields stand only for those whose narrow one is full, in this order.
+            // Wide fields exist only for narrow ones at their maximum, in this order.
             for field in [&mut unpacked, &mut packed, &mut header_offset] {
                 if *field == u64::from(u32::MAX) {
                     *field = wide.u64()?;

@@ -1,4 +1,4 @@
-//! Whole conversions: Detectron2's own pickles (cut narrower), torchvision's class order, files in and out.
+//! Whole conversions: Detectron2's own pickles (reduced), torchvision's class order, files in and out.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -114,7 +114,7 @@ fn half_precision_rounds_kernels_and_leaves_vectors() {
         let tolerance = |value: f32| if applied.shape.len() < 2 { 0.0 } else { value.abs() / 2048.0 + 3e-8 };
         assert!(exact.iter().zip(&rounded).all(|(e, r)| (e - r).abs() <= tolerance(*e)), "{}", applied.name);
     }
-    // What was converted can be converted again: the names are ours now.
+    // A converted file can be converted again: the names are now ours.
     let again = folder.path().join("again.safetensors");
     let twice = convert(&out, &narrow_keypoint(), &again, Precision::F16);
     assert_eq!(twice.metadata["source_names"], "this project");
@@ -157,7 +157,7 @@ fn what_the_file_lacks_is_missing() {
     let (_, _, conversion) = planned(&fixture("detectron2_keypoint.pkl"), &target, &[]);
     assert_eq!(conversion.report().missing.len(), 12);
     assert!(conversion.report().to_string().contains("missing     roi_heads.mask_head.deconv.bias\n"));
-    // The other way round: a head that nobody asked for is left over, which is no error.
+    // The reverse: an unused head remains, which is not an error.
     let (_, _, conversion) = planned(&fixture("detectron2_keypoint.pkl"), &narrow(1), &[]);
     assert_eq!(conversion.report().unused.len(), 18);
     conversion.complete().unwrap();
@@ -181,7 +181,7 @@ fn write_tensors(path: &Path, tensors: &BTreeMap<String, (Vec<usize>, Vec<f32>)>
 fn torchvision_s_background_moves_behind_the_classes() {
     let folder = tempfile::tempdir().unwrap();
     let [from, out] = ["torchvision.safetensors", "out.safetensors"].map(|name| folder.path().join(name));
-    // Two classes and the background: rows of the predictors say which class they are for.
+    // Two classes and the background: rows of the predictors contain their class.
     let classes = |rows_a_class: usize, width: usize| -> (Vec<usize>, Vec<f32>) {
         let rows = 3 * rows_a_class;
         let values = (0..rows * width).map(|i| (i / width / rows_a_class) as f32).collect();

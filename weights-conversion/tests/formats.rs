@@ -1,4 +1,4 @@
-//! The same arrays as every writer wrote them. The files come from `fixtures/make_fixtures.py`.
+//! The same arrays from every writer. The files come from `fixtures/make_fixtures.py`.
 
 use std::path::{Path, PathBuf};
 

@@ -1,4 +1,4 @@
-//! Files made to do harm: each ends in an error that says why.
+//! Malicious files: each ends in an error with the reason.
 
 use std::fs;
 use std::path::Path;
@@ -46,7 +46,7 @@ fn code_is_refused_by_name_wherever_it_stands() {
             assert_refused("legacy", legacy(&pickle, &[]), &["refused", &full_name]);
         }
     }
-    // Other ways to call: instances by class name, extension codes, buffers from outside, persistent ids as text.
+    // Other kinds of calls: instances by class name, extension codes, external buffers, persistent ids as text.
     for operation in [&b"(iposix\nsystem\n"[..], b"(cnumpy\ndtype\no", b"\x82\x01", b"\x97", b"Pid\n", b"I1\n", b"\x92"]
     {
         assert_refused("operation", dict_with("weight", operation), &["an operation that weights need"]);
@@ -100,7 +100,7 @@ fn what_training_saves_names_the_way_out() {
 
 #[test]
 fn nesting_and_loops_end() {
-    // A hundred thousand lists in each other: nothing here recurses.
+    // A hundred thousand nested lists: no function here is recursive.
     let deep = cat(&[b"\x80\x02", &[b']'; 100_000], &[b'a'; 99_999], b"."]);
     assert_refused("deep", deep, &["a dict of names"]);
     let deeper = cat(&[b"\x80\x02", &[b'('; 1_000_000], &[b't'; 1_000_000], b"."]);
@@ -110,7 +110,7 @@ fn nesting_and_loops_end() {
     assert_refused("own model", own_model, &["tensors by name", "none"]);
     let own_shape = b"cnumpy.core.multiarray\n_reconstruct\ncnumpy\nndarray\nK\x00\x85C\x01b\x87R(K\x01]q\x00h\x00ah\x00\x89h\x00tb";
     assert_refused("own shape", dict_with("w", own_shape), &["sizes", "a tuple or list"]);
-    // A long list of which a dict is made again and again; five times, so that letting it pass costs no memory either.
+    // A long list from which a dict is made repeatedly; five times, so that even accepting it would cost no memory.
     let pair = cat(&[&text("k"), b"N\x86q\x01"]);
     let list = cat(&[&pair, b"]q\x00(", &b"h\x01".repeat(100_000), b"e"]);
     let copies = b"ccollections\nOrderedDict\nh\x00\x85R".repeat(5);
@@ -127,7 +127,7 @@ fn broken_stacks_end_in_errors() {
     }
     assert_refused("odd", b"\x80\x02}(NNNu.", &["keys and values in turn"]);
     assert_refused("call", b"\x80\x02NN\x85R.", &["a class or function to call"]);
-    assert_refused("behind the end", cat(&[&fixture("arrays_protocol2.pkl"), b"x"]), &["no bytes behind its end"]);
+    assert_refused("behind the end", cat(&[&fixture("arrays_protocol2.pkl"), b"x"]), &["no bytes after its end"]);
 }
 
 #[test]
@@ -142,7 +142,7 @@ fn every_file_cut_anywhere_is_an_error() {
 
 #[test]
 fn a_flipped_bit_in_a_torch_zip_is_noticed() {
-    // Entries carry a checksum; what stands between them (padding, dates) says nothing of the weights.
+    // Entries have a checksum; the bytes between them (padding, dates) do not affect the weights.
     let whole = fixture("tensors_zip.pth");
     let pickle_at = whole.windows(3).position(|bytes| bytes == b"\x80\x02}").unwrap();
     let pickle_end = pickle_at + whole[pickle_at..].windows(4).position(|bytes| bytes == b"PK\x07\x08").unwrap();

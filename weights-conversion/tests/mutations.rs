@@ -1,7 +1,8 @@
-//! Mutated files: no panic, no hang, no memory above twice the file's size plus 100 MB.
+//! Mutated files: no panic, no hang, no memory use above twice the file's size plus 100 MB.
 //!
 //! A short run is part of the tests; `SDG_MUTATIONS=1000000 cargo test --release -p sdg-weights-conversion --test
-//! mutations -- --nocapture` makes a long one, and `SDG_FIRST_MUTATION` says where it goes on. This binary has one test, because it counts the memory of the whole process.
+//! mutations -- --nocapture` makes a long one, and `SDG_FIRST_MUTATION` sets its start. This binary has one test,
+//! because it counts the memory of the whole process.
 #![allow(clippy::unwrap_used)]
 
 mod forged;
@@ -20,18 +21,18 @@ use sdg_weights_conversion::{Architecture, Checkpoint, Conversion, Source};
 #[global_allocator]
 static ALLOCATOR: PeakAlloc = PeakAlloc;
 
-/// Of the short run; some two seconds.
+/// Of the short run; about two seconds.
 const MUTATIONS: u64 = 5_000;
-/// Beyond twice the file.
+/// In addition to twice the file.
 const MAX_EXTRA_BYTES: usize = 100_000_000;
-/// A thousand times what the slowest file takes, for machines that do other things meanwhile.
+/// A thousand times the time of the slowest file, for machines under load.
 const MAX_TIME: Duration = Duration::from_secs(30);
 
-/// A file to start from.
+/// A file before mutation.
 struct Seed {
     name: &'static str,
     bytes: Vec<u8>,
-    /// The part that a mutation may hit: the pickle of a zip, whose checksum is then made right again.
+    /// The range of a mutation: the pickle of a zip, whose checksum is then corrected.
     in_zip: Option<Vec<u8>>,
 }
 
@@ -68,7 +69,7 @@ fn seeds() -> Vec<Seed> {
     ]
 }
 
-/// Bytes that mean something: ends of number ranges, operations of pickles.
+/// Bytes with a meaning: ends of number ranges, operations of pickles.
 const TELLING_BYTES: &[u8] =
     b"\x00\x01\x7f\x80\xff\x85\x86\x87\x8a\x8b\x8c\x8d\x8e\x93\x94\x95\x96.()}]NRbdcehjqrstuaXBCGJKMQ\"[{:,0129-";
 
@@ -106,7 +107,7 @@ fn mutate(bytes: &mut Vec<u8>, other: &[u8], rng: &mut Pcg64Mcg) {
     }
 }
 
-/// Everything that a conversion does short of the disk; true where the file is accepted.
+/// A conversion without writing to the disk; true if the file is accepted.
 fn digest(file: Vec<u8>, target: &Architecture) -> bool {
     let mut source = Source::from_bytes(file);
     let Ok(checkpoint) = Checkpoint::read(&mut source) else {
@@ -159,12 +160,12 @@ fn a_mutated_file_is_an_error_or_a_checkpoint_and_nothing_else() {
         (max_extra, slowest) = (max_extra.max(extra), slowest.max(elapsed));
     }
     println!("{count} files: {accepted} accepted, at most {max_extra} bytes beyond twice a file, slowest {slowest:?}");
-    // Mutations that never got past the first bytes would test nothing.
+    // Mutations that always fail at the first bytes would test nothing.
     assert!(accepted > count / 20 && accepted < count, "{accepted} of {count}");
     the_costliest_operations_stay_within_bounds(&target);
 }
 
-/// Files of one operation again and again: each operation adds what it can.
+/// Files that repeat one operation: each operation adds as much as it can.
 fn the_costliest_operations_stay_within_bounds(target: &Architecture) {
     let operations: [&[u8]; 9] =
         [b"]", b"}", b"N", b"(", b"\x8c\x00", b"\x8c\x01x\x94", b"K\x01\x85", b"N\x94", b"C\x00\x94"];

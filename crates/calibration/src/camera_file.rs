@@ -1,4 +1,4 @@
-//! The camera's file: `camera_info` as ROS's `camera_calibration` writes it, and beside it where the camera is.
+//! The camera's file: `camera_info` in the form of ROS's `camera_calibration`, with the camera's pose.
 //!
 //! ```yaml
 //! image_width: 640
@@ -25,18 +25,18 @@ use serde::{Deserialize, Serialize};
 use crate::camera_sections::merged;
 use crate::error::CameraFileError;
 
-/// Frame that a pose is given in.
+/// Frame of a pose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Frame {
-    /// On the table, `z` up: where a printed sheet lay.
+    /// On the table, `z` up: the frame of a printed sheet.
     Table,
     /// The robot's base frame.
     Base,
 }
 
 impl Frame {
-    /// The name, as files have it.
+    /// The name in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Table => "table",
@@ -52,34 +52,35 @@ pub struct CalibratedCamera {
     pub name: String,
     /// Size, focal length, lens.
     pub intrinsics: PinholeCamera,
-    /// Where it is; `None` in a file of intrinsics alone.
+    /// Its pose; `None` in a file of intrinsics only.
     pub table: Option<TablePose>,
-    /// From the optical frame to the robot's flange, in metres, of a camera on the hand.
+    /// For a camera on the hand: from the optical frame to the robot's flange, in metres.
     pub flange_from_camera: Option<Isometry3<f64>>,
 }
 
 /// A camera's pose, and the table under it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TablePose {
-    /// What `frame_from_camera` leads to.
+    /// The target frame of `frame_from_camera`.
     pub frame: Frame,
     /// The table's z in the frame.
     pub height_m: f64,
     /// From the optical frame (x right, y down, z forward) to the frame, in metres.
     pub frame_from_camera: Isometry3<f64>,
-    /// Where parts may lie; all that the camera sees where `None`.
+    /// Where parts may lie; `None` for everything that the camera sees.
     pub workspace: Option<Workspace>,
 }
 
-/// Metres over the table. Chosen by hand: no grasp was ever taught from farther, and a height in millimetres lies beyond.
+/// Range of the height over the table, metres. Chosen by hand: no grasp was ever taught from a greater distance, and
+/// heights in millimetres are larger.
 const HEIGHTS_M: [f64; 2] = [0.05, 20.0];
-/// How far camera and workspace may be from the frame's origin along the table, metres: no arm stands in a larger hall, and places in
-/// millimetres lie beyond.
+/// Largest distance of camera and workspace from the frame's origin along the table, metres: no hall with an arm is
+/// larger, and positions in millimetres are larger.
 const MAX_ASIDE_M: f64 = 50.0;
-/// How far a quaternion may be from length 1: files round.
+/// Tolerance of a quaternion's length, for rounding in files.
 const MAX_QUATERNION_ERROR: f64 = 1e-3;
 
-/// What we write, in this order.
+/// The written sections, in this order.
 const SECTIONS: [&str; 10] = [
     "image_width",
     "image_height",
@@ -92,7 +93,7 @@ const SECTIONS: [&str; 10] = [
     "table",
     "hand_eye",
 ];
-/// No arm carries its camera farther from the flange, metres.
+/// Largest distance of a camera from the flange, metres.
 const MAX_ON_HAND_M: f64 = 2.0;
 
 #[derive(Deserialize)]
@@ -101,7 +102,7 @@ struct File {
     image_height: u32,
     #[serde(default)]
     camera_name: String,
-    /// Kalibr's and others' name of the projection.
+    /// Key of the projection in files of Kalibr and others.
     #[serde(default)]
     camera_model: Option<String>,
     #[serde(default)]
@@ -162,10 +163,10 @@ impl CalibratedCamera {
     /// Reads a camera's file.
     ///
     /// # Errors
-    /// Anything but a `camera_info` of a `plumb_bob` lens, and a pose that no camera over a table has.
+    /// Anything but a `camera_info` of a `plumb_bob` lens, and a pose that is impossible for a camera over a table.
     pub fn from_yaml(text: &str) -> Result<Self, CameraFileError> {
         let file: File = serde_saphyr::from_str(text).map_err(|error| {
-            // The lines below it show the place in the file once more.
+            // The lines after it repeat the position in the file.
             let message = error.to_string();
             let first = message.lines().next().unwrap_or_default();
             CameraFileError::Unreadable { found: first.trim_start_matches("error: ").to_owned() }
@@ -178,15 +179,15 @@ impl CalibratedCamera {
         })
     }
 
-    /// The file, which [`Self::from_yaml`] reads to the same values.
+    /// The file; [`Self::from_yaml`] reads the same values from it.
     pub fn to_yaml(&self) -> String {
         self.sections().into_iter().map(|(_, section)| section).collect()
     }
 
-    /// An existing file with this camera's values: what other programs keep in it, and comments, stay.
+    /// An existing file with this camera's values: data of other programs and comments are kept.
     ///
     /// # Errors
-    /// [`CameraFileError::NotUpdatable`] where the file is not laid out line by line.
+    /// [`CameraFileError::NotUpdatable`] if the file does not have one field per line.
     pub fn update_yaml(&self, existing: &str) -> Result<String, CameraFileError> {
         let updated = merged(existing, &SECTIONS, &self.sections());
         match Self::from_yaml(&updated) {
@@ -195,7 +196,7 @@ impl CalibratedCamera {
         }
     }
 
-    /// Whether both are the same but for the last digits of a quaternion, which is made one again when it is read.
+    /// Whether both are equal except for the last digits of a quaternion, which is normalised on reading.
     fn is_near(&self, other: &Self) -> bool {
         let poses =
             |camera: &Self| [camera.table.as_ref().map(|table| table.frame_from_camera), camera.flange_from_camera];
@@ -232,19 +233,19 @@ impl CalibratedCamera {
         SECTIONS.into_iter().zip(texts).filter_map(|(name, text)| Some((name, text?))).collect()
     }
 
-    /// The camera in its frame, and where the table is.
+    /// The camera in its frame, and the height of the table.
     ///
     /// # Errors
-    /// [`CameraFileError::NoPose`] where that was not measured.
+    /// [`CameraFileError::NoPose`] if that was not measured.
     pub fn posed(&self) -> Result<(PosedCamera, &TablePose), CameraFileError> {
         let table = self.table.as_ref().ok_or(CameraFileError::NoPose)?;
         Ok((PosedCamera { intrinsics: self.intrinsics, world_from_camera: table.frame_from_camera }, table))
     }
 
-    /// Whether a picture can be this camera's.
+    /// Whether a picture can be from this camera.
     ///
     /// # Errors
-    /// [`CameraFileError::OtherSize`] where it has other dimensions.
+    /// [`CameraFileError::OtherSize`] if it has other dimensions.
     pub fn check_picture(&self, (found_width, found_height): (u32, u32)) -> Result<(), CameraFileError> {
         let PinholeCamera { width, height, .. } = self.intrinsics;
         if (width, height) == (found_width, found_height) {
@@ -254,12 +255,12 @@ impl CalibratedCamera {
     }
 }
 
-/// Names of what is read, in lines other than `distortion_model`.
+/// Values that are accepted in lines other than `distortion_model`.
 const PINHOLE_NAMES: [&str; 6] = ["pinhole", "perspective", "plumb_bob", "radtan", "brown", "opencv"];
-/// Places along each side of the picture at which the lens is tried.
+/// Number of points along each side of the picture at which the lens is checked.
 const TRIED_A_SIDE: u32 = 16;
 
-/// Refuses what says in another line than `distortion_model` that it is no pinhole camera.
+/// Refuses a file that names a non-pinhole camera in another line than `distortion_model`.
 fn check_model(file: &File) -> Result<(), CameraFileError> {
     let other = |key, found: &dyn std::fmt::Display| Err(CameraFileError::OtherModel { key, found: found.to_string() });
     let named = [
@@ -279,7 +280,7 @@ fn check_model(file: &File) -> Result<(), CameraFileError> {
     }
 }
 
-/// Refuses a lens that shows one place at two pixels of the picture, or none at one.
+/// Refuses a lens that shows one point at two pixels of the picture, or no point at a pixel.
 fn check_does_not_fold(camera: &PinholeCamera) -> Result<(), CameraFileError> {
     let [width, height] = [camera.width, camera.height].map(f64::from);
     let border = (0..=TRIED_A_SIDE).map(|step| f64::from(step) / f64::from(TRIED_A_SIDE)).flat_map(|share| {
@@ -498,7 +499,7 @@ table:
                 CameraFileError::Coefficients { .. }
             ));
         }
-        // A barrel so strong that the radius shrinks again before the corner; p1 that folds a border.
+        // A barrel distortion so strong that the radius decreases again before the corner; p1 that folds a border.
         for coefficients in ["[-1.5, 0, 0, 0, 0]", "[0, 0, 2.5, 0, 0]"] {
             let data = OF_ROS.split("data: ").nth(2).unwrap().lines().next().unwrap();
             let error = with(data, coefficients);

@@ -1,9 +1,9 @@
-//! Changes in a camera's file that leave the rest as it is: comments, and fields of other programs.
+//! Changes a camera's file without changing the rest of it: comments, and fields of other programs.
 //!
-//! A section is a line that begins with its name and the indented lines below it, as every tool writes `camera_info`.
+//! A section is a line that starts with its name, and the indented lines after it, as every tool writes `camera_info`.
 
-/// `existing` with each of the `known` sections replaced by that of the same name in `sections`, or removed where there is none; those that it
-/// lacks stand at its end.
+/// `existing` with each of the `known` sections replaced by that of the same name in `sections`, or removed if there is
+/// none; missing ones are added at the end.
 pub(crate) fn merged(existing: &str, known: &[&str], sections: &[(&str, String)]) -> String {
     let mut text = String::new();
     let mut written: Vec<&str> = Vec::new();

@@ -1,11 +1,11 @@
-//! What can be wrong with a camera file.
+//! Errors of a camera file.
 
-/// Why a camera file cannot be used.
+/// The reason why a camera file cannot be used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum CameraFileError {
-    /// Not YAML, or not with the names that ROS gives.
+    /// Not YAML, or not with ROS's names.
     #[error("expected a camera file as ROS's camera_calibration writes it, found: {found}")]
     Unreadable { found: String },
     /// A lens model other than `plumb_bob`.
@@ -15,10 +15,10 @@ pub enum CameraFileError {
     )]
     Lens {
         found: String,
-        /// How many coefficients it has.
+        /// Number of its coefficients.
         coefficients: usize,
     },
-    /// Another line of the file that names a lens of another kind than `distortion_model` says.
+    /// Another line of the file that names a lens of another kind than `distortion_model`.
     #[error(
         "expected a pinhole camera with distortion_model plumb_bob, found {key}: {found}; calibrate again with that model (in OpenCV: not as \
          fisheye)"
@@ -27,13 +27,13 @@ pub enum CameraFileError {
     /// NaN or an infinity.
     #[error("expected finite distortion_coefficients, found {found:?}")]
     Coefficients { found: Vec<f64> },
-    /// A polynomial that turns back within the picture: two places of the world would be one pixel.
+    /// A polynomial that turns back within the picture: two points of the world would have one pixel.
     #[error(
         "expected distortion_coefficients under which every pixel shows one place, found {found:?}, which fold the picture at ({x:.0}, {y:.0}); \
          calibrate again with the board held into the corners, too"
     )]
     Folds { found: Vec<f64>, x: f64, y: f64 },
-    /// A camera matrix that is none.
+    /// An invalid camera matrix.
     #[error(
         "expected a camera matrix [fx, 0, cx, 0, fy, cy, 0, 0, 1] with a positive focal length and its centre in the picture, \
          found {found:?} for {width} × {height} pixels"
@@ -44,13 +44,13 @@ pub enum CameraFileError {
         width: u32,
         height: u32,
     },
-    /// A pose that is no rigid transform.
+    /// A pose that is not a rigid transform.
     #[error("expected {name} to be {expected}, found {found:?}")]
     Pose { name: String, expected: &'static str, found: Vec<f64> },
-    /// The file has intrinsics alone.
+    /// The file has only intrinsics.
     #[error("expected the camera's pose over the table (`table:`), found none; `sdg camera table` measures it")]
     NoPose,
-    /// A camera that hangs where none does.
+    /// A camera at an impossible height.
     #[error("expected the camera 0.05 to 20 m above the table, found {height:.2} m{hint}")]
     Height { height: f64, hint: &'static str },
     /// A picture of another camera.
@@ -65,7 +65,7 @@ pub enum CameraFileError {
         found_width: u32,
         found_height: u32,
     },
-    /// An existing file that is not laid out as ROS's tools do.
+    /// An existing file without ROS's layout.
     #[error(
         "expected the existing camera file to have each field on lines of its own, as ROS's camera_calibration writes it; write another file"
     )]
@@ -75,18 +75,18 @@ pub enum CameraFileError {
     Workspace { x: [f64; 2], y: [f64; 2] },
 }
 
-/// Why a board, a calibration or a pose cannot be had.
+/// The reason why a board, a calibration or a pose cannot be computed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum CalibrationError {
-    /// A number of squares that no board of ours has.
+    /// A number of squares outside the supported range.
     #[error("expected {least} to {most} squares along each side of the board, found {columns} x {rows}")]
     BoardSize { columns: u32, rows: u32, least: u32, most: u32 },
-    /// Squares of a size that none have.
+    /// A size of squares outside the supported range.
     #[error("expected squares of 0.5 to 500 mm, found {} mm", 1000.0 * .found_m)]
     SquareSize { found_m: f64 },
-    /// A ruler's reading that no printer gives.
+    /// An impossible reading of the ruler.
     #[error(
         "expected the printed 100 mm line to measure 90 to 110 mm, found {measured_mm} mm: measure the line below the board, in millimetres"
     )]
@@ -97,7 +97,7 @@ pub enum CalibrationError {
     )]
     Paper { paper: &'static str, columns: u32, rows: u32, square_mm: f64, fits_mm: f64 },
     /// A file that `sdg camera board` did not write.
-    #[error("expected a board as `sdg camera board` writes it, found a file that does not tell its squares")]
+    #[error("expected a board as `sdg camera board` writes it, found a file without the size of its squares")]
     NoBoardFile,
     /// No grid of corners in the picture.
     #[error(
@@ -112,13 +112,14 @@ pub enum CalibrationError {
         /// Its extent along the other.
         rows: usize,
     },
-    /// A grid of corners of which it is not known which they are.
+    /// A grid of corners whose placement on the board is unknown.
     #[error(
-        "expected enough of the board to know which of its squares are seen, found {corners} corners and no place on the board that its dots \
-         agree with: show more of it, or print it with `sdg camera board`; a checkerboard without dots must be seen whole"
+        "expected enough of the board to identify the visible squares, found {corners} corners and no place on the \
+         board that matches its dots: show more of it, or print it with `sdg camera board`; a checkerboard without \
+         dots must be seen whole"
     )]
     BoardUnclear { corners: usize },
-    /// A checkerboard without dots that has other squares, or is not seen whole.
+    /// A checkerboard without dots that has other squares, or is not completely visible.
     #[error(
         "expected a checkerboard of {columns} x {rows} squares, found one of {found_columns} x {found_rows}: it has other \
          squares, or is not seen whole"
@@ -139,16 +140,17 @@ pub enum CalibrationError {
     /// Fewer pictures than a calibration needs.
     #[error("expected at least {least} pictures that show the board, found {found}{}", .hint)]
     TooFewPictures {
-        /// The smallest number that suffices.
+        /// The smallest sufficient number.
         least: usize,
         found: usize,
-        /// What else to know, or empty.
+        /// A further hint, or empty.
         hint: &'static str,
     },
-    /// Pictures that leave the focal length open.
+    /// Pictures that do not determine the focal length.
     #[error(
-        "expected pictures that show the board tilted in several directions, found {found}: their poses are alike and leave the focal \
-         length open{}; tilt the board by 20 to 40 degrees to the left, to the right, upwards and downwards", .hint
+        "expected pictures that show the board tilted in several directions, found {found}: their poses are similar \
+         and do not determine the focal length{}; tilt the board by 20 to 40 degrees to the left, to the right, \
+         upwards and downwards", .hint
     )]
     PosesAlike {
         found: String,
@@ -171,49 +173,50 @@ pub enum CalibrationError {
     /// Robot poses that cannot be read.
     #[error("expected robot poses as documented in docs/calibration.md, found: {found}")]
     PosesUnreadable { found: String },
-    /// A robot pose that is no rigid transform.
+    /// A robot pose that is not a rigid transform.
     #[error("expected base_from_flange.{name} of {picture} to be {expected}, found {found:?}")]
     RobotPose { picture: String, name: &'static str, expected: &'static str, found: Vec<f64> },
-    /// Robot poses that leave the transform open.
+    /// Robot poses that do not determine the transform.
     #[error(
         "expected robot poses that turn the flange about two axes, found {found}: add poses turned by 20 to 40 degrees about {missing}"
     )]
     TurnsAlike { found: String, missing: String },
-    /// Robot poses and pictures that do not belong together.
+    /// Robot poses and pictures that do not match.
     #[error("expected robot poses and pictures that agree, found {found}{hint}")]
     HandEyeDisagrees {
-        /// How far they are apart.
+        /// Their difference.
         found: String,
         hint: String,
-        /// Whether the hint is that the camera is mounted at the other place than told.
+        /// Whether the hint is that the camera is mounted at the other place than given.
         is_other_mount: bool,
     },
-    /// One or two robot poses that do not belong to their pictures, among others that agree.
+    /// One or two robot poses that do not match their pictures, among others that do.
     #[error(
         "expected robot poses and pictures that agree, found {found}: {}", wrong_poses(.names, *.are_exchanged, *.left_px)
     )]
     WrongPoses {
-        /// How far all are apart.
+        /// The difference of all.
         found: String,
-        /// Places of the pictures among those given, from 0.
+        /// Indices of the pictures among the given ones, from 0.
         pictures: Vec<usize>,
         /// The pictures' names, in the same order: their numbers from 1 before [`Self::with_picture_names`].
         names: Vec<String>,
-        /// Whether each of two has the pose of the other.
+        /// Whether each of two has the other's pose.
         are_exchanged: bool,
-        /// Reprojection without them, or with both exchanged.
+        /// Reprojection error without them, or with both exchanged.
         left_px: f64,
     },
-    /// A board of another size than was told.
+    /// A board of another size than given.
     #[error(
-        "expected a board of the size that was told, found squares of {:.2} ± {:.2} mm instead of {:.2} mm: by the robot's metres the board seems \
-         {:.1} % of that size, which leaves {left_px:.2} px; measure the 100 mm line below the board, or its squares, and tell what they measure",
+        "expected a board of the given size, found squares of {:.2} ± {:.2} mm instead of {:.2} mm: by the robot's \
+         metres the board seems {:.1} % of that size, which leaves {left_px:.2} px; measure the 100 mm line below the \
+         board, or its squares, and give the measured size",
         1000.0 * .told_m * .scale, 1000.0 * .told_m * .sigma, 1000.0 * .told_m, 100.0 * .scale
     )]
     OtherBoardScale {
-        /// A square's side as told, metres.
+        /// The given side of a square, metres.
         told_m: f64,
-        /// The size as a multiple of that told, and its standard error.
+        /// The size as a multiple of the given one, and its standard error.
         scale: f64,
         sigma: f64,
         left_px: f64,

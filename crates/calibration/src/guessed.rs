@@ -1,4 +1,4 @@
-//! A camera that nobody calibrated, over a sheet.
+//! An uncalibrated camera over a sheet.
 
 use sdg_geometry::{PinholeCamera, PlumbBob};
 
@@ -7,14 +7,14 @@ use crate::camera_file::CalibratedCamera;
 use crate::detection::SeenCorner;
 use crate::table::{focal_from_sheet, homography_rms_px};
 
-/// A focal length taken from the sheet's perspective must be known to this share.
+/// Largest relative error of a focal length from the sheet's perspective.
 const MAX_FOCAL_SIGMA: f64 = 0.1;
-/// Pictures of webcams and phones are about so wide.
+/// Usual angle of view of webcams and phones.
 pub const ASSUMED_VIEW_DEG: f64 = 60.0;
-/// A straight lens explains corners to this; more is the lens's distortion.
+/// Largest error of corners that a lens without distortion explains; more is distortion.
 const MAX_STRAIGHT_PX: f64 = 1.0;
 
-/// Where the focal length is from.
+/// Source of the focal length.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum FocalSource {
     /// The camera's file.
@@ -28,7 +28,7 @@ pub enum FocalSource {
 }
 
 impl FocalSource {
-    /// As `--json` calls it.
+    /// The name in `--json`.
     pub fn name(&self) -> &'static str {
         match self {
             Self::File => "file",
@@ -39,8 +39,8 @@ impl FocalSource {
     }
 }
 
-/// A camera without file: its axis in the middle, a straight lens, and a focal length from wherever there is one; `None` for one
-/// that no camera has.
+/// A camera without a file: its axis at the centre, no distortion, and a focal length from any available source; `None`
+/// for an impossible one.
 pub fn guess_camera(
     size: (u32, u32),
     board: &Board,
@@ -65,7 +65,8 @@ pub fn guess_camera(
     Some((camera, source))
 }
 
-/// How far the lens bends the sheet's lines, in pixels RMS; `None` where a straight lens explains the corners.
+/// Distortion of the sheet's lines by the lens, in pixels RMS; `None` if a lens without distortion explains the
+/// corners.
 pub fn bent_px(board: &Board, corners: &[SeenCorner]) -> Option<f64> {
     homography_rms_px(board, corners).filter(|rms| *rms > MAX_STRAIGHT_PX)
 }

@@ -2,8 +2,8 @@
 
 use nalgebra::{DMatrix, Matrix3, Point2, Vector3};
 
-/// The homography that takes places of a plane to pixels, in the least-squares sense of the normalised linear equations; `None` where they
-/// leave it open: fewer than four places, or places on a line.
+/// The homography from points of a plane to pixels, by least squares of the normalised linear equations; `None` if they
+/// do not determine it: fewer than four points, or points on a line.
 ///
 /// # Source
 /// Hartley and Zisserman, Multiple View Geometry, algorithm 4.2.
@@ -28,19 +28,19 @@ pub(crate) fn fit(places: &[(Point2<f64>, Point2<f64>)]) -> Option<Matrix3<f64>>
     let eigen = normal.symmetric_eigen();
     let mut order: Vec<usize> = (0..9).collect();
     order.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
-    // Two directions without resistance: the places lie on a line.
+    // Two undetermined directions: the points lie on a line.
     if eigen.eigenvalues[order[1]] < 1e-9 * eigen.eigenvalues[order[8]] {
         return None;
     }
     let h = eigen.eigenvectors.column(order[0]);
     let normalised = Matrix3::new(h[0], h[1], h[2], h[3], h[4], h[5], h[6], h[7], h[8]);
     let matrix = to.try_inverse()? * normalised * from;
-    // The places' middle is in front of the camera.
+    // The points' centre is in front of the camera.
     let middle = from.try_inverse()? * Vector3::z();
     Some(matrix * (1.0 / (matrix * middle).z))
 }
 
-/// Where the plane's place appears.
+/// The pixel of a point of the plane.
 pub(crate) fn apply(homography: &Matrix3<f64>, place: &Point2<f64>) -> Point2<f64> {
     let h = homography * place.to_homogeneous();
     Point2::new(h.x / h.z, h.y / h.z)

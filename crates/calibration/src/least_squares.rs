@@ -1,9 +1,9 @@
-//! Least squares over parameters that all pictures share and six more of each picture (its pose).
+//! Least squares over parameters that all pictures share and six more for each picture (its pose).
 //!
-//! Legend: `s` shared parameters, `o` the six of a picture; `A = Σ Jₛᵀ Jₛ`, `B = Jₛᵀ Jₒ`, `C = Jₒᵀ Jₒ`, and the gradients `Jᵀ r` of residuals
-//! `r` (found less expected). Pictures meet only in `s`, so their own steps are eliminated: `(A - Σ B C⁻¹ Bᵀ) δs = -(gₛ - Σ B C⁻¹ gₒ)`.
-//! The matrix on the left is also the information that the pictures hold about `s`; its inverse, times the residuals' variance, is
-//! the covariance of `s`.
+//! Legend: `s` shared parameters, `o` the six of a picture; `A = Σ Jₛᵀ Jₛ`, `B = Jₛᵀ Jₒ`, `C = Jₒᵀ Jₒ`, and the
+//! gradients `Jᵀ r` of residuals `r` (found minus expected). Pictures are coupled only by `s`, so that their own steps
+//! are eliminated: `(A - Σ B C⁻¹ Bᵀ) δs = -(gₛ - Σ B C⁻¹ gₒ)`. The matrix on the left is also the pictures' information
+//! about `s`; its inverse, times the residuals' variance, is the covariance of `s`.
 //!
 //! # Source
 //! Levenberg–Marquardt with the diagonal scaled (Marquardt 1963); Schur complement as in bundle adjustment (Triggs et al. 2000, section 6).
@@ -18,7 +18,7 @@ pub(crate) struct Block<const S: usize> {
     pub(crate) mixed: SMatrix<f64, S, 6>,
     pub(crate) own: Matrix6<f64>,
     pub(crate) own_gradient: Vector6<f64>,
-    /// Sum of squares, of what is beyond a robust bound less.
+    /// Sum of squares, with reduced weight beyond a robust bound.
     pub(crate) cost: f64,
 }
 
@@ -54,11 +54,11 @@ impl<const S: usize> Block<S> {
 
 /// A sum of squares of parameters.
 pub(crate) trait Problem<const S: usize>: Clone {
-    /// What each picture says at these parameters; `None` where they make no sense.
+    /// The normal equations of each picture at these parameters; `None` for impossible parameters.
     fn blocks(&self) -> Option<Vec<Block<S>>>;
     /// The parameters after a step.
     fn stepped(&self, shared: &SVector<f64, S>, own: &[Vector6<f64>]) -> Self;
-    /// Shared parameters that stay as they are.
+    /// Shared parameters that are fixed.
     fn fixed(&self) -> [bool; S] {
         [false; S]
     }
@@ -69,17 +69,17 @@ pub(crate) trait Problem<const S: usize>: Clone {
 pub(crate) struct Minimum<P, const S: usize> {
     pub(crate) at: P,
     pub(crate) cost: f64,
-    /// What is known of the shared parameters; rows of fixed ones are those of the unit matrix.
+    /// The information about the shared parameters; rows of fixed ones are those of the identity matrix.
     pub(crate) information: SMatrix<f64, S, S>,
 }
 
 const MAX_STEPS: usize = 100;
-/// Where it ends: costs that fall by less than this share.
+/// Stopping criterion: a decrease of the cost below this share.
 const MIN_DECREASE: f64 = 1e-12;
 const FIRST_DAMPING: f64 = 1e-3;
 const MAX_DAMPING: f64 = 1e12;
 
-/// Goes down from where the problem stands; `None` where it does not make sense there.
+/// Minimises from the problem's present state; `None` if that state is impossible.
 pub(crate) fn minimise<P: Problem<S>, const S: usize>(start: P) -> Option<Minimum<P, S>> {
     let cost_of = |blocks: &[Block<S>]| blocks.iter().map(|block| block.cost).sum::<f64>();
     let mut at = start;
@@ -182,7 +182,7 @@ mod tests {
                     by_own[0] = 1.0;
                     block.add(&residual, &SMatrix::<f64, 1, 2>::new(1.0, *x), &by_own, 1.0);
                 }
-                // The prior, and something for the parameters that nothing depends on.
+                // The prior, and a small value for parameters without influence.
                 block.own += Matrix6::identity();
                 block.own_gradient[0] += own;
                 block.cost += own * own;
@@ -203,7 +203,8 @@ mod tests {
         assert!((minimum.at.shared - SVector::<f64, 2>::new(1.0, 2.0)).norm() < 1e-6, "{}", minimum.at.shared);
         // The means of the residuals about y = 1 + 2 x are ± 0.2 / 3; with the prior, three quarters of it.
         assert!((minimum.at.own[0] - 0.05).abs() < 1e-6, "{:?}", minimum.at.own);
-        // Of b: the sum of squares about the mean, twice 2, and what the offsets leave of the means, 6 - 2 · 9 / 4.
+        // Of b: the sum of squares about the mean, twice 2, and the part of the means that the offsets leave, 6 - 2 · 9
+        // / 4.
         assert!((minimum.information[(0, 0)] - 1.5).abs() < 1e-9, "{}", minimum.information);
         // 10 - 2 · 9 / 4.
         assert!((minimum.information[(1, 1)] - 5.5).abs() < 1e-9, "{}", minimum.information);

@@ -1,25 +1,25 @@
-//! Calibrated cameras: how they are calibrated, and their files.
+//! Calibrated cameras: their calibration and their files.
 //!
 //! ```text
 //! Board ─ Sheet (SVG, PDF) ─ printed, photographed ─ find_board: corners to 0.03 px, each with its place on the board
-//!   ├─ PictureTaker        a camera's frames        ─ which of them are worth a picture
+//!   ├─ PictureTaker        a camera's frames        ─ selection of frames as pictures
 //!   ├─ calibrate           many pictures            ─ focal length, centre, lens, with errors and advice
 //!   ├─ locate_sheet        one, on the table        ─ where the camera is over the table
 //!   └─ calibrate_hand_eye  many, with robot poses   ─ where the camera is on the robot, or beside it
 //! CalibratedCamera: ROS's camera_info YAML, `table:` and `hand_eye:` beside it ─ PosedCamera, workspace ─ plan view
 //! ```
-//! **Frames.** ROS and OpenCV put the first pixel's centre at (0, 0), this project at (0.5, 0.5): half a pixel is added when
-//! such a file is read and taken away when it is written. The board's origin is the outer corner of its lower left dark square, x right,
-//! y up, z out of the sheet. Lengths in metres, `z` up from the table.
+//! **Frames.** ROS and OpenCV put the first pixel's centre at (0, 0), this project at (0.5, 0.5): half a pixel is added
+//! when such a file is read and subtracted when it is written. The board's origin is the outer corner of its lower left
+//! dark square, x right, y up, z out of the sheet. Lengths in metres, `z` up from the table.
 //!
-//! **Left out**: fisheye lenses, several cameras at once, rolling shutters; files and clocks, which `cli` has.
+//! **Not supported**: fisheye lenses, several cameras at once, rolling shutters. Files and clocks are in `cli`.
 //!
 //! ```
 //! use nalgebra::{Isometry3, Vector3};
 //! use sdg_calibration::{Board, SeenCorner, locate_sheet};
 //! use sdg_geometry::PinholeCamera;
 //!
-//! // A camera 0.5 m above the sheet's origin, looking straight down.
+//! // A camera 0.5 m above the sheet's origin, looking vertically down.
 //! let board = Board::new(9, 6, 0.025)?;
 //! let camera_from_sheet = Isometry3::new(Vector3::new(0.0, 0.0, 0.5), Vector3::x() * std::f64::consts::PI);
 //! let seen = board.corners().map(|corner| {

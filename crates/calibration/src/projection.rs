@@ -1,7 +1,8 @@
-//! A point in front of the camera to its pixel, with derivatives.
+//! From a point in front of the camera to its pixel, with derivatives.
 //!
-//! Legend: `p` a point in the camera's frame, `(x, y) = (p.x, p.y) / p.z`, `(x', y')` where the lens puts it (geometry's `PlumbBob`);
-//! `u = fx x' + cx`, `v = fy y' + cy`. Intrinsics stand in the order fx, fy, cx, cy, k1, k2, p1, p2, k3.
+//! Legend: `p` a point in the camera's frame, `(x, y) = (p.x, p.y) / p.z`, `(x', y')` its position through the lens
+//! (geometry's `PlumbBob`); `u = fx x' + cx`, `v = fy y' + cy`. Intrinsics are in the order fx, fy, cx, cy, k1, k2, p1,
+//! p2, k3.
 
 use nalgebra::{Matrix2x3, Matrix3, Matrix3x6, Point2, Point3, SMatrix, SVector, Vector2, Vector3};
 use sdg_geometry::{PinholeCamera, PlumbBob};
@@ -17,8 +18,8 @@ pub(crate) struct Projected {
     pub(crate) by_point: Matrix2x3<f64>,
 }
 
-/// Projects; `None` at or behind the camera. Beyond the radius at which the lens's polynomial turns back it goes on, so that an
-/// optimiser can come back from there.
+/// Projects; `None` at or behind the camera. Beyond the radius at which the lens's polynomial turns back it continues,
+/// so that an optimiser can return from there.
 pub(crate) fn project(camera: &PinholeCamera, p: &Point3<f64>) -> Option<Projected> {
     if p.z <= f64::EPSILON {
         return None;
@@ -68,7 +69,7 @@ pub(crate) fn stepped(camera: &PinholeCamera, delta: &SVector<f64, NUM_INTRINSIC
     }
 }
 
-/// How a point moves with a small twist `(t, ω)` that acts after all else: `δp = t + ω × p`.
+/// Derivative of a point by a small twist `(t, ω)` that is applied last: `δp = t + ω × p`.
 pub(crate) fn by_twist(p: &Point3<f64>) -> Matrix3x6<f64> {
     let mut matrix = Matrix3x6::zeros();
     matrix.fixed_view_mut::<3, 3>(0, 0).copy_from(&Matrix3::identity());
@@ -102,7 +103,8 @@ mod tests {
         cy: 244.0,
         lens: PlumbBob { k1: -0.28, k2: 0.11, p1: 0.0013, p2: -0.0007, k3: -0.02 },
     };
-    /// Steps of central differences, and how far they may be from the derivative, in pixels a unit: the third derivative's share.
+    /// Steps of central differences, and their tolerance from the derivative, in pixels per unit: the third
+    /// derivative's share.
     const STEP: f64 = 1e-6;
     const MAX_OFF: f64 = 1e-4;
 

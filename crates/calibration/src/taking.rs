@@ -1,56 +1,57 @@
-//! Which frames of a camera are worth a picture: the board lies still in them, and is seen as in none before.
+//! Selects frames of a camera for the calibration: the board is at rest in them, in a view unlike all before.
 
 use nalgebra::Vector2;
 use sdg_geometry::median;
 
 use crate::detection::SeenCorner;
 
-/// A board whose corners stay this near to where they were, as a share of the picture's diagonal, lies still. Chosen by hand: 1.6 pixels of 640 × 480.
+/// Largest movement of the corners of a board at rest, as a share of the picture's diagonal. Chosen by hand: 1.6 pixels
+/// of 640 × 480.
 const STILL_SHARE: f64 = 0.002;
-/// So many frames one after the other, so that no picture is blurred.
+/// Number of successive frames at rest, so that no picture is blurred.
 const STILL_FRAMES: u32 = 4;
-/// A view whose corners all in all lie farther than this from where another view has them shows something new. Chosen by hand: 48 pixels of
-/// 640 × 480, a tenth of the board's width where it fills the picture.
+/// Minimum distance of the corners from those of every other view, for a new view. Chosen by hand: 48 pixels of 640 ×
+/// 480, a tenth of the board's width if it fills the picture.
 const NEW_PLACE_SHARE: f64 = 0.06;
-/// The same for the corners about their middle: another tilt or size at the same place. Chosen by hand: 10 pixels of 640 × 480, what a tilt by 25
-/// degrees does to a board that fills half of the picture.
+/// The same for the corners relative to their centre: another tilt or size at the same place. Chosen by hand: 10 pixels
+/// of 640 × 480, the effect of a tilt by 25 degrees on a board that fills half of the picture.
 const NEW_SHAPE_SHARE: f64 = 0.0125;
 
-/// What a frame shows of the board.
+/// The state of the board in a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sight {
     /// It moves.
     Moving,
-    /// It lies still, as in a picture that was taken.
+    /// At rest, as in a picture that was taken.
     Known,
-    /// It lies still, as in no picture before: to be taken.
+    /// At rest, in a new view: to be taken.
     New,
 }
 
-/// Chooses among the frames of a camera those that a calibration needs.
+/// Selects the frames of a camera that a calibration needs.
 #[derive(Debug, Clone, Default)]
 pub struct PictureTaker {
     diagonal_px: f64,
     still_frames: u32,
     taken: Vec<Vec<SeenCorner>>,
-    /// Where the board was when it began to lie still, and for how many frames it has.
+    /// The corners at the start of the rest, and the number of frames since.
     still: Option<(Vec<SeenCorner>, u32)>,
 }
 
 impl PictureTaker {
-    /// For pictures of this size that follow each other.
+    /// For successive pictures of this size.
     pub fn new(width: u32, height: u32) -> Self {
         let diagonal_px = f64::from(width).hypot(f64::from(height));
         Self { diagonal_px, still_frames: STILL_FRAMES, ..Self::default() }
     }
 
-    /// For pictures that were taken one by one: the board lies still in each.
+    /// For pictures taken one by one: the board is at rest in each.
     #[must_use]
     pub fn of_single_pictures(self) -> Self {
         Self { still_frames: 1, ..self }
     }
 
-    /// Looks at the next frame, in which these corners are seen.
+    /// Processes the next frame, with these corners.
     pub fn look(&mut self, corners: &[SeenCorner]) -> Sight {
         let is_still = |from: &[SeenCorner]| {
             distances_px(from, corners).is_some_and(|[place, _]| place <= STILL_SHARE * self.diagonal_px)
@@ -86,13 +87,14 @@ impl PictureTaker {
         self.taken.push(corners);
     }
 
-    /// The corners of all pictures taken, in their order.
+    /// The corners of all pictures taken, in order.
     pub fn taken(&self) -> &[Vec<SeenCorner>] {
         &self.taken
     }
 }
 
-/// How far the corners that both show lie apart, and how far about their own middles, each in the median; `None` where they have none in common.
+/// Distance of the corners that both show, and their distance relative to their own centres, as medians; `None` without
+/// common corners.
 fn distances_px(one: &[SeenCorner], other: &[SeenCorner]) -> Option<[f64; 2]> {
     let apart = one.iter().filter_map(|seen| {
         let same = other.iter().find(|same| same.corner == seen.corner)?;
@@ -125,7 +127,7 @@ mod tests {
         assert_eq!(sights, [Sight::Moving, Sight::Moving, Sight::New]);
         taker.keep(resting.clone());
         assert_eq!(taker.look(&resting), Sight::Known);
-        // Nearer than 48 pixels it is the same view.
+        // At less than 48 pixels it is the same view.
         let sights = [(); 4].map(|()| taker.look(&row(115.5, 90.0, 0..12)));
         assert_eq!(sights[3], Sight::Known);
         let sights = [(); 4].map(|()| taker.look(&row(115.5, 100.0, 0..12)));
@@ -142,7 +144,8 @@ mod tests {
             (0..12).map(corner).collect()
         };
         taker.keep(sized(30.0));
-        // The corners lie 0.5 to 5.5 steps from their middle, 3 in the median: 2 pixels a step are 6, 4 are 12, and 10 are asked for.
+        // The corners are 0.5 to 5.5 steps from their centre, with a median of 3: 2 pixels per step are 6, 4 are 12,
+        // and 10 are required.
         assert_eq!(taker.look(&sized(32.0)), Sight::Known);
         assert_eq!(taker.look(&sized(34.0)), Sight::New);
     }

@@ -1,4 +1,4 @@
-//! Boards in rendered pictures: which corners are found, how exactly, and what is said where they are not.
+//! Boards in rendered pictures: the found corners, their accuracy, and the errors if none are found.
 
 use crate::rendering::{Exposure, Random, camera_from_board, render, render_with};
 use crate::textures::{TEXTURES, picture};
@@ -26,7 +26,7 @@ fn board() -> Board {
     Board::new(9, 6, 0.025).unwrap()
 }
 
-/// RMS distance from the truth; fails where a corner is not the one that it is taken for.
+/// RMS distance from the truth; fails if a corner is confused with another.
 fn rms_px(corners: &[SeenCorner], board: &Board, camera: &PinholeCamera, pose: &Isometry3<f64>) -> f64 {
     let squares = corners.iter().map(|seen| {
         let off = (camera.project(&(pose * board.corner(seen.corner))).unwrap() - seen.pixel).norm();
@@ -128,12 +128,12 @@ fn what_is_no_board_is_told_by_what_is_missing() {
         find_board(&picture, &smaller),
         Err(CalibrationError::OtherBoard { columns: 8, rows: 6, found_columns: 9, found_rows: 6 })
     );
-    // What is left of a board beyond the border of the picture.
+    // The visible part of a board that extends beyond the picture's border.
     let cut = camera_from_board(&board, &WIDE, [720.0, 240.0], 0.3, [0.1, 0.1, 0.0]);
     assert!(is_missing(&seen(&cut, &Exposure::ORDINARY)));
 }
 
-/// Too little of it is seen; pieces of a grid may be.
+/// Too little of it is visible; parts of a grid may be.
 fn is_missing(found: &Result<Vec<SeenCorner>, CalibrationError>) -> bool {
     use CalibrationError::{BoardNotFound, BoardUnclear, OtherCheckerboard};
     matches!(found, Err(BoardNotFound { .. } | BoardUnclear { .. } | OtherCheckerboard { .. }))
@@ -166,7 +166,7 @@ fn a_board_without_dots_is_known_where_it_is_whole() {
 #[test]
 fn a_board_among_other_squares_and_partly_covered_is_found() {
     let board = board();
-    // Squares of random colour all around, and a dark disc over the board, as a thumb.
+    // Squares of random colour all around, and a dark disc over the board, like a thumb.
     let printed = |place: &Point2<f64>| {
         let on_sheet = (-1.0..10.0).contains(&place.x) && (-1.0..7.0).contains(&place.y);
         let cell = |value: f64| (1.3 * value).floor() as i64 as u64;
@@ -181,12 +181,12 @@ fn a_board_among_other_squares_and_partly_covered_is_found() {
         let pose = camera_from_board(&board, &WIDE, [320.0, 240.0], 0.55, tilts);
         let picture = render_with(&printed, &board, &WIDE, &pose, &Exposure::ORDINARY, &mut Random(k as u64));
         let corners = find_board(&picture, &board).unwrap();
-        // Corners next to the disc's border are drawn towards it.
+        // Corners next to the disc's border are shifted towards it.
         let rms = rms_px(&corners, &board, &WIDE, &pose);
         println!("clutter {k}: {} corners, {rms:.4} px", corners.len());
         assert!((34..40).contains(&corners.len()) && rms < 0.1, "{k}: {} corners, {rms:.3} px", corners.len());
     }
-    // Without the board nothing is taken for it.
+    // Without the board nothing is mistaken for it.
     let floor = |place: &Point2<f64>| {
         let cell = |value: f64| (1.3 * value).floor() as i64 as u64;
         Random(cell(place.x).wrapping_mul(1009).wrapping_add(cell(place.y))).unit() < 0.5

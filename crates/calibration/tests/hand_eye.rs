@@ -1,6 +1,8 @@
-//! The camera on the robot and beside it, from simulated robots, beside OpenCV's `calibrateHandEye` on the same numbers.
+//! The camera on the robot and beside it, from simulated robots, compared with OpenCV's `calibrateHandEye` on the same
+//! numbers.
 //!
-//! OpenCV's figures stand in tests/golden/opencv/hand_eye.json; `write_trials` below and hand_eye.py beside that file make them.
+//! OpenCV's figures are in tests/golden/opencv/hand_eye.json, made by `write_trials` below and hand_eye.py in that
+//! folder.
 
 use std::fs;
 use std::path::Path;
@@ -21,7 +23,7 @@ pub const CAMERA: PinholeCamera = PinholeCamera {
     cy: 238.0,
     lens: PlumbBob { k1: -0.1, k2: 0.04, p1: 0.0005, p2: -0.0004, k3: 0.0 },
 };
-/// Bounds of place and angle with exact robot poses; docs/calibration.md has the figures.
+/// Bounds of position and angle with exact robot poses; docs/calibration.md has the figures.
 const MAX_ERROR_M: f64 = 0.0005;
 const MAX_ERROR_DEG: f64 = 0.1;
 /// Standard deviations of the simulated noise.
@@ -71,7 +73,8 @@ pub fn views(mount: Mount, seed: u64, noise: &Noise) -> Vec<HandEyeView> {
     (0..NUM_POSES).map(|_| view(mount, &mut random, noise, 0.3)).collect()
 }
 
-/// The board whole, at 0.4 to 0.7 m, tilted by up to `max_tilt` (the tangent of half the angle) about each axis.
+/// The board completely visible, at 0.4 to 0.7 m, tilted by up to `max_tilt` (the tangent of half the angle) about each
+/// axis.
 fn view(mount: Mount, random: &mut Random, noise: &Noise, max_tilt: f64) -> HandEyeView {
     let (board, x, y) = (board(), truth(mount), board_truth(mount));
     loop {
@@ -157,7 +160,7 @@ fn with_noisy_robot_poses_we_are_nearer_than_every_method_of_opencv() {
             );
             assert!(mm[0] < number("median_mm") && deg[0] < number("median_deg"), "{name}: {method} is nearer");
         }
-        // The sums of squares of what is told and what is are alike.
+        // The sums of squares of the estimated and the true errors are similar.
         let squares = |values: &mut dyn Iterator<Item = f64>| values.map(|value| value * value).sum::<f64>().sqrt();
         let told = 1000.0 * squares(&mut found.iter().map(|found| found.sigma_m));
         let ratio = squares(&mut all.iter().map(|errors| errors[0])) / told;
@@ -210,12 +213,12 @@ fn a_pose_that_is_wrong_shows_in_its_picture_and_in_the_spread() {
     let mut views = views(Mount::Hand, 7, &EXACT_ROBOT);
     let good = solve(Mount::Hand, &views).unwrap();
     assert!(good.robot_sigma.is_none() && good.spread.iter().all(|[metres, _]| *metres < 0.0005), "{:?}", good.spread);
-    // 5 mm: the arm had not come to a stop.
+    // 5 mm: the arm was still moving.
     views[6].base_from_flange.translation.x += 0.005;
     let found = solve(Mount::Hand, &views).unwrap();
     let most = |of: &dyn Fn(usize) -> f64| (0..NUM_POSES).max_by(|a, b| of(*a).total_cmp(&of(*b))).unwrap();
     assert_eq!(most(&|k| found.pictures_rms_px[k]), 6);
-    // Its error is shared out among all pictures as the robot's: the spread tells that the result rests on few of them.
+    // Its error is attributed to the robot in all pictures: the spread shows that the result depends on few of them.
     let widest = |found: &HandEye| found.spread.iter().map(|[metres, _]| *metres).fold(0.0, f64::max);
     println!("spread {:.3} mm, before {:.3} mm", 1000.0 * widest(&found), 1000.0 * widest(&good));
     assert!(widest(&found) > 3.0 * widest(&good) && found.robot_sigma.is_some());
@@ -226,7 +229,7 @@ fn poses_that_turn_about_one_axis_are_an_error_that_names_the_others() {
     let mut random = Random(3);
     let exact = Noise { corner_px: 0.1, robot_m: 0.0, robot_deg: 0.0 };
     let first = view(Mount::Hand, &mut random, &exact, 0.0);
-    // Without tilts only the turns about the optical axis are left, which is nearly the flange's z.
+    // Without tilts only the turns about the optical axis remain, which is nearly the flange's z.
     let mut alike = vec![first.clone()];
     alike.extend((0..8).map(|_| view(Mount::Hand, &mut random, &exact, 0.0)));
     let error = solve(Mount::Hand, &alike).unwrap_err();
@@ -259,13 +262,13 @@ fn mistaken_readings_of_the_poses_are_named() {
     let millimetres =
         |pose: &Isometry3<f64>| Isometry3::from_parts((pose.translation.vector * 1000.0).into(), pose.rotation);
     assert!(with(&millimetres, Mount::Hand).contains("millimetres"));
-    // Another picture's pose each.
+    // Each with another picture's pose.
     let mut mixed = views.clone();
     for k in 0..NUM_POSES {
         mixed[k].base_from_flange = views[(k + 1) % NUM_POSES].base_from_flange;
     }
     let error = solve(Mount::Hand, &mixed).unwrap_err().to_string();
     println!("{error}");
-    assert!(error.contains("each picture stands with its own pose"), "{error}");
+    assert!(error.contains("each picture is listed with its own pose"), "{error}");
     assert!(with(&|pose| *pose, Mount::Base).contains("the mount to be the other one"));
 }

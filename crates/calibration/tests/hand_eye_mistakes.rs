@@ -1,4 +1,4 @@
-//! Robot poses and boards that are not what they were told to be: which mistake is named.
+//! Wrong robot poses and boards of another size: the named error.
 
 use crate::hand_eye::{CAMERA, EXACT_ROBOT, NOISY_ROBOT, NUM_POSES, Noise, board, views};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
@@ -6,7 +6,7 @@ use sdg_calibration::{Board, CalibrationError, HandEye, HandEyeView, calibrate_h
 use sdg_geometry::Mount;
 
 const MOUNTS: [Mount; 2] = [Mount::Hand, Mount::Base];
-/// How far the told scale may be from the truth with [`NOISY_ROBOT`], as a share; its standard error is 0.001.
+/// Largest relative error of the estimated scale with [`NOISY_ROBOT`]; its standard error is 0.001.
 const MAX_SCALE_ERROR: f64 = 0.004;
 
 fn changed(views: &[HandEyeView], change: &dyn Fn(&Isometry3<f64>) -> Isometry3<f64>) -> Vec<HandEyeView> {
@@ -21,7 +21,7 @@ fn solve(mount: Mount, views: &[HandEyeView]) -> Result<HandEye, CalibrationErro
     calibrate_hand_eye(&CAMERA, &board(), mount, views)
 }
 
-/// The board is told `told` times as large as it is.
+/// The given size of the board is `told` times the true one.
 fn solve_told(mount: Mount, views: &[HandEyeView], told: f64) -> Result<HandEye, CalibrationError> {
     let board = Board::new(9, 6, board().square_m() * told).unwrap();
     calibrate_hand_eye(&CAMERA, &board, mount, views)
@@ -33,7 +33,7 @@ fn refusal(mount: Mount, views: &[HandEyeView]) -> String {
     text
 }
 
-/// The rotation that turns about x, y and z make, multiplied in this order.
+/// The rotation from turns about x, y and z, multiplied in this order.
 fn product(order: [usize; 3], about: [f64; 3]) -> UnitQuaternion<f64> {
     order.iter().fold(UnitQuaternion::identity(), |rotation, axis| {
         let mut vector = Vector3::zeros();
@@ -42,7 +42,7 @@ fn product(order: [usize; 3], about: [f64; 3]) -> UnitQuaternion<f64> {
     })
 }
 
-/// Turns about x, y and z as robots tell them: Rz·Ry·Rx.
+/// Turns about x, y and z as robots report them: Rz·Ry·Rx.
 fn roll_pitch_yaw(pose: &Isometry3<f64>) -> [f64; 3] {
     pose.rotation.euler_angles().into()
 }
@@ -75,13 +75,13 @@ fn a_board_of_the_told_size_is_not_blamed_where_pictures_are_few() {
             assert!(solve(mount, &views[..num]).is_ok(), "{mount:?}, {num} pictures, {seed}");
         }
     }
-    // A robot whose errors have another ratio than is assumed.
+    // A robot whose errors have another ratio than assumed.
     let turned_only = Noise { corner_px: 0.3, robot_m: 0.0, robot_deg: 0.1 };
     for seed in 0..30 {
         let views = views(Mount::Hand, 7000 + seed, &turned_only);
         assert!(solve(Mount::Hand, &views[..6]).is_ok(), "{seed}");
     }
-    // A third of a percent is what a ruler is read to.
+    // A third of a percent is the reading error of a ruler.
     assert!(solve_told(Mount::Hand, &views(Mount::Hand, 3, &EXACT_ROBOT), 1.002).is_ok());
 }
 
@@ -116,7 +116,7 @@ fn rotations_that_are_transposed_or_composed_in_another_order_are_named() {
 #[test]
 fn no_reading_is_proposed_that_leaves_many_pixels() {
     let views = views(Mount::Hand, 5, &EXACT_ROBOT);
-    // Degrees taken for radians cannot be undone, and a mirrored axis is no reading that is tried.
+    // Degrees taken for radians cannot be reversed, and a mirrored axis is not among the tried readings.
     let wound = |p: &Isometry3<f64>| with_rotation(p, product([2, 1, 0], roll_pitch_yaw(p).map(f64::to_degrees)));
     let text = refusal(Mount::Hand, &changed(&views, &wound));
     assert!(text.contains("turns by other angles than the board") && !text.contains("which leaves"), "{text}");
@@ -125,7 +125,7 @@ fn no_reading_is_proposed_that_leaves_many_pixels() {
         Isometry3::from_parts(Vector3::new(x, -y, z).into(), p.rotation)
     };
     let text = refusal(Mount::Hand, &changed(&views, &mirrored));
-    assert!(text.contains("each picture stands with its own pose") && !text.contains("which leaves"), "{text}");
+    assert!(text.contains("each picture is listed with its own pose") && !text.contains("which leaves"), "{text}");
 }
 
 #[test]

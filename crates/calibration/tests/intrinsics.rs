@@ -1,6 +1,7 @@
-//! Cameras found from rendered boards, beside OpenCV's `calibrateCamera` on the same pictures.
+//! Cameras from rendered boards, compared with OpenCV's `calibrateCamera` on the same pictures.
 //!
-//! OpenCV's figures stand in tests/golden/opencv/calibration.json; `write_pictures` below and calibrate.py beside that file make them.
+//! OpenCV's figures are in tests/golden/opencv/calibration.json, made by `write_pictures` below and calibrate.py in
+//! that folder.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -14,10 +15,10 @@ use sdg_geometry::PinholeCamera;
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
-/// Bounds: the reprojection error over OpenCV's, and the relative error of the focal length.
+/// Bounds: the reprojection error relative to OpenCV's, and the relative error of the focal length.
 const MAX_RMS_RATIO: f64 = 1.1;
 const MAX_FOCAL_ERROR: f64 = 0.002;
-/// Both optimisers on the same corners: they end where steps change nothing more, OpenCV after 30 steps or at 2.2e-16.
+/// Both optimisers on the same corners: they end when steps change nothing more, OpenCV after 30 steps or at 2.2e-16.
 const MAX_RMS_DIFFERENCE: f64 = 1e-5;
 const MAX_FOCAL_DIFFERENCE: f64 = 1e-4;
 
@@ -84,7 +85,7 @@ fn cameras_are_found_as_exactly_as_opencv_finds_them() {
     }
 }
 
-/// What calibrate.py reads; kept beside the build.
+/// The input of calibrate.py; kept beside the build.
 #[test]
 #[ignore = "writes the pictures that OpenCV's figures are made from"]
 fn write_pictures() {
@@ -152,7 +153,7 @@ fn forty_pictures_leave_the_noise_of_their_corners() {
 fn a_bad_picture_is_named_and_left_out() {
     let camera = CAMERAS[0].1;
     let mut views = synthetic(&camera, 0.05, 3);
-    // Bent, as a sheet is that is not glued to anything: 3 mm in its middle seen from the side.
+    // Bent like a loose sheet: 3 mm at its centre, seen from the side.
     for seen in &mut views[4] {
         let x = f64::from(seen.corner[0]) / 4.5 - 1.0;
         seen.pixel += nalgebra::Vector2::new(3.0, 5.0) * (1.0 - x * x);
@@ -162,7 +163,7 @@ fn a_bad_picture_is_named_and_left_out() {
     assert_eq!(left_out, [4]);
     assert!(found.rms_px < 0.1 && found.pictures[4].rms_px > 0.5, "{}", found.rms_px);
     assert!((found.camera.fx / camera.fx - 1.0).abs() < MAX_FOCAL_ERROR);
-    // One corner that is another's.
+    // One corner replaced by another.
     let mut views = synthetic(&camera, 0.05, 3);
     views[2][7].pixel += nalgebra::Vector2::new(1.2, 0.0);
     let found = calibrate(&board(), &views, &config(&camera)).unwrap();
@@ -204,7 +205,7 @@ fn poses_all_alike_are_an_error_that_says_what_to_do() {
 #[test]
 fn what_the_pictures_lack_is_named() {
     let camera = CAMERAS[0].1;
-    // Never in the lower right, tilted to the sides only.
+    // Never in the lower right, and tilted only sideways.
     let poses: Vec<_> = [[-0.3, 0.3], [0.0, 0.3], [0.3, -0.3], [0.1, 0.2], [-0.1, -0.3]]
         .iter()
         .map(|[_, tilt]| ([250.0, 180.0], 0.3, [0.0, *tilt, 0.05]))

@@ -8,7 +8,7 @@ use sdg_calibration::{
 };
 use sdg_geometry::{PinholeCamera, PlumbBob};
 
-/// The camera's place is known to this: a twentieth of a pixel at 0.6 m, tilted.
+/// Accuracy of the camera's position: a twentieth of a pixel at 0.6 m, tilted.
 const MAX_PLACE_ERROR_M: f64 = 0.0005;
 
 fn board() -> Board {
@@ -67,7 +67,7 @@ fn told_errors_are_those_that_repetition_shows() {
     }
 }
 
-/// As a phone's picture: no distortion to speak of.
+/// As in a phone's picture: practically no distortion.
 const PHONE: PinholeCamera =
     PinholeCamera { lens: PlumbBob::NONE, fx: 980.0, fy: 980.0, cx: 646.0, cy: 356.0, ..WEBCAM };
 
@@ -87,8 +87,9 @@ fn a_tilted_sheet_tells_the_focal_length_and_one_from_above_does_not() {
 
 #[test]
 fn the_focal_length_costs_nothing_on_the_table_and_more_above_it() {
-    // From straight above at 0.5 m, a point h above the table and d beside the camera's foot is displaced by d h / (H - h), H in proportion
-    // to the focal length: at d = 0.2 m and h = 0.03 m by 12.77 mm for 0.5 m and by 11.54 mm for 0.55 m.
+    // Vertically from above at 0.5 m, a point h above the table at distance d from the point below the camera is
+    // displaced by d h / (H - h), H in proportion to the focal length: at d = 0.2 m and h = 0.03 m by 12.77 mm for 0.5
+    // m and by 11.54 mm for 0.55 m.
     let camera = PinholeCamera { fx: 1000.0, fy: 1000.0, cx: 640.0, cy: 360.0, ..PHONE };
     let pose = camera_from_board(&board(), &camera, [640.0, 360.0], 0.5, [0.0, 0.0, 0.0]);
     let corners = corners(&camera, &pose, 0.0, &mut Random(1));
@@ -96,7 +97,7 @@ fn the_focal_length_costs_nothing_on_the_table_and_more_above_it() {
     let table = focal_cost(&camera, &board(), &corners, 0.0, 0.1).unwrap();
     assert!(table.at_border_m < 1e-6, "{table:?}");
     let above = focal_cost(&camera, &board(), &corners, 0.03, 0.1).unwrap();
-    // The picture's corner lies 0.367 m beside the foot; 0.9 of the focal length moves it most.
+    // The picture's corner is 0.367 m from the point below the camera; 0.9 of the focal length moves it most.
     let distance = (0.32_f64.powi(2) + 0.18_f64.powi(2)).sqrt();
     let expected = distance * (0.03 / 0.45 - 0.03 / 0.5);
     assert!((above.at_border_m - expected).abs() < 1e-6, "{above:?}, expected {expected}");

@@ -1,9 +1,9 @@
-//! Pictures of what is no board, from seeds: wood, cloth, tiles, gravel.
+//! Pictures without a board, from seeds: wood, cloth, tiles, gravel.
 
 use crate::rendering::Random;
 use image::{GrayImage, Luma};
 
-/// The picture shown.
+/// The picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Texture {
     /// Planks with grain, knots and dark joints.
@@ -22,7 +22,7 @@ pub const TEXTURES: [Texture; 5] = [Texture::Planks, Texture::Cloth, Texture::Ti
 
 const SIDE: u32 = 320;
 
-/// Noise without steps: random values at whole places, and smooth between them.
+/// Noise without steps: random values at whole positions, interpolated smoothly.
 struct Noise(u64);
 
 impl Noise {
@@ -41,7 +41,7 @@ impl Noise {
     }
 }
 
-/// One picture of a texture, seen from anywhere.
+/// One picture of a texture, from a random view.
 pub fn picture(texture: Texture, seed: u64) -> GrayImage {
     let mut random = Random(seed.wrapping_mul(7919) + 11);
     let (coarse, fine) = (Noise(seed + 1), Noise(seed + 1_000_003));

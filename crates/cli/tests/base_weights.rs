@@ -108,7 +108,7 @@ fn a_whole_r50_is_converted_and_taught_for_a_few_steps() {
     assert!(stdout.contains("0 missing, 0 mismatched, 0 unused, 2 re-initialised"), "{stdout}");
     // Three steps teach a random network nothing: it fails validation and is not kept.
     assert!(stderr.contains("teaching: step 3 of 3"), "{stderr}");
-    assert!(stderr.lines().last().unwrap().contains("held-back samples: too few to keep"), "{stderr}");
+    assert!(stderr.lines().last().unwrap().contains("held-back samples: too few for a usable model"), "{stderr}");
     assert_eq!(taught.status.code(), Some(1));
     assert!(!Path::new(&out).exists());
 }
@@ -206,11 +206,11 @@ fn weights_of_our_own_are_a_start_for_every_network_and_none_is_none() {
     for model in ["A", "D"] {
         let (code, stdout, stderr) = teach(&["--model", model, "--base-weights", &own]);
         assert!(stdout.contains("own.safetensors: seed 3"), "{stdout}");
-        assert!(stderr.contains("held-back samples: too few to keep"), "{model}: {stderr}");
+        assert!(stderr.contains("held-back samples: too few for a usable model"), "{model}: {stderr}");
         assert_eq!(code, Some(1));
     }
     let (_, stdout, stderr) = teach(&["--base-weights", "none"]);
-    assert!(!stdout.contains("base weights") && stderr.contains("too few to keep"), "{stdout} {stderr}");
+    assert!(!stdout.contains("base weights") && stderr.contains("too few for a usable model"), "{stdout} {stderr}");
     let (_, _, stderr) = teach(&["--base-weights", &own, "--preset", "paper"]);
     assert!(stderr.contains("weights for preset edge instead of paper"), "{stderr}");
     let (_, _, stderr) = teach(&["--base-weights", &own, "--reinit", "roi_heads.nose"]);
@@ -227,7 +227,7 @@ fn weights_that_cannot_be_a_start_are_refused_before_teaching() {
         (
             &["--preset", "r50-torchvision"][..],
             2,
-            "--base-weights: the preset r50-torchvision starts from weights, and this build carries none for it",
+            "--base-weights: the preset r50-torchvision needs base weights, and this build contains none for it",
         ),
         (&["--reinit", "roi_heads"], 2, "--base-weights"),
         (&["--base-weights", "/nowhere.pth"], 1, "/nowhere.pth"),

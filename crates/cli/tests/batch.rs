@@ -126,7 +126,7 @@ fn a_refusal_says_why_and_what_would_help() {
     assert!(text.contains(": nothing accepted; ") && text.contains(" refused, the best of them at ("), "{text}");
     assert!(text.contains("(see --all)") && text.contains("agreement 0."), "{text}");
     assert!(
-        text.contains("a part of its outline is not there") && text.contains("; if it is the part, a second --demo"),
+        text.contains("a part of its outline is missing") && text.contains("; if it is the part, a second --demo"),
         "{text}"
     );
     assert!(!text.contains("network"), "model S has none: {text}");

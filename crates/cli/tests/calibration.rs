@@ -367,7 +367,7 @@ fn pictures_and_files_that_cannot_be_used_are_refused_with_what_is_missing() {
         assert_refused(&[&["camera", "calibrate", "--out", &out], further].concat(), code, parts);
         assert!(!Path::new(&out).exists());
     };
-    calibrate(&[a, b, c, d], 1, &["poses are alike", "tilt the board by 20 to 40 degrees"]);
+    calibrate(&[a, b, c, d], 1, &["poses are similar", "tilt the board by 20 to 40 degrees"]);
     calibrate(&[a, b], 1, &["at least 3 pictures", "found 2"]);
     calibrate(&[a, b, c, "--squares", "8x6"], 1, &["8 x 6 squares", "at least 9 x 6", "--squares"]);
     calibrate(&[a, b, c, "--square-mm", "0.025"], 2, &["0.5 to 500 mm", "0.025 mm"]);

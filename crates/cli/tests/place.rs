@@ -154,12 +154,12 @@ fn places_and_cells_that_cannot_be_are_refused_by_name_and_line() {
         "hall.toml",
         "\n[[obstacle]]\nname = \"hall\"\nbox_mm = [400, 400, 400]\nat_mm = [0, 0, 200]\n",
     );
-    grasp(&hall, &[], 1, &["detect: no way through the cell: the obstacle \"hall\" encloses the robot"]);
+    grasp(&hall, &[], 1, &["detect: no path through the cell: the obstacle \"hall\" encloses the robot"]);
     let home = ["robot", "home", "--workcell", &hall, "--robot", "127.0.0.1:1", "--no-realtime"];
     refused(&home, 1, &["could not be reached"]);
     let inside = PLACES.replace("at_mm = [450, -400]", "at_mm = [450, -250]");
     let inside = workcell(&folder, "inside.toml", &inside);
-    grasp(&inside, &["--place", "shelf"], 1, &["carry: no way to \"shelf\"", "wall"]);
+    grasp(&inside, &["--place", "shelf"], 1, &["carry: no path to \"shelf\"", "wall"]);
     let rehearse = ["rehearse", "--grasp-model", &model, "--object", "pendulum", "--place", "shelf"];
     refused(&rehearse, 2, &["--workcell"]);
 }

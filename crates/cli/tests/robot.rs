@@ -82,7 +82,7 @@ fn the_simulated_arm_grasps_what_the_shipped_workcell_shows_it() {
     let wrong = sdg(&[&base[..], &states_of, &["--mark-height-mm", "0", "--mark-height-sigma-mm", "0.5"]].concat());
     let stderr = String::from_utf8(wrong.stderr).unwrap();
     assert_eq!(wrong.status.code(), Some(1), "{stderr}");
-    assert!(stderr.contains("detect: expected marks at the told height of 0.0 ± 0.5 mm, measured 1"), "{stderr}");
+    assert!(stderr.contains("detect: expected marks at the given height of 0.0 ± 0.5 mm, measured 1"), "{stderr}");
     fs::remove_file(&states).unwrap();
 
     // Another part than the taught one is not grasped.
@@ -114,7 +114,7 @@ fn a_motion_outside_the_workspace_is_not_begun() {
             text(&workcell),
         ],
         1,
-        &["detect: the motion was not begun: at ", "outside the workspace of 0.150 to 0.320 m"],
+        &["detect: the motion was not started: at ", "outside the workspace of 0.150 to 0.320 m"],
     );
 }
 

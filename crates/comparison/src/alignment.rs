@@ -1,27 +1,29 @@
-//! By how much a pose is off, from where the features of the demonstration are found in the picture.
+//! The error of a pose, from the positions of the demonstration's features in the picture.
 //!
-//! Every cell of the demonstration's map has a cosine with each cell of the picture's map within the network's reach. What
-//! is looked for is the shift, turn and size under which the cosines of the part's cells are greatest in the mean, less a
-//! penalty for moving. A cell on an edge does not fix the shift along the edge, since its cosines are alike there; other cells do.
+//! Every cell of the demonstration's map has a cosine with each cell of the picture's map within the network's reach.
+//! The search finds the shift, turn and size that maximise the mean cosine of the part's cells, minus a penalty for
+//! movement. A cell on an edge does not determine the shift along the edge, since its cosines are equal there; other
+//! cells do.
 
 use nalgebra::{Point2, Vector2};
 use sdg_geometry::{Angle, CompassSearch, PlanarSimilarity};
 
-/// Taken off the mean cosine for each square of a cell of shift, and for each square of a radian of turn and of ln of size. Of 0, 0.005,
-/// 0.02, 0.04 and 0.08 (the second twenty times as much), 192 poses of 24 generated parts, up to a tenth of the part
-/// beside it, 8° and 6 % off, were least off with 0.04: 2.9 % of the part in the median, 8.0 % before.
+/// Penalty of the mean cosine per squared cell of shift, and per squared radian of turn and squared ln of size. Of 0,
+/// 0.005, 0.02, 0.04 and 0.08 (the second twenty times as much), 192 poses of 24 generated parts with errors of up to a
+/// tenth of the part, 8° and 6 % had the smallest errors with 0.04: a median of 2.9 % of the part, and 8.0 % before the
+/// correction.
 const SHIFT_PENALTY: f64 = 0.04;
 const TURN_PENALTY: f64 = 0.8;
-/// Steps of turn and of ln of size for a step of one cell.
+/// Steps of turn and of ln of size that correspond to a step of one cell.
 const TURN_STEP: f64 = 0.1;
 const SIZE_STEP: f64 = 0.06;
-/// Cells of which less lies inside the outline say nothing.
+/// Minimum share of a cell inside the outline for the cell to be used.
 const MIN_INSIDE: f32 = 0.05;
 
 const SEARCH: CompassSearch =
     CompassSearch { steps: (1.0, 0.03), min_gain: 1e-6, max_rounds: 48, max_evaluations: usize::MAX };
 
-/// How alike the cells of one view's maps are.
+/// The cosines between the cells of one view's maps.
 #[derive(Debug, Clone)]
 pub(crate) struct CellCosines {
     /// `[(2 reach + 1)², M, M]`, shifts row by row.
@@ -33,13 +35,13 @@ pub(crate) struct CellCosines {
     pub(crate) map_px: usize,
 }
 
-/// Where the features of the part lie in the picture.
+/// The positions of the part's features in the picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Alignment {
-    /// Moves each place of the demonstration's map to where the picture's map shows it, in cells from the middle: for
-    /// [`crate::Reference::corrected`].
+    /// Maps each position of the demonstration's map to its position in the picture's map, in cells from the centre:
+    /// for [`crate::Reference::corrected`].
     pub offset: PlanarSimilarity,
-    /// How alike they are there, in `[0, 1]`: the mean over the part.
+    /// Their similarity there, in `[0, 1]`: the mean over the part.
     pub cosine: f64,
 }
 
@@ -47,7 +49,7 @@ pub struct Alignment {
 type Offset = [f64; 4];
 
 impl CellCosines {
-    /// By how much the pose is off.
+    /// The error of the pose.
     pub(crate) fn alignment(&self) -> Alignment {
         let reach = self.reach as f64;
         let moved = |offset: &Offset, k: usize, step: f64| {
@@ -63,7 +65,7 @@ impl CellCosines {
         Alignment { offset, cosine: self.mean_cosine(&cells, &found) }
     }
 
-    /// Index, place from the middle and weight of each cell of the part; the weights' sum is 1.
+    /// Index, position from the centre and weight of each cell of the part; the weights sum to 1.
     fn cells(&self) -> Vec<(usize, Vector2<f64>, f64)> {
         let middle = 0.5 * (self.map_px as f64 - 1.0);
         let of_part = || self.inside.iter().enumerate().filter(|(_, share)| **share >= MIN_INSIDE);
@@ -83,8 +85,8 @@ impl CellCosines {
         cells.iter().map(of_cell).sum()
     }
 
-    /// The cosine of a cell with the picture's map so far beside it, by Catmull-Rom splines between the shifts: between straight
-    /// lines the greatest value always lies at a whole cell.
+    /// The cosine of a cell with the picture's map at this offset, by Catmull-Rom splines between the shifts: with
+    /// linear interpolation the maximum would always lie at a whole cell.
     fn cosine(&self, cell: usize, x: f64, y: f64) -> f64 {
         let (reach, side) = (self.reach as i32, 2 * self.reach + 1);
         let cells = self.map_px * self.map_px;
@@ -106,7 +108,7 @@ fn penalty([dx, dy, turn, ln_size]: &Offset) -> f64 {
     SHIFT_PENALTY * (dx * dx + dy * dy) + TURN_PENALTY * (turn * turn + ln_size * ln_size)
 }
 
-/// Weights of four neighbouring values for a place between the second and the third, `t` from 0 to 1.
+/// Weights of four neighbouring values for a position between the second and the third, `t` from 0 to 1.
 fn catmull_rom(t: f64) -> [f64; 4] {
     [
         0.5 * t * ((2.0 - t) * t - 1.0),
@@ -120,7 +122,7 @@ fn catmull_rom(t: f64) -> [f64; 4] {
 mod tests {
     use super::*;
 
-    /// Cosines that fall off with the distance from where an offset puts each cell.
+    /// Cosines that decrease with the distance from the position given by an offset for each cell.
     fn cosines(offset: &PlanarSimilarity, map_px: usize, reach: usize) -> Vec<f32> {
         let (middle, side) = (0.5 * (map_px as f64 - 1.0), 2 * reach + 1);
         let at = |shift: usize, cell: usize| {

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// A setting that no network can be built with.
+/// A setting with which no network can be built.
 #[derive(Debug, Error)]
 #[error("comparison network: {field} must be {expected}, found {found}")]
 pub struct ComparisonError {
@@ -17,13 +17,13 @@ pub struct ComparisonError {
 pub struct ComparisonConfig {
     /// S: side of a view, in pixels.
     pub input_px: u32,
-    /// Channels of the stages that look at the demonstration and the picture each alone.
+    /// Channels of the stages that process demonstration and picture separately.
     pub trunk_channels: Vec<usize>,
     /// Convolutions of each of them, the halving one included.
     pub trunk_convs: Vec<usize>,
-    /// Cells along each axis by which the demonstration's map is moved over the picture's.
+    /// Range in cells, along each axis, by which the demonstration's map is shifted over the picture's.
     pub reach: usize,
-    /// Channels of each stage that looks at what differs.
+    /// Channels of each stage that processes the differences.
     pub stage_channels: Vec<usize>,
     /// Convolutions of each stage, the halving one included; as many as there are stages.
     pub stage_convs: Vec<usize>,
@@ -48,7 +48,7 @@ impl ComparisonConfig {
         }
     }
 
-    /// Views of twice the pixels along each side. Log-odds are learnt for one size; where features lie shows in any.
+    /// Views of twice the resolution. Log-odds are learnt for one size; positions of features can be found at any.
     pub fn finer(&self) -> Self {
         Self { input_px: 2 * self.input_px, ..self.clone() }
     }

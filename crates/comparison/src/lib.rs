@@ -1,4 +1,4 @@
-//! The comparison network: does a place of a picture show the part of a demonstration, in the pose that a model read there?
+//! The comparison network: does a place of a picture show the part of a demonstration at the model's pose?
 //!
 //! ```text
 //! demonstration, outline ─ upright, S×S ───────────────┐
@@ -6,13 +6,13 @@
 //! picture, pose ─ turned upright by the pose, S×S ─────┘
 //! ```
 //!
-//! Both are cut by the pose, so that the same place of the part is the same pixel of both, and what remains is whether
-//! they look alike. That question is the same for every part, so nothing in the network belongs to one part; it is learnt
-//! once, on generated parts and their look-alikes, and teaching adds nothing but the demonstration.
+//! Both are cropped by the pose, so that the same place of the part is the same pixel of both, and only their
+//! similarity remains to be judged. That question is the same for every part, so that the network is not specific to
+//! any part: it is trained once, on generated parts and their look-alikes, and teaching only adds the demonstration.
 //!
 //! **Frame of a view.** A square about the middle of the outline's box, in the demonstration's direction, x right, y down.
 //!
-//! Left out: finding the part and its pose (crates `detection`, `grasp`), pretraining (`base-weights`), files.
+//! Elsewhere: finding the part and its pose (crates `detection`, `grasp`), pretraining (`base-weights`), files.
 //!
 //! # Source
 //! Both as channels of one input: the 2-channel network of Zagoruyko and Komodakis, Learning to Compare Image Patches via

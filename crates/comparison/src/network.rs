@@ -19,7 +19,7 @@ const SQUARE_EPSILON: f32 = 1e-4;
 pub struct ComparisonNetwork {
     /// From a square of the demonstration or of the picture to its map; the same for both.
     pub trunk: Vec<Stage>,
-    /// From what differs to the last map.
+    /// From the differences to the last map.
     pub stages: Vec<Stage>,
     /// Fully connected layer, from the flattened last map.
     pub hidden: Linear,
@@ -39,10 +39,10 @@ impl ComparisonConfig {
         Ok(ComparisonNetwork::init(self, &mut Initializer::new(device, seed)))
     }
 
-    /// Builds the network without drawing its parameters, for who sets all of them next.
+    /// Builds the network without initial values, for a caller that sets all parameters next.
     ///
     /// # Errors
-    /// As [`Self::init`].
+    /// As for [`Self::init`].
     pub fn init_blank(&self, device: &Device) -> Result<ComparisonNetwork, ComparisonError> {
         self.check()?;
         Ok(ComparisonNetwork::init(self, &mut Initializer::blank(device)))
@@ -58,7 +58,7 @@ impl ComparisonNetwork {
         let head = stages(compared, 3, &config.stage_channels, &config.stage_convs, groups, init);
         let flat = config.stage_channels.last().copied().unwrap_or(compared) * config.last_map_px().pow(2);
         let hidden = Linear::init(flat, config.hidden, Distribution::he_normal(flat), init);
-        // Small first outputs: undecided.
+        // Small first outputs: the network is undecided.
         let output = Linear::init(config.hidden, 1, Distribution::Normal { std: 0.01 }, init);
         Self { trunk, stages: head, hidden, output, config: config.clone() }
     }
@@ -73,7 +73,7 @@ impl ComparisonNetwork {
         self.output.weight.val().device()
     }
 
-    /// The log-odds that each view shows the part in the pose that it was made by, `[N, 1]`.
+    /// The log-odds that each view shows the part in the view's pose, `[N, 1]`.
     ///
     /// # Panics
     /// Without a view, or with views of another network's references.
@@ -82,7 +82,7 @@ impl ComparisonNetwork {
         self.log_odds(&maps)
     }
 
-    /// The log-odds of each view, and by how much its pose is off.
+    /// The log-odds of each view, and the error of its pose.
     ///
     /// # Panics
     /// With views of another network's references.
@@ -91,7 +91,7 @@ impl ComparisonNetwork {
             return Vec::new();
         }
         let maps = self.maps(views);
-        // One tensor, because a device is waited for once for each that is read.
+        // One tensor, because each read waits for the device.
         let read = Tensor::cat(vec![self.log_odds(&maps), maps.cells()], 1);
         let map_px = maps.map_px();
         let of_view = |values: &[f32]| {
@@ -101,8 +101,8 @@ impl ComparisonNetwork {
         rows(read, views.len()).await.iter().map(|values| of_view(values)).collect()
     }
 
-    /// By how much the pose of each view is off. The views may be finer than those that the log-odds are learnt on
-    /// ([`ComparisonConfig::finer`]), since what finds features is the same at every place.
+    /// The error of the pose of each view. The views may be finer than those on which the log-odds are learnt
+    /// ([`ComparisonConfig::finer`]), since the features are computed in the same way at every position.
     ///
     /// # Panics
     /// With views of several sizes.
@@ -115,7 +115,7 @@ impl ComparisonNetwork {
         rows(maps.cells(), views.len()).await.iter().map(|values| self.cells(values, map_px).alignment()).collect()
     }
 
-    /// Out of the shares inside the outline and the cosines of one view.
+    /// From the shares inside the outline and the cosines of one view.
     fn cells(&self, values: &[f32], map_px: usize) -> CellCosines {
         let (inside, cosines) = values.split_at(map_px * map_px);
         CellCosines { cosines: cosines.to_vec(), inside: inside.to_vec(), reach: self.config.reach, map_px }
@@ -143,19 +143,19 @@ impl ComparisonNetwork {
 /// The output of the network for a view.
 #[derive(Debug, Clone)]
 pub struct Comparison {
-    /// The log-odds that the view shows the part in the pose that it was made by.
+    /// The log-odds that the view shows the part in the view's pose.
     pub log_odds: f64,
     cells: CellCosines,
 }
 
 impl Comparison {
-    /// By how much the pose is off.
+    /// The error of the pose.
     pub fn alignment(&self) -> Alignment {
         self.cells.alignment()
     }
 }
 
-/// What is compared, of N views.
+/// The compared features of N views.
 #[derive(Clone)]
 struct Maps {
     /// `[N, C, M, M]`.
@@ -259,7 +259,7 @@ mod tests {
     fn correlation_is_one_where_the_maps_are_the_same_and_finds_a_shift() {
         let network = ComparisonConfig::edge().init(&Device::flex(), 5).unwrap();
         let map = Tensor::<4>::random([1, 48, 16, 16], burn::tensor::Distribution::Normal(0.0, 1.0), &Device::flex());
-        // What the picture shows one cell to the right.
+        // The picture's content shifted one cell to the right.
         let moved = Tensor::cat(vec![map.clone().narrow(3, 15, 1), map.clone().narrow(3, 0, 15)], 3);
         let strongest = |other: &Tensor<4>| {
             let values = cosines(map.clone(), other.clone(), network.config.reach, SQUARE_EPSILON)

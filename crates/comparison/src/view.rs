@@ -1,4 +1,4 @@
-//! Views: what the network looks at.
+//! Views: the input of the network.
 
 use std::sync::Arc;
 
@@ -10,22 +10,22 @@ use sdg_orientation::{CropWindow, OUTSIDE, Pyramid};
 
 use crate::config::ComparisonConfig;
 
-/// Channels of one side: the colours, and the same less their mean on the part and over their deviation there.
+/// Channels of one side: the colours, and the same normalised by their mean and deviation on the part.
 const COLOURS: usize = 6;
-/// Channels that say how far the two sides differ on the part, colour by colour, and the share of each cell inside the
+/// Channels with the differences of the two sides on the part, for each colour, and the share of each cell inside the
 /// outline.
 pub const DIFFERENCES: usize = COLOURS + 1;
 
-/// Side of a view over the longer side of the outline's box: room for a pose that is a little off.
+/// Side of a view over the longer side of the outline's box: room for a small error of the pose.
 const SIDE_PER_LENGTH: f64 = 1.25;
-/// Grey values that make one unit of the colours: about the deviation of photos.
+/// Grey values per unit of the colours: about the deviation of photos.
 const GREY_VALUES_PER_UNIT: f32 = 58.0;
 /// Added to the deviation on the part, so that noise on an even part stays small, in grey values.
 const DEVIATION_EPSILON: f32 = 12.0;
-/// Points of a pixel along each axis that are asked whether they lie inside the outline.
+/// Sample points of a pixel along each axis for the test whether they lie inside the outline.
 const MASK_SAMPLES: u32 = 2;
 
-/// What the network compares.
+/// The compared images.
 #[derive(Debug, Clone, PartialEq)]
 pub struct View {
     /// The demonstration's colours, `[3, S, S]`; all views of one reference share them.
@@ -37,8 +37,8 @@ pub struct View {
 }
 
 impl View {
-    /// How far the two sides differ on the part, `[DIFFERENCES, M, M]`: three colours, the same normalised, and the share of
-    /// each cell inside the outline. M is [`ComparisonConfig::trunk_map_px`].
+    /// The differences of the two sides on the part, `[DIFFERENCES, M, M]`: three colours, the same normalised, and the
+    /// share of each cell inside the outline. M is [`ComparisonConfig::trunk_map_px`].
     pub fn differences(&self) -> &[f32] {
         &self.differences
     }
@@ -60,7 +60,7 @@ pub struct Reference {
 }
 
 impl Reference {
-    /// The part inside `outline` of `image`, for the views of a network. What is outside of the outline is not seen.
+    /// The part inside `outline` of `image`, for the views of a network. Pixels outside the outline are ignored.
     pub fn new(image: &RgbImage, outline: &Polygon, config: &ComparisonConfig) -> Self {
         let input_px = config.input_px;
         let bounds = outline.bounds();
@@ -87,7 +87,7 @@ impl Reference {
         Self { window, mask, own, shared, input_px, cell_px }
     }
 
-    /// The demonstration, and what a picture shows where a pose puts it; pixels of the demonstration's image to pixels of the
+    /// The demonstration, and the picture at a pose, which maps pixels of the demonstration's image to pixels of the
     /// picture.
     pub fn view(&self, picture: &Pyramid<'_>, image_from_demonstration: &PlanarSimilarity) -> View {
         let window = CropWindow {
@@ -111,7 +111,7 @@ impl Reference {
         View { demonstration: self.shared.clone(), picture: seen, differences }
     }
 
-    /// A pose of this demonstration, corrected by the offset of its view's [`crate::Comparison`].
+    /// A pose of this demonstration, corrected by the offset from its view's [`crate::Comparison`].
     pub fn corrected(&self, pose: &PlanarSimilarity, offset: &PlanarSimilarity) -> PlanarSimilarity {
         let px_per_cell = self.window.side / f64::from(self.input_px) * self.cell_px as f64;
         let center = self.window.center;
@@ -132,7 +132,7 @@ impl Reference {
     }
 }
 
-/// The colours of a crop as the network sees them, `[COLOURS, S, S]`.
+/// The colours of a crop in the network's form, `[COLOURS, S, S]`.
 fn colours(crop: &RgbImage, mask: &[f32]) -> Vec<f32> {
     let num_pixels = mask.len();
     let mut values = vec![0f32; COLOURS * num_pixels];
@@ -160,7 +160,7 @@ fn colours(crop: &RgbImage, mask: &[f32]) -> Vec<f32> {
 pub(crate) struct Batch {
     /// Each demonstration once, `[D, 3, S, S]`.
     pub(crate) demonstrations: Tensor<4>,
-    /// Which of them each view has, `[N]`.
+    /// The index of each view's demonstration, `[N]`.
     pub(crate) demonstration_of_view: Tensor<1, Int>,
     /// `[N, 3, S, S]`.
     pub(crate) pictures: Tensor<4>,

@@ -1,10 +1,10 @@
-//! Proposed outlines beside drawn ones, without clicks and after one and two clicks of a simulated person: overlap, share of the
-//! true outline within 3 px or 1 % of the part's diagonal, time; medians at the end.
+//! Compares proposed outlines with drawn ones, without clicks and after one and two clicks of a simulated person:
+//! overlap, share of the true outline within 3 px or 1 % of the part's diagonal, time; medians at the end.
 //!
 //! ```sh
 //! cargo run --release -p sdg-demonstration --example outlines -- PICTURE[:ANNOTATION] …
 //! ```
-//! The annotation stands beside the picture as .json where none is named; every outline in it counts.
+//! The default annotation is the .json file beside the picture; every outline in it counts.
 
 #[path = "../tests/outlines/simulated_person.rs"]
 mod simulated_person;

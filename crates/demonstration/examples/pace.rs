@@ -1,4 +1,4 @@
-//! How long a sample takes on one thread: the paper's, whole frames and windows, at the sizes that teaching uses.
+//! Time per sample on one thread: the paper's, whole frames and windows, at the sizes that teaching uses.
 //!
 //! ```sh
 //! cargo run --release -p sdg-demonstration --example pace -- IMAGE ANNOTATION [SAMPLES]

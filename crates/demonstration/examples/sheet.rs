@@ -1,9 +1,9 @@
-//! A contact sheet of augmented samples with their marks, to look at.
+//! A contact sheet of augmented samples with their marks, for inspection.
 //!
 //! ```sh
 //! cargo run --release -p sdg-demonstration --example sheet -- IMAGE ANNOTATION OUT.png [paper] [seed] [first]
 //! ```
-//! Without arguments it draws a part of its own and writes `sheet.png`. Box green, outline yellow, keypoints from blue
+//! Without arguments it draws its own part and writes `sheet.png`. Box green, outline yellow, keypoints from blue
 //! (start) to red (end), hidden ones hollow.
 
 use std::error::Error;

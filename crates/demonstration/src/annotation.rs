@@ -1,4 +1,4 @@
-//! What a person marked on a photo: the box, the grasp line, the outline.
+//! The marks of a person on a photo: the box, the grasp line, the outline.
 
 use sdg_geometry::{BoundingBox, GraspLine, Polygon};
 
@@ -9,24 +9,26 @@ use crate::{Error, Result};
 pub struct Annotation {
     /// The object's name.
     pub label: String,
-    /// The box around it: as drawn, or around the outline where none was drawn.
+    /// The box around it: as drawn, or around the outline if none was drawn.
     pub bbox: BoundingBox,
     /// The two points of the grasp, if marked.
     pub grasp: Option<GraspLine>,
-    /// How far apart the jaws are where they close on the part, in pixels, if marked; without it, the outline tells.
+    /// Opening of the jaws where they close on the part, in pixels, if marked; otherwise it is measured from the
+    /// outline.
     pub jaw_width: Option<f64>,
     /// The outline, if drawn.
     pub outline: Option<Polygon>,
 }
 
-/// The image that an annotation is read for.
+/// The image of an annotation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ImageFacts<'a> {
     /// Width, in pixels.
     pub width: u32,
     /// Height, in pixels.
     pub height: u32,
-    /// The image's path or file name, by which a COCO file of several images is searched; folders choose among images of one name.
+    /// The image's path or file name, by which a COCO file of several images is searched; the folders decide among
+    /// images of the same name.
     pub file_name: Option<&'a str>,
 }
 
@@ -38,12 +40,12 @@ impl ImageFacts<'_> {
 }
 
 impl Annotation {
-    /// The outline, or the box where none was drawn.
+    /// The outline, or the box if none was drawn.
     pub fn region(&self) -> Polygon {
         self.outline.clone().unwrap_or_else(|| Polygon::from_box(&self.bbox))
     }
 
-    /// The grasp line, or an error that says who needs it.
+    /// The grasp line, or an error with the reason why it is needed.
     ///
     /// # Errors
     /// [`Error::Lacking`].
@@ -57,13 +59,14 @@ impl Annotation {
         })
     }
 
-    /// Whether box, grasp and outline can be those of one part.
+    /// Whether box, grasp and outline can belong to one part.
     ///
     /// # Errors
-    /// [`Error::Contradictory`]: an outline whose own box is another one, a grasp line that does not touch the box, and a box that is only that of
-    /// the line's two points.
+    /// [`Error::Contradictory`]: an outline with another bounding box, a grasp line that does not touch the box, and a
+    /// box that contains only the line's two points.
     pub fn check(&self) -> Result<()> {
-        /// Least overlap of the box and that of the outline: a box with a margin of 40 % on each side has a third.
+        /// Minimum overlap of the box and the outline's bounding box: a box with a margin of 40 % on each side has a
+        /// third.
         const MIN_IOU: f64 = 0.3;
         /// Files round coordinates.
         const ROUNDING_PX: f64 = 1.5;
@@ -91,7 +94,7 @@ impl Annotation {
             let found = format!("the grasp {} and the box {}", in_words(&of_line), in_words(&self.bbox));
             return contradictory("a grasp line that crosses the box", found);
         }
-        // The opening is measured across the line's middle, and there is nothing to measure.
+        // The opening is measured across the line's midpoint, where there would be nothing to measure.
         if self.outline.is_none() && self.jaw_width.is_none() && !self.bbox.contains(&nalgebra::center(&start, &end)) {
             let found = format!("the grasp {} and the box {}", in_words(&of_line), in_words(&self.bbox));
             return contradictory("a grasp line whose middle lies in the box", found);
@@ -108,7 +111,7 @@ impl Annotation {
         Ok(())
     }
 
-    /// The outline, or an error that says who needs it.
+    /// The outline, or an error with the reason why it is needed.
     ///
     /// # Errors
     /// [`Error::Lacking`].
@@ -142,7 +145,7 @@ mod tests {
     #[test]
     fn marks_that_cannot_be_of_one_part_are_refused() {
         const BOX: [f64; 4] = [100.0, 80.0, 220.0, 160.0];
-        // Across a jutting piece the line begins and ends outside.
+        // Across a protrusion the line may begin and end outside.
         for grasp in [[180.0, 150.0, 200.0, 140.0], [90.0, 100.0, 140.0, 100.0], [200.0, 60.0, 200.0, 220.0]] {
             marked(BOX, grasp, None).check().unwrap();
             marked(BOX, grasp, Some([110.0, 90.0, 210.0, 150.0])).check().unwrap();
@@ -153,7 +156,7 @@ mod tests {
         };
         refused(marked(BOX, [30.0, 30.0, 60.0, 60.0], None), "a grasp line that crosses the box");
         refused(marked(BOX, [100.5, 160.0, 219.0, 80.0], None), "the box of the two grasp points");
-        // COCO's width and height written as the lower right corner.
+        // COCO's width and height given as the lower right corner.
         refused(marked([100.0, 80.0, 400.0, 280.0], [180.0, 150.0, 220.0, 140.0], Some(BOX)), "x, y, width, height");
     }
 }

@@ -1,7 +1,7 @@
 //! COCO JSON, the canonical annotation: `bbox` xywh, `keypoints` x y v named `grasp_start` and `grasp_end`,
-//! `segmentation` polygons; under `attributes`, where CVAT keeps what COCO has no field for, `jaw_width` in pixels and
-//! `grasp_offset`, the grasp's middle seen from the box's. Coordinates are this project's: the centre of the first pixel
-//! is (0.5, 0.5).
+//! `segmentation` polygons; under `attributes`, where CVAT stores values without a COCO field, `jaw_width` in pixels
+//! and `grasp_offset`, the grasp's centre relative to the box's. Coordinates are this project's: the centre of the
+//! first pixel is (0.5, 0.5).
 
 use nalgebra::Point2;
 use serde_json::{Value, json};
@@ -46,11 +46,11 @@ pub(crate) fn read_instances(root: &Node, image: &ImageFacts, border: Border) ->
             of_image.push(annotation);
         }
     }
-    // A mask that is all there is gets its error.
+    // A mask without any other mark gets its own error.
     if of_image.iter().any(|annotation| !is_foreign_annotation(annotation)) {
         of_image.retain(|annotation| !is_foreign_annotation(annotation));
     }
-    // Beside one with a grasp, keypoints of a category that names other ones mark something else.
+    // Beside an annotation with a grasp, keypoints of a category with other names mark something else.
     let has_grasp = |annotation: &Node| {
         let category = category_of(annotation, &categories).ok().flatten();
         category.is_some_and(|category| is_of_grasps(category)) && has_keypoints(annotation)
@@ -69,7 +69,7 @@ pub(crate) fn read_instances(root: &Node, image: &ImageFacts, border: Border) ->
 /// The category of an annotation, if the file has it.
 ///
 /// # Errors
-/// Two categories of one id that name other keypoints, so that which is the grasp's start is not known.
+/// Two categories of one id with different keypoint names, so that the grasp's start is unknown.
 fn category_of<'a, 'b>(annotation: &Node, categories: &'b [Node<'a>]) -> Result<Option<&'b Node<'a>>> {
     let Some(id) = annotation.optional("category_id")? else { return Ok(None) };
     let mut of_id =
@@ -79,7 +79,7 @@ fn category_of<'a, 'b>(annotation: &Node, categories: &'b [Node<'a>]) -> Result<
     match of_id.find(|other| keypoints(other) != keypoints(first)) {
         Some(other) => Err(Error::Malformed {
             place: format!("{}.id", other.place),
-            expected: "a number of its own".into(),
+            expected: "a unique number".into(),
             found: format!("{}, as {} has, with other keypoints", id.value, first.place),
         }),
         None => Ok(Some(first)),
@@ -92,7 +92,7 @@ fn is_of_grasps(category: &Node) -> bool {
     names.is_some_and(|names| ["grasp_start", "grasp_end"].iter().all(|end| names.iter().any(|name| name == end)))
 }
 
-/// Whether an annotation has a keypoint that is labelled: exporters write zeros for those that are not.
+/// Whether an annotation has a labelled keypoint: exporters write zeros for unlabelled ones.
 fn has_keypoints(annotation: &Node) -> bool {
     let keypoints = annotation.value.get("keypoints").and_then(Value::as_array);
     keypoints.is_some_and(|all| all.iter().any(|value| value.as_f64() != Some(0.0)))
@@ -146,7 +146,7 @@ fn read_object(node: &Node, categories: &[Node], needs_grasp_names: bool) -> Res
     Ok(draft)
 }
 
-/// Exporters write `[]` for what is not there.
+/// Exporters write `[]` for absent values.
 fn not_empty_list(node: &Node) -> bool {
     node.value.as_array().is_none_or(|items| !items.is_empty())
 }
@@ -189,7 +189,7 @@ fn read_keypoints(keypoints: &Node, category: Option<&Node>, draft: &mut Draft) 
     Ok(())
 }
 
-/// A COCO file while it is written: images and the objects on them.
+/// A COCO file under construction: images and their objects.
 ///
 /// ```
 /// use sdg_demonstration::CocoFile;
@@ -211,13 +211,13 @@ impl CocoFile {
         Self::default()
     }
 
-    /// Adds an image and what is marked on it; ids count up from 1.
+    /// Adds an image and its marks; ids count up from 1.
     pub fn push_image(&mut self, file_name: &str, width: u32, height: u32, objects: &[Annotation]) {
         let instances: Vec<_> = objects.iter().map(|object| LabelledInstance::new(object.clone(), false)).collect();
         self.push_labelled(file_name, width, height, &instances);
     }
 
-    /// Adds a test picture and the instances on it, each optional or not; ids count up from 1.
+    /// Adds a test picture and its instances, each optional or not; ids count up from 1.
     pub fn push_labelled(&mut self, file_name: &str, width: u32, height: u32, instances: &[LabelledInstance]) {
         let image_id = self.images.len() + 1;
         self.images.push(json!({"id": image_id, "file_name": file_name, "width": width, "height": height}));
@@ -352,7 +352,7 @@ mod tests {
             let mut file = other(keypoints, names);
             let read = read_named(&file, None).unwrap();
             assert_eq!((read[0].label.as_str(), read[0].grasp, &read[1]), ("hole", None, &expected[0]));
-            // Alone it may be the grasp by other names.
+            // On its own it may be the grasp under other names.
             file["annotations"].as_array_mut().unwrap().pop();
             let alone = read_named(&file, None);
             assert!(alone.is_err(), "{alone:?}");

@@ -1,4 +1,4 @@
-//! Which image of a COCO file a picture is.
+//! Finds a picture's image in a COCO file.
 
 use serde_json::Value;
 
@@ -7,7 +7,8 @@ use crate::file_name::{NameLikeness, base_name, common_parts};
 use crate::json::{Node, shorten};
 use crate::{Error, Result};
 
-/// The image of that name, of several the one whose folders fit best; the only image whatever its name, since people rename files.
+/// The image of that name, of several the one with the best matching folders; a single image under any name, because
+/// people rename files.
 pub(crate) fn choose_image<'a>(images: &[Node<'a>], image: &ImageFacts) -> Result<Node<'a>> {
     if let [only] = images {
         return Ok(only.clone());
@@ -47,7 +48,7 @@ pub(crate) fn choose_image<'a>(images: &[Node<'a>], image: &ImageFacts) -> Resul
         {
             return Err(Error::Malformed {
                 place: format!("{}.id", chosen.place),
-                expected: "a number of its own".into(),
+                expected: "a unique number".into(),
                 found: format!("{id}, as {} has", other.place),
             });
         }
@@ -135,7 +136,7 @@ mod tests {
         let mut twice = of(["other.jpg", "image.jpg"]);
         twice["images"][1]["id"] = json!(1);
         let found = read_named(&twice, Some("image.jpg")).unwrap_err().to_string();
-        assert!(found.contains("images[1].id: expected a number of its own"), "{found}");
+        assert!(found.contains("images[1].id: expected a unique number"), "{found}");
     }
 
     #[test]

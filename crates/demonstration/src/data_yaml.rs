@@ -1,19 +1,18 @@
 //! The entries of a YOLO dataset's `data.yaml` that its labels need: `names`, `kpt_shape` and `kpt_names`.
 //!
-//! Read are the ways in which such files are written: a list in brackets, a list of dashes, a map from numbers. Other
-//! entries are left alone.
+//! It reads the usual forms: a list in brackets, a list of dashes, a map from numbers. Other entries are ignored.
 
 use crate::{Error, Result};
 
-/// More classes than any dataset has; bounds what a hostile file costs.
+/// More classes than any dataset has; limits the cost of a hostile file.
 const MAX_NAMES: usize = 100_000;
 
-/// What labels need to be read.
+/// The entries needed for reading labels.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct DataYaml {
     /// The label of each class.
     pub names: Vec<String>,
-    /// Keypoints an object, and numbers a keypoint: 2 or 3.
+    /// Number of keypoints per object, and numbers per keypoint: 2 or 3.
     pub keypoint_shape: Option<[usize; 2]>,
     /// The keypoints' names, by class; a list for all classes has none.
     pub keypoint_names: Vec<(Option<usize>, Vec<String>)>,
@@ -55,7 +54,7 @@ impl DataYaml {
         Ok(data)
     }
 
-    /// Where the grasp's start and end stand among the keypoints of a class; `None` where no names say it.
+    /// The indices of the grasp's start and end among the keypoints of a class; `None` if no names give them.
     pub fn grasp_among_keypoints(&self, class: usize, num_keypoints: usize) -> Option<[usize; 2]> {
         let of_class = self.keypoint_names.iter().find(|(of, _)| of.is_none_or(|of| of == class));
         let names = of_class.map(|(_, names)| names).filter(|names| names.len() == num_keypoints)?;
@@ -63,7 +62,7 @@ impl DataYaml {
         Some([place("grasp_start")?, place("grasp_end")?])
     }
 
-    /// As Ultralytics reads it; paths are for the user to fill in.
+    /// As Ultralytics reads it; users fill in the paths.
     pub fn to_text(&self) -> String {
         let mut text = String::new();
         if let Some([count, stride]) = self.keypoint_shape {
@@ -71,7 +70,7 @@ impl DataYaml {
         }
         text += "names:\n";
         for (class, name) in self.names.iter().enumerate() {
-            // Between single quotes only a single quote means anything; line ends would be folded.
+            // In single quotes only a single quote is special; line ends would be folded.
             let name = name.replace('\'', "''").replace(['\n', '\r'], " ");
             text += &format!("  {class}: '{name}'\n");
         }
@@ -112,7 +111,7 @@ fn entry(text: &str, name: &str) -> Option<Vec<(Option<String>, String)>> {
         }
     };
     if !rest.trim().is_empty() {
-        // A list or a map in brackets, which may go on over lines.
+        // A list or a map in brackets, which may continue over lines.
         let mut whole = rest.trim().to_owned();
         while !whole.contains([']', '}']) {
             whole += " ";
@@ -171,7 +170,7 @@ fn split_items(list: &str) -> Vec<String> {
     items
 }
 
-/// `key: value` taken apart where a key is expected, and quotes taken off.
+/// Splits `key: value` where a key is expected, and removes quotes.
 fn keyed(item: &str, has_key: bool) -> (Option<String>, String) {
     let unquoted = |text: &str| {
         let text = text.trim();

@@ -7,10 +7,10 @@ use crate::draft::Draft;
 use crate::erase::erase_parts;
 use crate::{Annotation, Error, ImageFacts, ImageLimits, Result, decode_image};
 
-/// How many keypoints stand for a grasp line: the two clicked points and ten evenly spaced between them.
+/// Number of keypoints of a grasp line: the two clicked points and ten evenly spaced between them.
 pub const NUM_KEYPOINTS: usize = 12;
 
-/// One photo and what is marked on it.
+/// One photo and its marks.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Demonstration {
     /// The photo, upright.
@@ -25,7 +25,7 @@ impl Demonstration {
     /// `file_name` is the photo's, by which a COCO file of several images is searched.
     ///
     /// # Errors
-    /// Whatever [`decode_image`] and [`Annotation::read`] refuse, and several objects.
+    /// The errors of [`decode_image`] and [`Annotation::read`], and several objects.
     pub fn decode(image: &[u8], annotation: &[u8], file_name: Option<&str>) -> Result<Self> {
         let mut all = Self::decode_all(image, annotation, file_name)?;
         match (all.pop(), all.len()) {
@@ -34,11 +34,11 @@ impl Demonstration {
         }
     }
 
-    /// Reads a photo of several marked objects as one demonstration each; from each photo the other objects are
-    /// removed, so that none of them is taught as background.
+    /// Reads a photo of several marked objects as one demonstration each; the other objects are removed from
+    /// each photo, so that none of them is taught as background.
     ///
     /// # Errors
-    /// Whatever [`decode_image`] and [`Annotation::read`] refuse.
+    /// The errors of [`decode_image`] and [`Annotation::read`].
     pub fn decode_all(image: &[u8], annotation: &[u8], file_name: Option<&str>) -> Result<Vec<Self>> {
         let image = decode_image(image, &ImageLimits::default())?;
         let facts = ImageFacts { width: image.width(), height: image.height(), file_name };
@@ -54,7 +54,7 @@ impl Demonstration {
             .collect())
     }
 
-    /// The same with what lies in these regions of the photo (pixels) removed, but nothing of the part.
+    /// The same with these regions of the photo (pixels) removed, except for the part itself.
     #[must_use]
     pub fn without(self, others: &[Polygon]) -> Self {
         if others.is_empty() {
@@ -64,7 +64,7 @@ impl Demonstration {
         Self { image, ..self }
     }
 
-    /// Checks a demonstration that was put together by hand.
+    /// Checks a demonstration that was assembled by hand.
     ///
     /// # Errors
     /// An annotation outside the image, without extent, not finite.
@@ -87,7 +87,7 @@ impl Demonstration {
     /// `count` keypoints evenly spaced on the grasp line, both ends included; [`NUM_KEYPOINTS`] by custom.
     ///
     /// # Errors
-    /// [`Error::Lacking`] where no grasp is marked.
+    /// [`Error::Lacking`] if no grasp is marked.
     pub fn keypoints(&self, count: usize) -> Result<Vec<Keypoint>> {
         Ok(self.annotation.require_grasp()?.keypoints(count))
     }

@@ -1,4 +1,4 @@
-//! What a reader has gathered of one object, and the checks that make an [`Annotation`] of it.
+//! The data of one object collected by a reader, and the checks that make an [`Annotation`] of it.
 
 use nalgebra::Point2;
 use sdg_geometry::{BoundingBox, GraspLine, Polygon};
@@ -6,14 +6,14 @@ use sdg_geometry::{BoundingBox, GraspLine, Polygon};
 use crate::annotation::{Annotation, ImageFacts};
 use crate::{Error, Result};
 
-/// A click may miss the image by this much and is moved to its edge; annotation tools let it.
+/// A click may miss the image by this much and is moved to its edge; annotation tools allow this.
 const EDGE_TOLERANCE_PX: f64 = 1.0;
 /// Boxes, grasp lines and outlines smaller than this were clicked by mistake.
 const MIN_EXTENT_PX: f64 = 1.0;
-/// More vertices than any hand draws; bounds the time that checking an outline takes.
+/// More vertices than any person draws; limits the time for checking an outline.
 const MAX_VERTICES: usize = 10_000;
 
-/// What a reader has gathered of one object, each with its place in the file.
+/// The data of one object, each with its position in the file.
 #[derive(Default)]
 pub(crate) struct Draft {
     pub label: Option<String>,
@@ -26,17 +26,18 @@ pub(crate) struct Draft {
     pub outline: Option<(Vec<Point2<f64>>, String)>,
 }
 
-/// Whether the picture's border may cut a part.
+/// Whether the picture's border may clip a part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Border {
-    /// A demonstration shows the whole part: marks outside the picture are mistakes.
+    /// A demonstration shows the whole part: marks outside the picture are errors.
     MustNotCut,
-    /// On a test picture the part may lie across the border: its box is cut, its outline left out.
+    /// On a test picture the part may extend beyond the border: its box is clipped, its outline left out.
     MayCut,
 }
 
 impl Draft {
-    /// For files with places in pixels: cuts, if need be, what reaches beyond the picture, then [`Self::finish`]. A grasp is never cut: it must lie inside.
+    /// For files with positions in pixels: clips marks to the picture if necessary, then calls [`Self::finish`]. A
+    /// grasp is never clipped: it must lie inside.
     pub fn finish_at(mut self, image: &ImageFacts, border: Border) -> Result<Annotation> {
         self.check_is_in_pixels(image)?;
         if border == Border::MustNotCut {
@@ -51,7 +52,7 @@ impl Draft {
             && let Some(bbox) = BoundingBox::around(corners.iter().copied())
         {
             let cut = bbox.clip(width, height);
-            // A box beside the picture stays as it is, to be refused with its place.
+            // A box beside the picture is not clipped, so that it is refused with its position in the file.
             if cut.width() >= MIN_EXTENT_PX && cut.height() >= MIN_EXTENT_PX {
                 *corners = cut.corners().to_vec();
             }
@@ -59,7 +60,7 @@ impl Draft {
         self.finish(image)
     }
 
-    /// Makes sure that no mark is given in shares of the image, which would be a place of a pixel in its corner.
+    /// Checks that no mark is given as a share of the image, which would be a pixel position in its corner.
     pub fn check_is_in_pixels(&self, image: &ImageFacts) -> Result<()> {
         let line: Vec<Point2<f64>> = self.grasp_start.iter().chain(&self.grasp_end).map(|(point, _)| *point).collect();
         let line_place = self.grasp_start.as_ref().map(|(_, place)| place.clone()).unwrap_or_default();
@@ -67,7 +68,7 @@ impl Draft {
         for (points, place) in marks.into_iter().flatten() {
             let is_share = |value: f64| (0.0..=1.0).contains(&value);
             let has_shares = points.len() > 1 && points.iter().all(|point| is_share(point.x) && is_share(point.y));
-            // Points of one place are a click that was made twice.
+            // Equal points are a double click.
             if has_shares && points[0] != points[1] {
                 let [first, last] = [points[0], points[points.len() - 1]];
                 return Err(Error::Malformed {
@@ -167,7 +168,7 @@ fn check_jaw_width(width: f64, place: String, image: &ImageFacts) -> Result<f64>
 
 fn check_outline(points: &[Point2<f64>], place: &str, image: &ImageFacts) -> Result<Polygon> {
     let mut vertices = points.iter().map(|&point| inside(point, place, image)).collect::<Result<Vec<_>>>()?;
-    // Tools repeat the first vertex at the end, and double clicks repeat any.
+    // Tools repeat the first vertex at the end, and double clicks repeat others.
     vertices.dedup();
     if vertices.len() > 1 && vertices.first() == vertices.last() {
         vertices.pop();

@@ -5,7 +5,7 @@ use sdg_geometry::Polygon;
 
 use crate::raster::Raster;
 
-/// Removes the parts inside `regions` from a photo, leaving what `keep` encloses.
+/// Removes the parts inside `regions` from a photo, except inside `keep`.
 pub(crate) fn erase_parts(image: &RgbImage, regions: &[Polygon], keep: Option<&Polygon>) -> RgbImage {
     let (width, height) = image.dimensions();
     let kept = keep.map(|polygon| polygon.rasterize(width, height));
@@ -29,7 +29,7 @@ pub(crate) fn erase_parts(image: &RgbImage, regions: &[Polygon], keep: Option<&P
     })
 }
 
-/// Fills the hole smoothly from its rim and adds the fine grain of another place of the picture.
+/// Fills the hole smoothly from its rim and adds the fine grain of another place in the picture.
 pub(crate) fn fill(picture: &Raster, hole: &[bool]) -> Raster {
     let mut filled = pull_push(picture, hole);
     let (width, height) = (picture.width, picture.height);
@@ -71,7 +71,7 @@ fn local_mean(picture: &Raster, hole: &[bool], x: usize, y: usize) -> [f32; 3] {
     sum.map(|s| s / count)
 }
 
-/// The shift of about the hole's own size under which most of the hole falls on known pixels.
+/// The shift, of about the hole's own size, for which most of the hole falls on known pixels.
 fn grain_offset(width: usize, height: usize, hole: &[bool]) -> Option<(isize, isize)> {
     let (mut x1, mut y1, mut x2, mut y2) = (width, height, 0, 0);
     for (at, _) in hole.iter().enumerate().filter(|&(_, &inside)| inside) {
@@ -91,14 +91,14 @@ fn grain_offset(width: usize, height: usize, hole: &[bool]) -> Option<(isize, is
     [(w, 0), (-w, 0), (0, h), (0, -h), (w, h), (-w, -h), (w, -h), (-w, h)].into_iter().max_by_key(known)
 }
 
-/// Averages known pixels into ever coarser levels, then fills each level's holes from the next coarser one.
+/// Averages known pixels into increasingly coarse levels, then fills each level's holes from the next coarser one.
 ///
 /// # Source
 /// Gortler et al. 1996, "The Lumigraph", section 3.4.
 fn pull_push(picture: &Raster, hole: &[bool]) -> Raster {
     let mut level = picture.clone();
     for (pixel, &inside) in level.pixels.iter_mut().zip(hole) {
-        // The fourth float is the weight, colours are kept multiplied by it.
+        // The fourth float is the weight, colours are stored multiplied by it.
         *pixel = if inside { [0.0; 4] } else { [pixel[0], pixel[1], pixel[2], 1.0] };
     }
     let mut levels = vec![level];
@@ -113,7 +113,7 @@ fn pull_push(picture: &Raster, hole: &[bool]) -> Raster {
             }
         }
         for pixel in &mut coarse.pixels {
-            // A weight saturates at one: a place that is known is not known any better by more pixels.
+            // A weight saturates at one: more pixels do not make a known value more certain.
             let factor = if pixel[3] > 1.0 { 1.0 / pixel[3] } else { 1.0 };
             *pixel = pixel.map(|v| v * factor);
         }
@@ -125,7 +125,7 @@ fn pull_push(picture: &Raster, hole: &[bool]) -> Raster {
             for x in 0..fine.width {
                 let pixel = &mut fine.pixels[y * fine.width + x];
                 if pixel[3] < 1.0 {
-                    // Nothing known at all: a middle grey.
+                    // Without any known pixel: a medium grey.
                     let below = match &coarse {
                         Some(coarse) => coarse.bilinear((x as f32 + 0.5) / 2.0, (y as f32 + 0.5) / 2.0),
                         None if pixel[3] > 0.0 => pixel.map(|v| v / pixel[3]),

@@ -1,4 +1,4 @@
-//! What can be wrong with a photo or its annotation, each with what was expected and what was found.
+//! Errors of a photo or its annotation, each with the expected and the found value.
 
 use sdg_picture::PictureError;
 use thiserror::Error;
@@ -6,10 +6,10 @@ use thiserror::Error;
 /// Result of this crate's functions.
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// Why a photo, an annotation or an augmentation was refused.
+/// The reason why a photo, an annotation or an augmentation was refused.
 ///
-/// `place` fields say where in the file: `line 3, column 7` for text that is no JSON, a path such as
-/// `shapes[2].points[0]` for JSON of the wrong content.
+/// `place` fields give the position in the file: `line 3, column 7` for text that is not JSON, a
+/// path such as `shapes[2].points[0]` for JSON of the wrong content.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
@@ -17,16 +17,16 @@ pub enum Error {
     /// The photo itself.
     #[error(transparent)]
     Picture(#[from] PictureError),
-    /// The annotation is not JSON at all, nor of a format that is something else.
+    /// The annotation is neither JSON nor of another known format.
     #[error("annotation is not JSON ({place}): {reason}")]
     NotJson { place: String, reason: String },
-    /// JSON, but neither COCO nor LabelMe; or nothing that annotations are written in.
+    /// JSON, but neither COCO nor LabelMe; or not an annotation at all.
     #[error(
         "wrong annotation file: expected COCO JSON (`images`, `annotations`), LabelMe JSON (`shapes`), YOLO-pose labels \
          or OpenDR's .npy, found {found}"
     )]
     WrongFile {
-        /// The keys or the kind of value at the top.
+        /// The top-level keys or the kind of value.
         found: String,
     },
     /// A value in the annotation is missing or of the wrong kind.
@@ -68,14 +68,14 @@ pub enum Error {
     /// Two edges of the outline cross.
     #[error("annotation, {place}: expected an outline that does not cross itself, found edges that cross")]
     SelfCrossing { place: String },
-    /// There is no object in the annotation of this image.
+    /// The annotation of this image contains no object.
     #[error("annotation holds no object: expected {expected}, found {found}")]
     NoObject {
-        /// What an object needs.
+        /// The requirements of an object.
         expected: String,
         found: String,
     },
-    /// Several shapes of one kind and nothing that says which belong together.
+    /// Several shapes of one kind without an assignment to objects.
     #[error("annotation of several objects: expected a `group_id` on every shape, found {found}")]
     Ungrouped {
         /// Groups and shapes that were found.
@@ -87,29 +87,29 @@ pub enum Error {
     /// The COCO file has no image of that name, or several images and no name was given.
     #[error("annotation of several images: expected {expected}, found {found}")]
     ImageNotFound {
-        /// The file name looked for.
+        /// The requested file name.
         expected: String,
-        /// The names that the file has.
+        /// The names in the file.
         found: String,
     },
-    /// A format of two files, of which one is not there.
+    /// A format of two files, of which one is missing.
     #[error("annotation in two files: expected {expected}, found {found}")]
     MissingBeside { expected: &'static str, found: &'static str },
     /// A format that is read but not written.
     #[error("annotations are not written in the format `{format}`: expected coco, labelme or yolo-pose")]
     ReadOnlyFormat { format: &'static str },
-    /// What a model needs and the annotation lacks.
+    /// An annotation without marks that a model needs.
     #[error("annotation of `{label}` lacks {missing}: {why}")]
     Lacking {
         label: String,
         missing: &'static str,
-        /// Who needs it, and how to add it.
+        /// The reason why it is needed, and how to add it.
         why: String,
     },
-    /// Marks of one part that cannot all be right.
+    /// Marks of one part that contradict each other.
     #[error("contradictory marks of `{label}`: expected {expected}, found {found}")]
     Contradictory { label: String, expected: &'static str, found: String },
-    /// An augmentation setting makes no sense.
+    /// An invalid augmentation setting.
     #[error("augmentation, {setting}: expected {expected}, found {found}")]
     Setting { setting: &'static str, expected: String, found: String },
 }

@@ -1,13 +1,14 @@
-//! Names of pictures in files of marks: written on another system, as a web address, before the picture was converted.
+//! Names of pictures in annotation files: from another system, as a web address, or from before a conversion of the
+//! picture.
 
-/// How like a name in a file is to the picture's, from the surest on.
+/// Similarity of a name in a file to the picture's, the most certain first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum NameLikeness {
     /// The last part of the path is the same.
     Same,
     /// The same with escapes of web addresses resolved, accents composed, and in lower case.
     Folded,
-    /// The same but for the ending: the picture was converted.
+    /// The same except the extension: the picture was converted.
     Stem,
 }
 
@@ -27,12 +28,12 @@ impl NameLikeness {
     }
 }
 
-/// A path's last part, whichever system wrote it.
+/// A path's last part, for any system's separator.
 pub(crate) fn base_name(path: &str) -> &str {
     path.rsplit(['/', '\\']).next().unwrap_or(path)
 }
 
-/// How many parts of two paths are the same, from the last one on, whichever system wrote them.
+/// Number of equal parts of two paths, counted from the last, for any system's separator.
 pub(crate) fn common_parts(one: &str, other: &str) -> usize {
     fn parts(path: &str) -> impl Iterator<Item = &str> {
         path.rsplit(['/', '\\']).filter(|part| !part.is_empty() && *part != ".")
@@ -40,7 +41,7 @@ pub(crate) fn common_parts(one: &str, other: &str) -> usize {
     parts(one).zip(parts(other)).take_while(|(one, other)| is_same_folded(one, other)).count()
 }
 
-/// Whether two names are the same across systems; one of them may have escapes of web addresses, or look as if it had.
+/// Whether two names are equal across systems; one of them may have escapes of web addresses, or look as if it had.
 fn is_same_folded(one: &str, other: &str) -> bool {
     let folded = |name: &str| composed(name).to_lowercase();
     let [resolved_one, resolved_other] = [one, other].map(|name| folded(&without_escapes(name)));
@@ -48,7 +49,7 @@ fn is_same_folded(one: &str, other: &str) -> bool {
     one == other || one == resolved_other || resolved_one == other
 }
 
-/// With `%20` and its like resolved; the name as it is where that gives no text.
+/// With `%20` and similar escapes resolved; the unchanged name if that gives no text.
 pub(crate) fn without_escapes(name: &str) -> String {
     let bytes = name.as_bytes();
     let hex = |at: usize| char::from(*bytes.get(at)?).to_digit(16);
@@ -68,7 +69,7 @@ pub(crate) fn without_escapes(name: &str) -> String {
     String::from_utf8(resolved).unwrap_or_else(|_| name.to_owned())
 }
 
-/// With the combining accents that macOS writes put together with their letters, for the letters of European languages.
+/// With the combining accents of macOS composed with their letters, for the letters of European languages.
 fn composed(name: &str) -> String {
     const ACCENTS: [(char, &str, &str); 6] = [
         ('\u{300}', "aeiouAEIOU", "àèìòùÀÈÌÒÙ"),

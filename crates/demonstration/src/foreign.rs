@@ -1,4 +1,4 @@
-//! Marks of something else that stand beside those of the part: they are passed over, and told.
+//! Marks of other objects beside those of the part: they are skipped and reported.
 
 use crate::json::{self, Node, shorten};
 
@@ -7,13 +7,13 @@ pub(crate) fn is_foreign_shape(shape: &Node) -> bool {
     let text = |key: &str| shape.value.get(key).and_then(|value| value.as_str()).map(str::trim);
     match text("shape_type") {
         Some("circle" | "line" | "linestrip" | "points" | "mask") => true,
-        // A misspelt grasp is no other thing.
+        // A misspelt grasp is not another object.
         Some("point") => text("label").is_some_and(|label| !label.to_lowercase().contains("grasp")),
         _ => false,
     }
 }
 
-/// Whether a COCO annotation is a crowd's or a run-length mask without keypoints.
+/// Whether a COCO annotation is a crowd or a run-length mask without keypoints.
 pub(crate) fn is_foreign_annotation(annotation: &Node) -> bool {
     let value = |key: &str| annotation.value.get(key);
     let is_crowd = value("iscrowd").is_some_and(|crowd| crowd == 1 || crowd == true);
@@ -23,7 +23,7 @@ pub(crate) fn is_foreign_annotation(annotation: &Node) -> bool {
     (is_crowd || is_mask) && !has_keypoints
 }
 
-/// What is passed over in a COCO or LabelMe file, in words.
+/// The skipped marks of a COCO or LabelMe file, in words.
 pub(crate) fn passed_over(bytes: &[u8]) -> Vec<String> {
     let Ok(value) = json::parse(bytes) else { return Vec::new() };
     let root = Node::root(&value);

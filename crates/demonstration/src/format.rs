@@ -1,4 +1,4 @@
-//! The files that hold annotations: which of them one is, and what a file holds besides.
+//! The annotation formats: recognition of a file's format, and its declared images.
 
 use crate::file_name::without_escapes;
 use crate::json::{self, Node, describe};
@@ -10,20 +10,20 @@ use crate::{Annotation, CocoFile, Error, ImageFacts, Result, coco, foreign, labe
 /// A kind of annotation file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AnnotationFormat {
-    /// COCO JSON, the canonical one: holds everything.
+    /// COCO JSON, the canonical format: contains everything.
     Coco,
-    /// LabelMe JSON: holds everything.
+    /// LabelMe JSON: contains everything.
     LabelMe,
-    /// Text of one object a line, as Ultralytics' pose models learn from: no outlines; labels in a `data.yaml` beside it.
+    /// Text with one object per line, for Ultralytics' pose models: no outlines; labels in a `data.yaml` beside it.
     YoloPose,
     /// `boxes_*.npy` and `kps_*.npy` of OpenDR's augmentation: no outlines, no labels; read only.
     OpenDr,
 }
 
-/// The size that an annotation file says of an image.
+/// The size of an image according to an annotation file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DeclaredImage {
-    /// The image's file name, as it stands there.
+    /// The image's file name, as written there.
     pub file_name: Option<String>,
     /// Width, in pixels.
     pub width: u32,
@@ -45,10 +45,10 @@ impl AnnotationFormat {
         }
     }
 
-    /// Tells the format by the content.
+    /// Recognises the format by the content.
     ///
     /// # Errors
-    /// Content that is none of them.
+    /// Content of none of them.
     pub fn of(bytes: &[u8]) -> Result<Self> {
         if npy::is_npy(bytes) {
             return Ok(Self::OpenDr);
@@ -62,10 +62,10 @@ impl AnnotationFormat {
         json_format(&json::parse(bytes)?)
     }
 
-    /// The images and sizes that a file declares; none for formats that declare none.
+    /// The images and sizes that a file declares; empty for formats without such declarations.
     ///
     /// # Errors
-    /// Content that is no annotation file, or sizes that are none.
+    /// Content that is not an annotation file, or invalid sizes.
     pub fn declared_images(bytes: &[u8]) -> Result<Vec<DeclaredImage>> {
         let format = Self::of(bytes)?;
         if !matches!(format, Self::Coco | Self::LabelMe) {
@@ -86,7 +86,7 @@ impl AnnotationFormat {
         Ok(declared.collect::<Result<Vec<_>>>()?.into_iter().flatten().collect())
     }
 
-    /// The one picture that a file says it is of, and the field that says so; its name may be a path or a web address.
+    /// The single picture that a file names, and the field with its name; the name may be a path or a web address.
     pub fn named_picture(bytes: &[u8]) -> Option<(&'static str, String)> {
         let value = json::parse(bytes).ok()?;
         let (field, name) = match json_format(&value).ok()? {
@@ -99,7 +99,7 @@ impl AnnotationFormat {
         Some((field, without_escapes(name?.as_str()?)))
     }
 
-    /// Writes what is marked on one image. What is read back is the same but for what `left_out` says.
+    /// Writes the marks of one image. Reading it back gives the same, except for the contents of `left_out`.
     ///
     /// # Errors
     /// [`Error::ReadOnlyFormat`] for OpenDR's.
@@ -129,33 +129,33 @@ impl AnnotationFormat {
 }
 
 impl Annotation {
-    /// What of a COCO or LabelMe file is passed over because it marks no part, in words: circles, lines, masks, points of other
+    /// The skipped marks of a COCO or LabelMe file that mark no part, in words: circles, lines, masks, points of other
     /// names, crowds.
     pub fn passed_over(bytes: &[u8]) -> Vec<String> {
         foreign::passed_over(bytes)
     }
 
-    /// Reads every object that a file marks on the image; the content says which [`AnnotationFormat`] it is.
+    /// Reads every object that a file marks on the image; the content determines the [`AnnotationFormat`].
     ///
     /// # Errors
-    /// A file that is none, one made on an image of another size, and whatever a [`Annotation`] may not be:
-    /// outside the image by more than a pixel, without extent, not finite, half a grasp line, an outline of fewer
-    /// than three points or one that crosses itself. Several objects need group ids (LabelMe). The message says where.
+    /// An invalid file, one made on an image of another size, and every invalid [`Annotation`]: outside the image by
+    /// more than a pixel, without extent, not finite, half a grasp line, an outline of fewer than three points or one
+    /// that crosses itself. Several objects need group ids (LabelMe). The message gives the position.
     pub fn read(bytes: &[u8], image: &ImageFacts) -> Result<Vec<Self>> {
         Self::read_with(bytes, None, image)
     }
 
-    /// As [`read`](Self::read), with the file that some formats keep `beside`: a YOLO dataset's `data.yaml`, or the other
-    /// one of OpenDR's two files.
+    /// As [`read`](Self::read), with the second file that some formats have in `beside`: a YOLO dataset's `data.yaml`,
+    /// or the other one of OpenDR's two files.
     ///
     /// # Errors
-    /// Those of [`read`](Self::read), and a file beside it that does not fit.
+    /// Those of [`read`](Self::read), and a second file that does not match.
     pub fn read_with(bytes: &[u8], beside: Option<&[u8]>, image: &ImageFacts) -> Result<Vec<Self>> {
         AnnotationFormat::of(bytes)?.read(bytes, beside, image)
     }
 }
 
-/// Tells LabelMe from COCO by the lists that they have.
+/// Distinguishes LabelMe from COCO by their lists.
 pub(crate) fn json_format(value: &serde_json::Value) -> Result<AnnotationFormat> {
     let is_list = |name: &str| value.get(name).is_some_and(serde_json::Value::is_array);
     if is_list("shapes") {

@@ -1,22 +1,22 @@
-//! A JSON value with its place in the file, so that an error can name it.
+//! A JSON value with its position in the file, so that an error can name it.
 
 use serde_json::{Map, Value};
 
 use crate::{Error, Result};
 
-/// A value and the path that leads to it.
+/// A value and the path to it.
 #[derive(Clone)]
 pub(crate) struct Node<'a> {
     pub value: &'a Value,
     pub place: String,
 }
 
-/// Parses the bytes, naming line and column of what is no JSON.
+/// Parses the bytes; errors give line and column.
 pub(crate) fn parse(bytes: &[u8]) -> Result<Value> {
-    // Windows editors like to put a byte order mark first; the parser does not.
+    // Windows editors often start with a byte order mark, which the parser does not accept.
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let parsed = serde_json::from_slice(bytes);
-    // Nothing here needs an area.
+    // No area is needed here.
     let parsed = parsed.or_else(|error| match without_area_literals(bytes) {
         Some(patched) => serde_json::from_slice(&patched),
         None => Err(error),
@@ -41,7 +41,8 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Value> {
     })
 }
 
-/// The same text of the same length with blanks and a 0 for each area that is Python's NaN or infinity; `None` where there is none.
+/// The same text of the same length with blanks and a 0 for each `area` with Python's NaN or infinity; `None` if there
+/// is none.
 fn without_area_literals(bytes: &[u8]) -> Option<Vec<u8>> {
     const KEY: &[u8] = b"\"area\"";
     let mut patched: Option<Vec<u8>> = None;
@@ -73,7 +74,7 @@ impl<'a> Node<'a> {
         self.value.as_object().ok_or_else(|| self.malformed("an object"))
     }
 
-    /// The field, absent and `null` alike being `None`.
+    /// The field; absent and `null` both give `None`.
     pub fn optional(&self, name: &str) -> Result<Option<Self>> {
         let place = if self.place.is_empty() { name.to_string() } else { format!("{}.{name}", self.place) };
         let value = self.object()?.get(name).filter(|value| !value.is_null());
@@ -121,7 +122,7 @@ impl<'a> Node<'a> {
     }
 }
 
-/// A short picture of a value.
+/// A short text form of a value.
 pub(crate) fn describe(value: &Value) -> String {
     match value {
         Value::Null => "null".into(),
@@ -146,7 +147,7 @@ fn key_list(value: &Value) -> String {
     names.join(", ")
 }
 
-/// File contents end up in messages; no more of them than a reader wants.
+/// File contents appear in messages, shortened to a readable length.
 pub(crate) fn shorten(text: &str) -> String {
     const LONGEST: usize = 40;
     if text.chars().count() <= LONGEST { text.to_string() } else { text.chars().take(LONGEST).chain(['…']).collect() }

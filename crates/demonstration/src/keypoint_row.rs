@@ -1,17 +1,18 @@
-//! Grasp lines in files that know keypoints only by their number.
+//! Grasp lines in files that identify keypoints only by their number.
 
 use nalgebra::Point2;
 
 use crate::draft::Draft;
 use crate::{Error, Result};
 
-/// How far a keypoint between the ends may stray from its place on the line, as a share of the line's length …
+/// Largest distance of a keypoint between the ends from its expected position on the line, as a share of the line's
+/// length …
 const MAX_STRAY_SHARE: f64 = 0.02;
-/// … and in pixels, whichever is more.
+/// … and in pixels; the larger value applies.
 const MAX_STRAY_PX: f64 = 1.5;
 
 /// Puts the first and the last keypoint into the draft as the grasp's ends; those between them must lie evenly on the
-/// line, as OpenDR's ten do: other keypoints mark something else. `None` is a keypoint that is not labelled.
+/// line, like OpenDR's ten, because other keypoints mark something else. `None` is an unlabelled keypoint.
 pub(crate) fn read_grasp(keypoints: &[Option<Point2<f64>>], place: &str, draft: &mut Draft) -> Result<()> {
     let (first, last) = match keypoints {
         [] => return Ok(()),

@@ -1,7 +1,7 @@
-//! Label files of pictures that a model is tested on: any number of instances a picture, none among them.
+//! Label files of test pictures: any number of instances per picture, including none.
 //!
-//! A demonstration marks one part and must have a grasp; a test picture may mark many parts, or none, which says that the
-//! part is not there. Boxes, points and outlines are read by the same code.
+//! A demonstration marks one part and must have a grasp; a test picture may mark many parts, or none, which means that
+//! the part is absent. Boxes, points and outlines are read by the same code.
 
 use serde_json::Value;
 
@@ -12,7 +12,7 @@ use crate::json::{self, Node, shorten};
 use crate::labelled_instance::LabelledInstance;
 use crate::{AnnotationFormat, Error, ImageFacts, Result, coco, labelme};
 
-/// A label file, LabelMe or COCO JSON, parsed once for however many pictures it labels.
+/// A label file, LabelMe or COCO JSON, parsed once for all the pictures that it labels.
 ///
 /// ```
 /// use sdg_demonstration::{ImageFacts, LabelFile};
@@ -34,7 +34,7 @@ impl LabelFile {
     /// Parses the file's bytes.
     ///
     /// # Errors
-    /// [`Error::NotJson`] and [`Error::NotFinite`] for what is no JSON, [`Error::WrongFile`] for other JSON.
+    /// [`Error::NotJson`] and [`Error::NotFinite`] for text that is not JSON, [`Error::WrongFile`] for other JSON.
     pub fn parse(bytes: &[u8]) -> Result<Self> {
         let value = json::parse(bytes)?;
         Ok(Self { format: json_format(&value)?, value })
@@ -45,10 +45,10 @@ impl LabelFile {
         self.format
     }
 
-    /// The names of the pictures that it labels, without folders, in the file's order. LabelMe: at most one.
+    /// The names of the labelled pictures, without folders, in the file's order. LabelMe: at most one.
     ///
     /// # Errors
-    /// A name that is no text; COCO without the list of images, an image without a name, or two of one name.
+    /// A name that is not text; COCO without the list of images, an image without a name, or two with the same name.
     pub fn picture_names(&self) -> Result<Vec<String>> {
         let root = Node::root(&self.value);
         let name = |node: &Node| node.text().map(|text| base_name(text).to_owned());
@@ -73,11 +73,11 @@ impl LabelFile {
         Ok(names)
     }
 
-    /// What is marked on one picture, in the file's order; nothing where the part is not there.
+    /// The marks of one picture, in the file's order; empty if the part is absent.
     ///
     /// # Errors
-    /// Those of [`Annotation::read`], but for [`Error::NoObject`] of a picture without any mark, and but for boxes and
-    /// outlines that lie across the picture's border. A grasp must lie inside.
+    /// Those of [`Annotation::read`], except [`Error::NoObject`] for a picture without marks, and except boxes and
+    /// outlines across the picture's border. A grasp must lie inside.
     pub fn instances(&self, image: &ImageFacts) -> Result<Vec<LabelledInstance>> {
         let root = Node::root(&self.value);
         match self.format {
@@ -173,7 +173,7 @@ mod tests {
         let value = labelme(shapes);
         let cut = parse(&value).instances(&IMAGE).unwrap().remove(0).annotation;
         assert_eq!((cut.bbox.to_xywh(), cut.outline), ([10.0, 0.0, 630.0, 30.0], None));
-        // Of a demonstration the whole part is wanted.
+        // A demonstration must show the whole part.
         let text = serde_json::to_vec(&value).unwrap();
         assert!(matches!(Annotation::read(&text, &IMAGE), Err(Error::OutsideImage { .. })));
 

@@ -1,17 +1,18 @@
-//! One part on a test picture, as it was labelled.
+//! One part on a test picture, as labelled.
 
 use crate::json::Node;
 use crate::{Annotation, Result};
 
-/// One part on a picture, as it was labelled.
+/// One part on a picture, as labelled.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LabelledInstance {
-    /// The marks, in pixels of the picture. Where the picture's border cuts the part, the box is cut and the outline left out.
+    /// The marks, in pixels of the picture. If the picture's border clips the part, the box is clipped and the outline
+    /// left out.
     pub annotation: Annotation,
-    /// Neither missed when it is not found nor wrong when it is: mostly covered, or seen from another side. LabelMe: the
+    /// Neither missed if it is not found nor wrong if it is: mostly covered, or seen from another side. LabelMe: the
     /// flag `optional` of any shape of the group; COCO: `attributes.optional`.
     pub optional: bool,
-    /// Where in the file it stands, such as `shapes[3]` or `annotations[0]`; empty for one that is not from a file.
+    /// Its position in the file, such as `shapes[3]` or `annotations[0]`; empty for one that does not come from a file.
     pub place: String,
 }
 
@@ -22,7 +23,7 @@ impl LabelledInstance {
     }
 }
 
-/// The flag `optional` of an object that holds flags or attributes; `false` where there is none.
+/// The flag `optional` of an object with flags or attributes; `false` if absent.
 pub(crate) fn is_optional(flags: Option<&Node>) -> Result<bool> {
     let Some(flags) = flags.filter(|flags| flags.value.is_object()) else { return Ok(false) };
     match flags.optional("optional")? {

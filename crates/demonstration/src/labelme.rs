@@ -1,4 +1,4 @@
-//! LabelMe JSON: a `rectangle`, points `grasp_start` and `grasp_end`, an optional `polygon`, tied by `group_id`.
+//! LabelMe JSON: a `rectangle`, points `grasp_start` and `grasp_end`, an optional `polygon`, connected by `group_id`.
 
 use std::collections::{BTreeSet, HashMap};
 
@@ -24,7 +24,7 @@ pub(crate) fn read(root: &Node, image: &ImageFacts) -> Result<Vec<Annotation>> {
     Ok(instances.into_iter().map(|instance| instance.annotation).collect())
 }
 
-/// Reads every object of a LabelMe file, if there is one, in the order in which their first shapes stand.
+/// Reads every object of a LabelMe file, if there is one, in the order of their first shapes.
 pub(crate) fn read_instances(root: &Node, image: &ImageFacts, border: Border) -> Result<Vec<LabelledInstance>> {
     if let (Some(width), Some(height)) = (root.optional("imageWidth")?, root.optional("imageHeight")?) {
         image.check_declared(width.pixels()?, height.pixels()?)?;
@@ -36,7 +36,7 @@ pub(crate) fn read_instances(root: &Node, image: &ImageFacts, border: Border) ->
         return Ok(Vec::new());
     }
 
-    // One group or none at all is one object, whether or not every shape carries the id.
+    // One group, or none at all, is one object, even if not every shape carries the id.
     let ids: BTreeSet<&str> = shapes.iter().filter_map(|shape| shape.group.as_deref()).collect();
     let ungrouped = shapes.iter().filter(|shape| shape.group.is_none()).count();
     if ids.len() <= 1 {
@@ -75,7 +75,7 @@ struct Shape {
     label: String,
     group: Option<String>,
     points: Vec<Point2<f64>>,
-    /// Of the grasp's start alone: LabelMe keeps fields that it does not know.
+    /// Only in the grasp's start: LabelMe keeps unknown fields.
     jaw_width: Option<(f64, String)>,
     optional: bool,
     place: String,
@@ -93,7 +93,7 @@ impl Shape {
                 _ => return Err(point.malformed("a pair [x, y]")),
             }
         }
-        // LabelMe's own default, left out by old versions.
+        // LabelMe's own default, omitted by old versions.
         let shape_type = node.optional("shape_type")?.map_or(Ok("polygon"), |kind| kind.text())?;
         let (kind, min_points) = match (shape_type, label.as_str()) {
             ("rectangle", _) => (Kind::Box, 2),
@@ -127,7 +127,7 @@ impl Shape {
     }
 }
 
-/// What the shapes of one group mark.
+/// The marks in the shapes of one group.
 fn object(shapes: Vec<Shape>) -> Result<Draft> {
     let mut draft =
         Draft { place: shapes.first().map(|shape| shape.place.clone()).unwrap_or_default(), ..Draft::default() };
@@ -162,7 +162,7 @@ fn object(shapes: Vec<Shape>) -> Result<Draft> {
     Ok(draft)
 }
 
-/// The version of LabelMe whose files ours are like; LabelMe compares it with its own and warns of newer ones.
+/// The LabelMe version of our files; LabelMe compares it with its own and warns about newer ones.
 const VERSION: &str = "5.4.1";
 
 /// Writes objects as LabelMe shows them: a group of a rectangle, two points and a polygon for each.
@@ -235,7 +235,7 @@ mod tests {
         Annotation::read(&serde_json::to_vec(value).unwrap(), &IMAGE)
     }
 
-    /// The message after `change`, which must spoil the file.
+    /// The message after `change`, which must make the file invalid.
     fn message(change: impl FnOnce(&mut Value)) -> String {
         let mut value = full();
         change(&mut value);
@@ -341,7 +341,7 @@ mod tests {
         assert!(message("\u{89}PNG").contains("not JSON"));
     }
 
-    /// Every place that is marked. Reading decimal text costs a last bit.
+    /// Every marked position. Reading decimal text costs a last bit.
     fn points(marked: &Annotation) -> impl Iterator<Item = Point2<f64>> {
         let line = marked.grasp.iter().flat_map(|line| [line.start, line.end]);
         let outline = marked.outline.iter().flat_map(|outline| outline.vertices.iter().copied());

@@ -1,4 +1,4 @@
-//! A demonstration: one photo of a part and what a person marked on it, read, checked and multiplied.
+//! A demonstration: one photo of a part with a person's marks, read, checked and multiplied.
 //!
 //! ```text
 //! photo bytes ── decode_image ─────┐
@@ -7,12 +7,12 @@
 //! YOLO-pose, OpenDR ─ Annotation ──┘                           CocoFile ── bytes ────┘
 //! ```
 //!
-//! Everything from outside is checked here, once: [`decode_image`] reads the size before it takes memory,
-//! [`Annotation::read`] says what was expected, what was found and where. [`Augmenter`] then makes any number of
-//! samples by random access: sample *i* of a seed is the same on every call.
+//! Everything from outside is checked here, once: [`decode_image`] reads the size before it allocates memory,
+//! errors of [`Annotation::read`] give the expected value, the found value and the position. [`Augmenter`] then
+//! makes any number of samples by random access: sample *i* of a seed is the same on every call.
 //!
-//! What is deliberately absent: files, threads and clocks (bytes in, bytes out; the crate runs in a browser), tensors
-//! and training targets (`sdg-training`), and mirror images, which would be other parts.
+//! This crate deliberately has no files, threads or clocks (bytes in, bytes out; it runs in a browser), no tensors or
+//! training targets (`sdg-training`), and no mirror images, which would be other parts.
 //!
 //! ```
 //! use image::{Rgb, RgbImage};

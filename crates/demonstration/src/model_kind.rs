@@ -1,5 +1,5 @@
-//! The grasp models that a demonstration can be taught to. How each looks for the part is in `sdg-grasp`; here is what names
-//! them, and which marks each needs.
+//! The grasp models that a demonstration can be taught to: their names and the marks that each needs. Their methods are
+//! in `sdg-grasp`.
 
 use std::fmt;
 use std::str::FromStr;
@@ -17,7 +17,7 @@ pub enum ModelKind {
     C,
     /// Mask R-CNN; position and angle from the mask's texture or outline (paper, section IV-D).
     D,
-    /// No network; the demonstration itself is searched for in the whole image.
+    /// No network; the whole image is searched for the demonstration itself.
     S,
 }
 
@@ -52,17 +52,18 @@ impl ModelKind {
         }
     }
 
-    /// Whether its detections come with keypoints.
+    /// Whether its detections have keypoints.
     pub fn has_keypoints(self) -> bool {
         matches!(self, Self::B | Self::C)
     }
 
-    /// Whether it looks with a network; model S is nothing but the demonstration.
+    /// Whether it uses a network; model S consists of the demonstration only.
     pub fn has_network(self) -> bool {
         self != Self::S
     }
 
-    /// The model whose network this one reads: B and C are taught alike and read differently, so that C's file serves both.
+    /// The model whose network this one uses: B and C are taught alike and read differently, so that C's file serves
+    /// both.
     pub fn taught_as(self) -> Self {
         match self {
             Self::B => Self::C,
@@ -80,18 +81,18 @@ impl fmt::Display for ModelKind {
 impl FromStr for ModelKind {
     type Err = UnknownModel;
 
-    /// Reads a letter or a name, in capitals or not.
+    /// Reads a letter or a name, in upper or lower case.
     fn from_str(text: &str) -> Result<Self, UnknownModel> {
         let is_named = |kind: &Self| [kind.letter(), kind.name()].iter().any(|name| name.eq_ignore_ascii_case(text));
         Self::ALL.into_iter().find(is_named).ok_or_else(|| UnknownModel { found: text.to_owned() })
     }
 }
 
-/// A letter or name that is no grasp model's.
+/// A letter or name of no grasp model.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("expected a grasp model out of {}, found \"{found}\"", ModelKind::ALL.map(ModelKind::letter).join(", "))]
 pub struct UnknownModel {
-    /// What was asked for.
+    /// The requested model.
     pub found: String,
 }
 

@@ -13,7 +13,7 @@ pub(crate) fn is_npy(bytes: &[u8]) -> bool {
     bytes.starts_with(MAGIC)
 }
 
-/// An array in the bytes of its file. Nothing is allocated for its elements, so a header that lies costs nothing.
+/// An array in the bytes of its file. Nothing is allocated for its elements, so that a false header costs nothing.
 #[derive(Debug)]
 pub(crate) struct NpyArray<'a> {
     pub shape: Vec<usize>,
@@ -73,7 +73,7 @@ impl Dtype {
 }
 
 impl<'a> NpyArray<'a> {
-    /// Reads the header and checks that exactly its elements follow; `name` stands in errors.
+    /// Reads the header and checks that exactly its elements follow; `name` is used in errors.
     pub fn parse(bytes: &'a [u8], name: &str) -> Result<Self> {
         let malformed = |expected: &str, found: String| Error::Malformed {
             place: name.to_owned(),
@@ -87,7 +87,7 @@ impl<'a> NpyArray<'a> {
             2 | 3 => 4,
             other => return Err(malformed("a .npy file of version 1, 2 or 3", format!("version {other}"))),
         };
-        // After the magic come two bytes of version.
+        // After the magic number come two bytes of version.
         let start = MAGIC.len() + 2;
         let mut length = [0; 4];
         length[..length_bytes].copy_from_slice(bytes.get(start..start + length_bytes).ok_or_else(truncated)?);
@@ -129,7 +129,7 @@ impl<'a> NpyArray<'a> {
         Ok(Self { shape, dtype, column_major, elements })
     }
 
-    /// The element at an index of as many numbers as the shape has. Panics outside the array.
+    /// The element at an index with one number per dimension. Panics outside the array.
     pub fn at(&self, index: &[usize]) -> f64 {
         assert_eq!(index.len(), self.shape.len(), "one number for each dimension");
         let mut position = 0;

@@ -9,7 +9,7 @@
 //!
 //! # Source
 //! OpenDR, src/opendr/control/single_demo_grasp: augmentation and learner_utils. Boxes are hulls of turned rectangles
-//! there and reach over the image's edges; here they end at them.
+//! there and extend beyond the image's edges; here they are clipped.
 
 use nalgebra::Point2;
 
@@ -18,7 +18,7 @@ use crate::keypoint_row::read_grasp;
 use crate::npy::NpyArray;
 use crate::{Annotation, Error, ImageFacts, Result};
 
-/// The size that the original brings every image to.
+/// The size to which the original resizes every image.
 const IMAGE: [u32; 2] = [640, 480];
 
 /// Reads the row of the image's number from the two files, in either order.
@@ -51,7 +51,7 @@ pub(crate) fn read(bytes: &[u8], beside: Option<&[u8]>, image: &ImageFacts) -> R
     let row = choose_row(rows, image)?;
     let place = |what: &str| format!("{what} row {row}");
     let corner = |x, y| -> Result<Point2<f64>> {
-        // Clipping would turn what is no number into a place on the edge.
+        // Clipping would turn NaN into a position on the edge.
         let point = Point2::new(boxes.at(&[row, x]), boxes.at(&[row, y]));
         match point.iter().find(|value| !value.is_finite()) {
             Some(found) => Err(Error::NotFinite { place: place("boxes"), found: found.to_string() }),
@@ -68,7 +68,7 @@ pub(crate) fn read(bytes: &[u8], beside: Option<&[u8]>, image: &ImageFacts) -> R
     Ok(vec![draft.finish(image)?])
 }
 
-/// The row that the image's name says; the only row whatever the name, since people rename files.
+/// The row given by the image's name; a single row under any name, because people rename files.
 fn choose_row(rows: usize, image: &ImageFacts) -> Result<usize> {
     let stem = image.file_name.map(|name| name.rsplit(['/', '\\']).next().unwrap_or(name));
     let number = stem.and_then(|name| name.split('.').next()).and_then(|stem| stem.parse::<usize>().ok());
@@ -95,7 +95,7 @@ mod tests {
         file("'<f8'", "False", &format!("({}, 4)", values.len() / 4), &floats(values))
     }
 
-    /// Three keypoints a row.
+    /// Three keypoints per row.
     fn keypoints(values: &[f64]) -> Vec<u8> {
         file("'<f8'", "False", &format!("({}, 2, 3)", values.len() / 6), &floats(values))
     }

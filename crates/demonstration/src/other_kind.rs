@@ -1,10 +1,10 @@
-//! What a file is that holds no marks, or holds them as another program writes them: the error says it in the words of that kind.
+//! The kind of a file without marks, or with marks of another program, for an error in the terms of that kind.
 
 use serde_json::Value;
 
 use crate::json::shorten;
 
-/// The kind of a file, by its first bytes; `None` where it may be JSON.
+/// The kind of a file, by its first bytes; `None` if it may be JSON.
 pub(crate) fn other_kind(bytes: &[u8]) -> Option<String> {
     let said = |words: &str| Some(words.to_owned());
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
@@ -17,7 +17,7 @@ pub(crate) fn other_kind(bytes: &[u8]) -> Option<String> {
     }
     let text = match std::str::from_utf8(bytes) {
         Ok(text) => text,
-        // A zero or a control character is in no text.
+        // Text contains neither zeros nor control characters.
         Err(_) if bytes.iter().any(|byte| *byte < b' ' && !byte.is_ascii_whitespace()) => return None,
         Err(error) => {
             let line = bytes[..error.valid_up_to()].iter().filter(|byte| **byte == b'\n').count() + 1;
@@ -48,14 +48,14 @@ pub(crate) fn other_kind(bytes: &[u8]) -> Option<String> {
             "YAML, as a dataset's data.yaml: give the labels of the photo (.txt), and leave data.yaml beside or above them",
         )
     } else if words().next().is_some_and(is_number) {
-        // A row of labels with something else in it, or a number alone.
+        // A row of labels with another content, or a single number.
         None
     } else {
         Some(format!("words, as in a list of classes (classes.txt): `{}`", shorten(first)))
     }
 }
 
-/// Whose JSON it is, where the keys tell it.
+/// The program of a JSON file, if the keys show it.
 pub(crate) fn other_json(value: &Value) -> Option<&'static str> {
     let has = |value: &Value, key: &str| value.get(key).is_some();
     let first = value.as_array().and_then(|items| items.first());

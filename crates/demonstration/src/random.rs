@@ -1,4 +1,4 @@
-//! Random numbers by index: a generator of its own for each (seed, stream, index), independent of the order of calls.
+//! Random numbers by index: a separate generator for each (seed, stream, index), independent of the order of calls.
 
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;

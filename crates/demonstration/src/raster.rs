@@ -1,8 +1,8 @@
-//! Pictures as four floats a pixel, which is what the warps read and the scenes are painted on.
+//! Pictures as four floats per pixel, for reading warps and painting scenes.
 
 use image::RgbImage;
 
-/// Red, green, blue in `[0, 1]` as displayed (not linear light); the fourth float has a meaning of its maker's.
+/// Red, green, blue in `[0, 1]` as displayed (not linear light); the meaning of the fourth float depends on the caller.
 ///
 /// Four floats are one SIMD register, so that a bilinear look-up is four loads.
 #[derive(Debug, Clone)]
@@ -10,7 +10,7 @@ pub(crate) struct Raster {
     pub width: usize,
     pub height: usize,
     pub pixels: Vec<[f32; 4]>,
-    /// Width of the whole frame that this may be a window of: what sizes in pixels are measured by.
+    /// Width of the whole frame of which this may be a window: the reference for sizes in pixels.
     pub frame_width: usize,
 }
 
@@ -29,7 +29,7 @@ impl Raster {
         }
     }
 
-    /// Bilinear at (x, y) with the first pixel's centre at (0.5, 0.5); beyond the border the border goes on.
+    /// Bilinear at (x, y) with the first pixel's centre at (0.5, 0.5); beyond the border its pixels are repeated.
     ///
     /// Four floats at once, without a branch: `sdg-shape`'s sampling reads three bytes of an image and ends at the border.
     #[inline(always)]
@@ -55,7 +55,7 @@ impl Raster {
         out
     }
 
-    /// The pixel that (x, y) falls into; beyond the border the border goes on.
+    /// The pixel that (x, y) falls into; beyond the border its pixels are repeated.
     #[inline(always)]
     pub fn nearest(&self, x: f32, y: f32) -> [f32; 4] {
         let column = (x.max(0.0) as i32 as usize).min(self.width - 1);
@@ -63,7 +63,7 @@ impl Raster {
         self.pixels[row * self.width + column]
     }
 
-    /// Bilinear with the picture mirrored at its borders, again and again.
+    /// Bilinear with the picture mirrored repeatedly at its borders.
     #[inline(always)]
     pub fn reflected(&self, x: f32, y: f32) -> [f32; 4] {
         self.bilinear(reflect(x, self.width as f32), reflect(y, self.height as f32))
@@ -80,8 +80,8 @@ fn reflect(x: f32, length: f32) -> f32 {
     if folded > length { 2.0 * length - folded } else { folded }
 }
 
-/// The greatest whole number not above `x`, for places on a picture: without the library call that `f32::floor` is
-/// where a processor's newer instructions may not be taken for granted.
+/// The largest whole number not above `x`, for positions on a picture: without the library call of `f32::floor` on
+/// processors whose newer instructions cannot be assumed.
 #[inline(always)]
 pub(crate) fn floor(x: f32) -> i32 {
     let towards_zero = x as i32;
@@ -98,7 +98,7 @@ pub(crate) struct PixelRect {
 }
 
 impl PixelRect {
-    /// The pixels of a `width` × `height` canvas that a box grown by `margin` touches.
+    /// The pixels of a `width` × `height` canvas touched by a box that is enlarged by `margin`.
     pub fn covering(bounds: [f32; 4], margin: f32, width: usize, height: usize) -> Self {
         let [x1, y1, x2, y2] = bounds;
         let low = |v: f32, end: usize| ((v - margin).floor().max(0.0) as usize).min(end);
@@ -114,7 +114,7 @@ pub(crate) fn smoothstep(low: f32, high: f32, x: f32) -> f32 {
     t * t * (3.0 - 2.0 * t)
 }
 
-/// `from` towards `to` by `t`, colour only.
+/// Interpolates from `from` to `towards` by `t`, colour only.
 #[inline(always)]
 pub(crate) fn blend(pixel: &mut [f32; 4], color: [f32; 3], alpha: f32) {
     for k in 0..3 {

@@ -1,8 +1,9 @@
-//! Whether marks fit a photo as they stand, or would in another reading: at twice the size, with x and y exchanged, as percentages.
+//! Whether marks fit a photo as they are, or in another reading: at twice the size, with x and y exchanged, as
+//! percentages.
 //!
-//! Only pixels tell: half of a coordinate is a coordinate, too. An outline fits when colours change across its border and are others
-//! inside than around it. A box has ground inside, and the part touches its border in places: what is inside alone counts there.
-//! Readings are compared with each other, never with a fixed fit.
+//! Only pixels can decide, because half of a coordinate is also a coordinate. An outline fits if colours change across
+//! its border and differ inside from those around it. A box contains background, and the part touches its border only
+//! in places, so that only its inside counts. Readings are compared with each other, never with a fixed threshold.
 
 use image::RgbImage;
 use nalgebra::{Point2, Vector2};
@@ -10,21 +11,21 @@ use sdg_geometry::{BoundingBox, Polygon};
 
 use crate::Annotation;
 
-/// Another reading must fit so much better than the marks as they stand. Of 62 labelled photos, the shipped demonstrations among them, with
-/// outlines and with boxes alone, none is refused at 1.1; at 3, of marks that were spoilt on purpose, 56 of 57 outlines and 126 of 144
-/// boxes are.
+/// Factor by which another reading must fit better than the marks as they are. Of 62 labelled photos, the shipped
+/// demonstrations among them, with outlines and with boxes alone, none is refused at 1.1; at 3, of intentionally wrong
+/// marks, 56 of 57 outlines and 126 of 144 boxes are refused.
 const MIN_GAIN: f64 = 3.0;
-/// Marks around a place with one mixture of colours inside and outside, such as a plain background. The least difference of the same photos
-/// is 0.99 for an outline and 0.29 for a box.
+/// Limit of the colour difference for marks around a place with one mixture of colours inside and outside, such as a
+/// plain background. The smallest difference of the same photos is 0.99 for an outline and 0.29 for a box.
 const MIN_DIFFERENCE: f64 = 0.15;
-/// Marks on a pattern of one mixture, whose parts they may well follow: more than a camera's noise, in grey values.
+/// Marks on a pattern of one mixture may well follow its elements: the limit is above a camera's noise, in grey values.
 const MIN_CONTRAST: f64 = 20.0;
-/// Dark photos and those of little contrast have one mixture of colours everywhere: the hundredth and the ninety-ninth percentile of their
-/// grey values differ by less. A photo at 30 % of its brightness has at most 76.
+/// Dark photos and those of low contrast have one mixture of colours everywhere: the first and the ninety-ninth
+/// percentile of their grey values differ by less. A photo at 30 % of its brightness has at most 76.
 const MIN_RANGE: f64 = 100.0;
-/// Marks on more of the photo than this are a crop's: their surroundings say nothing. Chosen by hand.
+/// Marks on more of the photo than this belong to a crop: their surroundings carry no information. Chosen by hand.
 const MAX_COVER: f64 = 0.5;
-/// Brings the fit of a box to the size of an outline's, should a file have both.
+/// Scales the fit of a box to that of an outline, in case a file has both.
 const BOX_CONTRAST: f64 = 100.0;
 /// Samples across the region and its surroundings, and down.
 const GRID: u32 = 64;
@@ -33,7 +34,7 @@ const SURROUNDINGS: f64 = 0.25;
 /// Steps of a colour channel in a histogram.
 const STEPS: usize = 8;
 
-/// How marks were meant that do not fit the photo as they stand.
+/// The probable meaning of marks that do not fit the photo as they are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum MarksReading {
@@ -45,7 +46,7 @@ pub enum MarksReading {
     Exchanged,
     /// Hundredths of the photo's width and height.
     Percent,
-    /// No reading fits: the photo has one colour where they are.
+    /// No reading fits: the photo has one colour at the marks.
     OtherPhoto,
 }
 
@@ -74,7 +75,8 @@ impl MarksReading {
     }
 }
 
-/// The reading in which the marks fit the photo far better than as they stand; `None` where they are right, or none are there.
+/// The reading in which the marks fit the photo far better than as they are; `None` if they are right, or if there are
+/// none.
 pub fn other_reading(image: &RgbImage, marked: &[&Annotation]) -> Option<MarksReading> {
     let pixels = f64::from(image.width()) * f64::from(image.height());
     let is_crop = |annotation: &&Annotation| annotation.region().area() > MAX_COVER * pixels;
@@ -109,12 +111,12 @@ pub fn other_reading(image: &RgbImage, marked: &[&Annotation]) -> Option<MarksRe
     }
 }
 
-/// How well marks fit a photo; to be compared with other photos or other marks.
+/// The fit of marks to a photo, for comparison with other photos or other marks.
 pub fn marks_fit(image: &RgbImage, annotation: &Annotation) -> f64 {
     region_fit(image, &annotation.region(), annotation.outline.is_some())
 }
 
-/// How far the brightest hundredth of a photo is from the darkest, in grey values.
+/// Difference between the brightest and the darkest hundredth of a photo, in grey values.
 fn grey_range(image: &RgbImage) -> f64 {
     let along = |at: u32, length: u32| ((f64::from(at) + 0.5) / f64::from(GRID) * f64::from(length)) as u32;
     let place = |at: u32| (along(at % GRID, image.width()), along(at / GRID, image.height()));
@@ -143,7 +145,7 @@ fn region_fit(image: &RgbImage, region: &Polygon, is_outline: bool) -> f64 {
     if is_outline { border_contrast(image, region, &bounds) * difference } else { BOX_CONTRAST * difference.powi(3) }
 }
 
-/// How much colours change across the border of a region, in grey values: more where the border is the part's.
+/// Change of colours across the border of a region, in grey values: larger if the border is the part's.
 fn border_contrast(image: &RgbImage, region: &Polygon, bounds: &BoundingBox) -> f64 {
     let corners = &region.vertices;
     let reach = (0.01 * (bounds.width() + bounds.height())).max(2.0);
@@ -166,7 +168,8 @@ fn border_contrast(image: &RgbImage, region: &Polygon, bounds: &BoundingBox) -> 
     sum / count.max(1.0)
 }
 
-/// How different the colours inside a region and around it are: 0 for the same ones in the same shares, 2 for none in common.
+/// Difference between the colours inside a region and around it: 0 for the same colours in the same shares, 2 for no
+/// common ones.
 fn color_difference(image: &RgbImage, region: &Polygon, bounds: &BoundingBox) -> f64 {
     let margin = SURROUNDINGS * 0.5 * (bounds.width() + bounds.height());
     let mut shares = [vec![0.0; STEPS * STEPS * STEPS], vec![0.0; STEPS * STEPS * STEPS]];
@@ -192,7 +195,7 @@ mod tests {
     use super::*;
     use image::Rgb;
 
-    /// A bar of 60×24 pixels at (150, 40) on a ground with some noise.
+    /// A bar of 60×24 pixels at (150, 40) on a background with some noise.
     fn photo() -> RgbImage {
         RgbImage::from_fn(320, 240, |x, y| {
             let noise = ((x * 31 + y * 17) % 9) as u8;
@@ -212,7 +215,7 @@ mod tests {
         const RIGHT: [f64; 4] = [150.0, 40.0, 210.0, 64.0];
         let cases = [
             (RIGHT, None),
-            // A hand's margin.
+            // The margin of a hand-drawn box.
             ([144.0, 35.0, 217.0, 70.0], None),
             ([75.0, 20.0, 105.0, 32.0], Some(MarksReading::HalfSize)),
             ([40.0, 150.0, 64.0, 210.0], Some(MarksReading::Exchanged)),

@@ -1,12 +1,12 @@
-//! An annotation file while it is written.
+//! An annotation file under construction.
 
-/// An annotation file in the making, and what it had no room for.
+/// An annotation file under construction, and the marks that it cannot contain.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WrittenAnnotation {
     /// The file's text.
     pub text: String,
-    /// What must stand beside it in a `data.yaml`: the labels of a YOLO-pose file.
+    /// The required content of a `data.yaml` beside it: the labels of a YOLO-pose file.
     pub data_yaml: Option<String>,
-    /// What the format cannot hold, in words; empty when nothing was lost.
+    /// The marks that the format cannot contain, in words; empty if nothing was lost.
     pub left_out: Vec<String>,
 }

@@ -1,14 +1,14 @@
-//! YOLO-pose labels: a text file an image, a line an object, everything as a share of the image's width and height.
+//! YOLO-pose labels: a text file per image, a line per object, all values as shares of the image's width and height.
 //!
 //! ```text
-//! class  centre_x centre_y width height  x y v  x y v …      without visibilities where data.yaml says so: x y  x y …
+//! class  centre_x centre_y width height  x y v  x y v …      without visibilities if data.yaml has none: x y  x y …
 //! ```
 //!
-//! Labels stand in a `data.yaml`, whose `names` the classes count and whose `kpt_shape` says how the line is read.
+//! Labels are in a `data.yaml`; classes are indices into its `names`, and its `kpt_shape` defines the format of a line.
 //!
 //! # Source
 //! The dataset format of Ultralytics' pose models, and what its loader accepts: a byte order mark, blank lines,
-//! coordinates up to a hundredth outside. Lines that begin with `#`, as people add them, are passed over.
+//! coordinates up to a hundredth outside. Comment lines, which begin with `#`, are skipped.
 
 use std::fmt::Write;
 
@@ -22,12 +22,12 @@ use crate::{Annotation, Error, ImageFacts, Result};
 
 /// Numbers of a line before its keypoints.
 const BOX_NUMBERS: usize = 5;
-/// Larger numbers of a box are no shares that were rounded or reach over the image's edge.
+/// Larger values of a box are not shares, even with rounding or beyond the image's edge.
 const MAX_SHARE: f64 = 1.5;
-/// More objects than a person marks on a photo; bounds what a hostile file costs.
+/// More objects than a person marks on a photo; limits the cost of a hostile file.
 const MAX_OBJECTS: usize = 10_000;
 
-/// Whether the first line with anything on it is a row of numbers.
+/// Whether the first non-empty line is a row of numbers.
 pub(crate) fn looks_like(bytes: &[u8]) -> bool {
     let Ok(text) = std::str::from_utf8(without_mark(bytes)) else { return false };
     let first = text.lines().find(|line| is_row(line)).unwrap_or_default();
@@ -135,7 +135,7 @@ fn read_line(line: &str, place: &str, data: &DataYaml, image: &ImageFacts) -> Re
         .map(|keypoint| {
             let unlabelled = match keypoint.get(2) {
                 Some(&visibility) => visibility == 0.0,
-                // Without visibilities, Ultralytics takes what lies left of or above the image for not labelled.
+                // Without visibilities, Ultralytics treats keypoints left of or above the image as unlabelled.
                 None => keypoint[0] < 0.0 || keypoint[1] < 0.0,
             };
             (!unlabelled).then(|| Point2::new(keypoint[0] * across, keypoint[1] * down))
@@ -148,7 +148,8 @@ fn read_line(line: &str, place: &str, data: &DataYaml, image: &ImageFacts) -> Re
     draft.finish(image)
 }
 
-/// Refuses what may be corners of an oriented box or of a segment, which have as many numbers as a box and keypoints without visibilities.
+/// Refuses a row that may be corners of an oriented box or of a segment, which have as many numbers as a box and
+/// keypoints without visibilities.
 fn check_is_pose(line: &str, place: &str) -> Result<()> {
     let numbers: Vec<f64> = line.split_whitespace().filter_map(|word| word.parse().ok()).collect();
     let rest = &numbers[BOX_NUMBERS..];
@@ -162,12 +163,12 @@ fn check_is_pose(line: &str, place: &str) -> Result<()> {
     })
 }
 
-/// Numbers a keypoint: as data.yaml says, or as the numbers themselves allow.
+/// Numbers per keypoint: from data.yaml, or as the numbers themselves allow.
 fn keypoint_stride(rest: &[f64], data: &DataYaml) -> Option<usize> {
     if let Some([count, stride]) = data.keypoint_shape {
         return (rest.is_empty() || rest.len() == count * stride).then_some(stride);
     }
-    // Every third number a visibility: shares of the image lie between these three values.
+    // Every third number is a visibility: shares of the image lie between these three values.
     let visibilities =
         rest.len().is_multiple_of(3) && rest.iter().skip(2).step_by(3).all(|v| [0.0, 1.0, 2.0].contains(v));
     match (visibilities, rest.len().is_multiple_of(2)) {
@@ -194,7 +195,7 @@ pub(crate) fn write(image: &ImageFacts, objects: &[Annotation]) -> WrittenAnnota
             Some(line) => [line.start, line.end].map(|p| [p.x / across, p.y / down, 2.0]),
             None => [[0.0; 3]; 2],
         };
-        // Writing into a string cannot fail. Shortest digits that read back the same.
+        // Writing into a string cannot fail. Shortest digits that restore the value.
         let _ = write!(text, "{class}");
         for number in shares.iter().chain(keypoints.iter().flatten()) {
             let _ = write!(text, " {number}");
@@ -267,7 +268,7 @@ mod tests {
         let oriented = "0 0.404687 0.35 0.60625 0.35 0.60625 0.579167 0.404687 0.579167";
         refused(oriented, None);
         refused("0 0.596094 0.575 0.460156 0.458333 0.919531 0.360417 0.489063 0.421875", None);
-        // Whatever its numbers are.
+        // With any numbers.
         refused("0 0.5 0.5 0.25 0.5 0.4 0.5 0.6 0.5", None);
         refused("0 0.5 0.5 0.25 0.5 0.4 0.5 0.6 0.5", Some(b"names: [rod]\n"));
         let announced = Some(&b"kpt_shape: [2, 2]\nnames: [rod]\n"[..]);

@@ -1,4 +1,4 @@
-//! Files that other tools wrote, read here. `formats/make.py` says how they were made, and with which versions.
+//! Reads files written by other tools. `formats/make.py` documents how they were made, and with which versions.
 
 use nalgebra::Point2;
 use sdg_demonstration::{Annotation, AnnotationFormat, ImageFacts};
@@ -8,7 +8,7 @@ const YOLO_POSE: &[u8] = include_bytes!("formats/yolo-pose.txt");
 const COCO: &[u8] = include_bytes!("formats/coco-supervision.json");
 const OPENDR_BOXES: &[u8] = include_bytes!("formats/boxes_train.npy");
 const OPENDR_KEYPOINTS: &[u8] = include_bytes!("formats/kps_train.npy");
-/// What all of them were made from.
+/// The source of all of them.
 const ORIGINAL: &[u8] = include_bytes!("../../../datasets/demonstrations/fuel_line/annotation.json");
 
 /// Ultralytics writes shares of the image with six digits: 640 · 5e-7 pixels, with the box's width counted in.
@@ -49,7 +49,7 @@ fn a_coco_file_of_another_tool_has_box_and_outline() {
     assert_eq!((found.label.as_str(), found.bbox), ("fuel_line", expected.bbox));
     assert_eq!(found.grasp, None);
     let mask = |annotation: &Annotation| annotation.outline.as_ref().unwrap().rasterize(640, 480);
-    // That tool stores the outline of whole pixels, their lower right edges left out; the part is ten pixels wide.
+    // That tool stores the outline of whole pixels without their lower right edges; the part is ten pixels wide.
     let overlap = mask(&found).iou(&mask(&expected));
     assert!(overlap > 0.75, "{overlap}");
 }
@@ -98,7 +98,8 @@ fn what_one_format_holds_comes_back_from_every_other() {
 
 #[test]
 fn damaged_files_end_in_an_error_or_in_what_can_be_marked() {
-    // Every byte of every file, cut off there and replaced by others: no panic, and never a place outside the image.
+    // Every byte of every file, truncated there and replaced by others: no panic, and never a position outside the
+    // image.
     let files: [(&[u8], Option<&[u8]>); 4] = [
         (YOLO_POSE, None),
         (OPENDR_BOXES, Some(OPENDR_KEYPOINTS)),

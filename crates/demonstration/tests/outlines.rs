@@ -1,4 +1,4 @@
-//! Proposed outlines against those of the shipped demonstrations.
+//! Compares proposed outlines with those of the shipped demonstrations.
 
 use std::path::Path;
 
@@ -7,8 +7,9 @@ use crate::simulated_person;
 use sdg_demonstration::{Demonstration, propose_outline, propose_outline_with};
 use sdg_geometry::{BoundingBox, Polygon};
 
-/// Measured on the paper's eight parts: 0.954 as drawn and 0.957 a tenth looser; least the thin fuel line, 0.905 and 0.889.
-/// OpenCV's grabCut, with its five rounds, reaches 0.960 and 0.956 on the same boxes. On all twelve: 0.954 and 0.955.
+/// Measured on the paper's eight parts: 0.954 as drawn and 0.957 a tenth looser; the minimum is the thin fuel line's,
+/// 0.905 and 0.889. OpenCV's grabCut, with its five rounds, has 0.960 and 0.956 on the same boxes. On all twelve: 0.954
+/// and 0.955.
 const MIN_MEAN_OVERLAP: f64 = 0.93;
 const MIN_OVERLAP: f64 = 0.85;
 
@@ -59,11 +60,13 @@ fn same_photo_same_outline() {
     assert_eq!(propose_outline(&image, &annotation.bbox), propose_outline(&image, &annotation.bbox));
 }
 
-/// Issue 19: median overlap without a click, and of the true outline within 3 px or 1 % of the diagonal after two.
+/// Issue 19: median overlap without a click, and median share of the true outline within 3 px or 1 % of the diagonal
+/// after two clicks.
 const MIN_MEDIAN_OVERLAP: f64 = 0.9;
 const MIN_NEAR: f64 = 0.9;
 
-/// Pictures of generated parts (crates/part-generator/examples/outline_pictures.rs), whose outlines are true to the pixel.
+/// Pictures of generated parts (crates/part-generator/examples/outline_pictures.rs), whose outlines are exact to the
+/// pixel.
 #[test]
 fn two_clicks_correct_an_outline() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/outlines");
@@ -85,26 +88,26 @@ fn two_clicks_correct_an_outline() {
     assert!(near >= MIN_NEAR, "{near}");
 }
 
-/// Shadows of one lamp after the other: their directions, lengths and depths differ.
+/// Shadows of successive lamps: their directions, lengths and depths differ.
 fn lamp(number: usize) -> Lamp {
     let dark = [0.5, 0.4, 0.3, 0.2][number % 4];
     let length = [0.15, 0.25, 0.35][number % 3];
     Lamp { direction: 0.4 + 2.1 * number as f64, length, left: [dark, 1.1 * dark, 1.35 * dark] }
 }
 
-/// An outline has taken a shadow in where it holds so much of it, beside the part.
+/// Minimum share of a shadow, beside the part, for an outline that includes it.
 const SHADOW_IN: f64 = 0.4;
 const PART_IN: f64 = 0.85;
-/// It is removed where the outline is as good as that of the same photo without the shadow: at most so much more of the place where the
-/// shadow falls, and at least so much of the overlap with the true outline.
+/// It is removed if the outline is as good as that of the same photo without the shadow: at most this much more of the
+/// shadow's area, and at least this share of the overlap with the true outline.
 const SHADOW_OUT: f64 = 0.15;
 const OVERLAP_KEPT: f64 = 0.9;
 /// Issue 47: eight of ten.
 const MIN_REMOVED: f64 = 0.8;
 
-/// One click or one stroke of a simulated person removes a shadow. Measured: 28 of 35 each; without the look for shadows 12 and 20.
-/// The first fifteen pictures, which the constants were chosen on, are left out (21 of 23 each); some of those here were looked at, too,
-/// in darker shadows.
+/// One click or one stroke of a simulated person removes a shadow. Measured: 28 of 35 each; without the search for
+/// shadows 12 and 20. The first fifteen pictures, on which the constants were chosen, are left out (21 of 23 each);
+/// some of those here were also inspected, in darker shadows.
 #[test]
 fn one_click_or_one_stroke_removes_a_shadow() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/outlines");

@@ -1,4 +1,4 @@
-//! Seconds a forward pass and a training step of the `edge` preset take, part by part.
+//! Times of a forward pass and a training step of the `edge` preset, part by part.
 //!
 //! `cargo run --release -p sdg-detection --features training --example profile -- [batch]`
 

@@ -1,12 +1,12 @@
-//! The boxes that the region proposal network starts from.
+//! The initial boxes of the region proposal network.
 //!
 //! Each level has one base anchor per aspect ratio, centred at the origin and repeated at every
-//! cell. Order: level, row, column, aspect ratio; the RPN's outputs are laid out alike.
+//! cell. Order: level, row, column, aspect ratio; the RPN's outputs have the same layout.
 
 use crate::boxes::Corners;
 use crate::config::{AnchorConfig, AnchorRounding, AnchorStride};
 
-/// Nominal strides of p2 to p6, pixels a cell.
+/// Nominal strides of p2 to p6, pixels per cell.
 pub const LEVEL_STRIDES: [usize; 5] = [4, 8, 16, 32, 64];
 
 /// Size of one level's grid of cells.
@@ -37,8 +37,8 @@ pub fn base_anchors(size_px: f64, config: &AnchorConfig) -> Vec<Corners> {
 
 /// The anchors of each level, in pixels of the padded image.
 ///
-/// `image_height`, `image_width` are those of the padded batch; they matter to
-/// [`AnchorStride::ImageOverGrid`] only.
+/// `image_height`, `image_width` are those of the padded batch; they are used only by
+/// [`AnchorStride::ImageOverGrid`].
 pub fn grid_anchors(
     config: &AnchorConfig,
     grids: &[GridSize; 5],
@@ -104,7 +104,7 @@ mod tests {
         assert_eq!(nominal[0][1], [-16.0, -16.0, 16.0, 16.0]);
         assert_eq!(nominal[0][4], [-12.0, -16.0, 20.0, 16.0]);
         assert_eq!(nominal[0][10], [-16.0, -12.0, 16.0, 20.0]);
-        // 13 pixels over 2 cells are 6 a cell, where the nominal stride of p3 is 8.
+        // 13 pixels over 2 cells are 6 per cell; the nominal stride of p3 is 8.
         let over_grid = grid_anchors(&config(AnchorRounding::Rounded, AnchorStride::ImageOverGrid), &grids, 8, 13);
         assert_eq!(over_grid[1][4], [-26.0, -32.0, 38.0, 32.0]);
     }

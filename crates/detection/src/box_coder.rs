@@ -1,4 +1,4 @@
-//! Box deltas: a box relative to another, in numbers fit for regression.
+//! Box deltas: a box relative to another, in numbers suitable for regression.
 //!
 //! `dx = wx·(gx - ax)/aw`, `dy = wy·(gy - ay)/ah`, `dw = ww·ln(gw/aw)`, `dh = wh·ln(gh/ah)`, where
 //! `a` is the reference box (anchor or proposal), `g` the other, x and y are centres.
@@ -9,7 +9,7 @@ use crate::config::BoxCoderConfig;
 /// Deltas `[dx, dy, dw, dh]`.
 pub type Deltas = [f32; 4];
 
-/// Bound on the decoded `dw`, `dh`: `ln(1000/16)`, so that a box grows at most 62.5 times.
+/// Bound on the decoded `dw`, `dh`: `ln(1000/16)`, so that a box grows by at most a factor of 62.5.
 pub const SCALE_CLAMP: f32 = 4.135_166_6;
 
 /// Encodes boxes relative to reference boxes, and back.
@@ -24,7 +24,7 @@ impl BoxCoder {
         Self { weights: config.weights.map(|w| w as f32) }
     }
 
-    /// Gives the deltas that lead from `reference` to `target`.
+    /// Returns the deltas from `reference` to `target`.
     pub fn encode(&self, reference: &Corners, target: &Corners) -> Deltas {
         let [aw, ah] = [reference[2] - reference[0], reference[3] - reference[1]];
         let [gw, gh] = [target[2] - target[0], target[3] - target[1]];
@@ -34,7 +34,7 @@ impl BoxCoder {
         [wx * (gx - ax) / aw, wy * (gy - ay) / ah, ww * (gw / aw).ln(), wh * (gh / ah).ln()]
     }
 
-    /// Gives the box that `deltas` lead to from `reference`.
+    /// Returns the box at `deltas` from `reference`.
     pub fn decode(&self, reference: &Corners, deltas: &Deltas) -> Corners {
         let [aw, ah] = [reference[2] - reference[0], reference[3] - reference[1]];
         let [ax, ay] = [reference[0] + 0.5 * aw, reference[1] + 0.5 * ah];

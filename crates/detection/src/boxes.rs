@@ -3,7 +3,7 @@
 /// A box by its corners, pixels of the resized image.
 pub type Corners = [f32; 4];
 
-/// Area; zero for a box without one.
+/// Area; zero for a box without area.
 pub fn area(b: &Corners) -> f32 {
     (b[2] - b[0]).max(0.0) * (b[3] - b[1]).max(0.0)
 }

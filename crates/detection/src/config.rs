@@ -1,8 +1,8 @@
-//! The configuration of a detector: every setting in which the R-CNN implementations differ.
+//! The configuration of a detector: every setting in which R-CNN implementations differ.
 //!
-//! Nothing here computes. Each enum names a choice that a bare bool or number would hide; the two
-//! ends of most choices are Detectron2 and torchvision. A configuration is plain data and
-//! serialises, so a model file can carry the one it was trained with.
+//! This module computes nothing. Each enum names a choice that a bare bool or number would hide;
+//! the two values of most choices are Detectron2's and torchvision's. A configuration is plain data
+//! and serialises, so that a model file can contain the one of its training.
 
 mod mask_head;
 mod roi_pooler;
@@ -16,7 +16,7 @@ pub use sdg_layers::NormKind;
 /// The whole detector.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RcnnConfig {
-    /// From the image as given to the network's input.
+    /// From the given image to the network's input.
     pub input: ImageTransformConfig,
     /// The residual network, "bottom-up" of the feature pyramid.
     pub backbone: ResNetConfig,
@@ -54,8 +54,8 @@ pub enum ResizeFilter {
     /// A triangle filter that widens when shrinking, rounded to bytes after each pass: Pillow's
     /// `BILINEAR`, used by Detectron2.
     AntialiasedBytes,
-    /// Two by two neighbours whatever the scale, not rounded: `torch.nn.functional.interpolate`,
-    /// used by torchvision.
+    /// Two by two neighbours at any scale, not rounded: `torch.nn.functional.interpolate`, used by
+    /// torchvision.
     Bilinear,
 }
 
@@ -71,7 +71,7 @@ pub enum ResizeRule {
         /// From the exact size to whole pixels.
         rounding: SizeRounding,
     },
-    /// As large as fits into `width_px` by `height_px`, rounded to nearest.
+    /// The largest size within `width_px` by `height_px`, rounded to nearest.
     FitWithin {
         /// Bound on the width.
         width_px: u32,
@@ -117,7 +117,7 @@ pub enum BlockKind {
     Bottleneck {
         /// Channels of the inner convolutions in res2; doubled in each later stage.
         inner_channels: usize,
-        /// Where a stage halves the resolution.
+        /// The position of the stride in a stage.
         stride_in: StrideIn,
     },
 }
@@ -159,7 +159,7 @@ pub struct ResNetConfig {
     pub block: BlockKind,
     /// Norm after every convolution.
     pub norm: NormKind,
-    /// What stays as initialised or loaded.
+    /// Layers that keep their initial or loaded values.
     pub freeze: Freeze,
 }
 
@@ -231,27 +231,27 @@ pub enum RegressionLoss {
     },
 }
 
-/// What the losses of the region proposal network are divided by.
+/// The divisor of the region proposal network's losses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum RpnNormaliser {
-    /// Nominal samples an image times images: Detectron2.
+    /// Nominal samples per image times images: Detectron2.
     NominalSamples,
     /// Samples actually drawn: torchvision.
     DrawnSamples,
 }
 
-/// Which boxes a matcher calls positive, negative, or neither.
+/// Thresholds by which a matcher makes boxes positive, negative, or ignored.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct MatcherConfig {
     /// IoU below which a box is negative.
     pub negative_below: f64,
-    /// IoU from which on a box is positive; between the two it is ignored.
+    /// IoU from which a box is positive; between the two it is ignored.
     pub positive_from: f64,
-    /// Whether an object that no box reaches takes its best boxes anyway.
+    /// Whether an object without a positive box takes its best boxes anyway.
     pub low_quality: LowQualityMatches,
 }
 
-/// Whether an object that no box reaches takes its best boxes anyway.
+/// Whether an object without a positive box takes its best boxes anyway.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum LowQualityMatches {
     /// They become positive: the region proposal network.
@@ -260,12 +260,12 @@ pub enum LowQualityMatches {
     Forbidden,
 }
 
-/// How many boxes of an image take part in a loss.
+/// Number of boxes of an image in a loss.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SamplerConfig {
-    /// Boxes an image.
+    /// Boxes per image.
     pub batch_size_per_image: usize,
-    /// Largest part of them that is positive.
+    /// Largest positive share of them.
     pub positive_fraction: f64,
 }
 
@@ -281,7 +281,7 @@ pub struct PerMode {
 /// The region proposal network.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RpnConfig {
-    /// Which anchors are objects.
+    /// Matching of anchors to objects.
     pub matcher: MatcherConfig,
     /// Anchors in the loss.
     pub sampler: SamplerConfig,
@@ -289,11 +289,11 @@ pub struct RpnConfig {
     pub box_coder: BoxCoderConfig,
     /// Best anchors kept on each level before NMS.
     pub pre_nms_top_n: PerMode,
-    /// Proposals kept an image.
+    /// Proposals kept per image.
     pub post_nms_top_n: PerMode,
-    /// IoU above which the lesser of two proposals of a level is dropped.
+    /// IoU above which the lower-scoring of two proposals of a level is dropped.
     pub nms_threshold: f64,
-    /// Proposals with a side not above this are dropped, pixels.
+    /// Proposals with a side of at most this are dropped, pixels.
     pub min_box_size_px: f64,
     /// Loss on deltas.
     pub regression_loss: RegressionLoss,
@@ -301,7 +301,7 @@ pub struct RpnConfig {
     pub normaliser: RpnNormaliser,
 }
 
-/// Where the background stands among the class scores.
+/// Position of the background among the class scores.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum BackgroundClass {
     /// Class 0: torchvision, which also has (unused) box deltas for it.
@@ -324,12 +324,12 @@ pub enum BoxDeltas {
 pub struct RoiHeadsConfig {
     /// Object classes, without background.
     pub num_classes: usize,
-    /// Which proposals are objects.
+    /// Matching of proposals to objects.
     pub matcher: MatcherConfig,
     /// Proposals in the loss.
     pub sampler: SamplerConfig,
-    /// Share of the negatives among them that are the proposals of the highest objectness; the others are drawn. With 0,
-    /// as Detectron2 and torchvision have it, all are drawn, and most lie on the bare table.
+    /// Share of the negatives among them that are the proposals of the highest objectness; the others are drawn. At 0,
+    /// as in Detectron2 and torchvision, all are drawn, and most lie on the bare table.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub hard_negative_share: f64,
     /// Classes and refined boxes of the proposals.
@@ -351,21 +351,21 @@ pub struct BoxHeadConfig {
     pub pooler: RoiPoolerConfig,
     /// Width of the two fully connected layers.
     pub fc_channels: usize,
-    /// Place of the background class.
+    /// Position of the background class.
     pub background: BackgroundClass,
-    /// Own deltas for each class or not.
+    /// Whether each class has its own deltas.
     pub box_deltas: BoxDeltas,
     /// Weights of the deltas from anchors, or from proposals, to boxes.
     pub box_coder: BoxCoderConfig,
     /// Loss on deltas.
     pub regression_loss: RegressionLoss,
-    /// Least score of a detection.
+    /// Minimum score of a detection.
     pub score_threshold: f64,
-    /// IoU above which the lesser of two detections of a class is dropped.
+    /// IoU above which the lower-scoring of two detections of a class is dropped.
     pub nms_threshold: f64,
-    /// Detections kept an image.
+    /// Detections kept per image.
     pub detections_per_image: usize,
-    /// Detections with a side not above this are dropped, pixels of the resized image.
+    /// Detections with a side of at most this are dropped, pixels of the resized image.
     pub min_box_size_px: f64,
 }
 
@@ -399,9 +399,9 @@ pub struct KeypointHeadConfig {
     pub pooler: RoiPoolerConfig,
     /// Channels of each 3×3 convolution.
     pub conv_channels: Vec<usize>,
-    /// Keypoints of an object.
+    /// Keypoints per object.
     pub num_keypoints: usize,
-    /// Most positive proposals an image that go through the head while training.
+    /// Maximum number of positive proposals per image that go through the head in training.
     pub max_train_rois_per_image: Option<usize>,
     /// Factor on the keypoint loss.
     pub loss_weight: f64,

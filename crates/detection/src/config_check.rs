@@ -14,7 +14,7 @@ impl RcnnConfig {
     /// Checks that every value is usable and that values that depend on each other agree.
     ///
     /// # Errors
-    /// [`DetectionError::Config`] names the first field that is not.
+    /// [`DetectionError::Config`] names the first invalid field.
     pub fn validate(&self) -> Result<()> {
         let (w, h) = match self.input.resize {
             ResizeRule::ShortSide { short_px, max_long_px, .. } => (short_px, max_long_px),

@@ -1,4 +1,4 @@
-//! A detector's configuration from JSON: whole, or as what differs from a preset.
+//! A detector's configuration from JSON: complete, or as differences from a preset.
 
 use serde::Deserialize;
 use serde::de::IgnoredAny;
@@ -7,13 +7,13 @@ use crate::config::{BlockKind, RcnnConfig, ResizeRule};
 use crate::error::{DetectionError, Result};
 use crate::presets::{RcnnKind, r50_detectron2, r50_torchvision};
 
-/// What differs from a preset, in the words of the reference outputs' `config.json`.
+/// Differences from a preset, with the keys of the reference outputs' `config.json`.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct PresetChanges {
     /// `faster`, `keypoint` or `mask`.
     kind: String,
-    /// `detectron2` (where absent) or `torchvision`.
+    /// `detectron2` (if absent) or `torchvision`.
     numerics: Option<String>,
     classes: Option<usize>,
     keypoints: Option<usize>,
@@ -21,7 +21,7 @@ struct PresetChanges {
     min_size_test: Option<u32>,
     /// Bound on the long side.
     max_size_test: Option<u32>,
-    /// Of each level, in training and in inference.
+    /// For each level, in training and in inference.
     pre_nms_topk: Option<usize>,
     post_nms_topk_test: Option<usize>,
     post_nms_topk_train: Option<usize>,
@@ -36,7 +36,7 @@ struct PresetChanges {
     box_head_fc: Option<usize>,
     keypoint_convs: Option<usize>,
     mask_convs: Option<usize>,
-    /// How the reference was made and what it gave: nothing to build from.
+    /// The origin and the outputs of the reference: not used for building.
     #[serde(rename = "width")]
     _width: Option<IgnoredAny>,
     #[serde(rename = "seed")]
@@ -47,16 +47,16 @@ struct PresetChanges {
 
 impl RcnnConfig {
     /// Reads a configuration: either every value, as this type serialises, or an object with `kind` (`faster`,
-    /// `keypoint`, `mask`), `numerics` (`detectron2`, `torchvision`) and what differs from [`r50_detectron2`] or
-    /// [`r50_torchvision`] of that kind, such as `fpn_channels`.
+    /// `keypoint`, `mask`), `numerics` (`detectron2`, `torchvision`) and the differences from [`r50_detectron2`]
+    /// or [`r50_torchvision`] of that kind, such as `fpn_channels`.
     ///
     /// # Errors
-    /// [`DetectionError::ConfigFile`] names the place of what cannot be read; [`DetectionError::Config`] the
+    /// [`DetectionError::ConfigFile`] gives the position of unreadable text; [`DetectionError::Config`] the
     /// value that is out of range.
     pub fn from_json(text: &str) -> Result<Self> {
         let failed = |error: serde_json::Error| DetectionError::ConfigFile { reason: error.to_string() };
         let value: serde_json::Value = serde_json::from_str(text).map_err(failed)?;
-        // Read again from the text, because only then do errors name line and column.
+        // Parsed again from the text, because only then do errors contain line and column.
         let config = if value.get("kind").is_some() {
             serde_json::from_str::<PresetChanges>(text).map_err(failed)?.applied()?
         } else {

@@ -1,8 +1,8 @@
-//! What can be wrong with the inputs of this crate.
+//! Errors of the inputs of this crate.
 
 use thiserror::Error;
 
-/// An input that the detector cannot work with. Each message says what was expected and found.
+/// An input with which the detector cannot work. Each message gives the expected and the found value.
 #[derive(Debug, Error, Clone, PartialEq)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
@@ -12,14 +12,16 @@ pub enum DetectionError {
     Config {
         /// Path of the field in [`crate::RcnnConfig`].
         field: &'static str,
-        /// What the field may be.
+        /// The accepted values.
         expected: String,
         found: String,
     },
     /// A configuration cannot be read.
-    #[error("detector configuration: expected every value, or `kind` and what differs from its preset: {reason}")]
+    #[error(
+        "detector configuration: expected all values, or `kind` and the values that differ from its preset: {reason}"
+    )]
     ConfigFile {
-        /// What cannot be read, and where.
+        /// The unreadable part, and its position.
         reason: String,
     },
     /// A batch holds another number of targets than of images.

@@ -55,7 +55,7 @@ impl Fpn {
         }
     }
 
-    /// Gives p2 to p6.
+    /// Returns p2 to p6.
     ///
     /// # Shapes
     /// - `stages`: res2 to res5, `[N, C_l, H/s, W/s]`, strides 4 to 32

@@ -28,7 +28,7 @@ pub struct Backbone {
 }
 
 impl Backbone {
-    /// Gives p2 to p6 of a padded batch `[N, 3, H, W]`.
+    /// Returns p2 to p6 of a padded batch `[N, 3, H, W]`.
     pub fn forward(&self, images: Tensor<4>) -> [Tensor<4>; 5] {
         self.fpn.forward(self.bottom_up.forward(images))
     }
@@ -36,8 +36,8 @@ impl Backbone {
 
 /// A detector of the R-CNN family.
 ///
-/// Paths of the parameters follow Detectron2, but for `backbone.fpn.`, which stands before the
-/// pyramid's names, and `conv_fcn.0`, `mask_fcn.0` for `conv_fcn1`, `mask_fcn1`.
+/// Paths of the parameters follow Detectron2, with two exceptions: the pyramid's names have the
+/// prefix `backbone.fpn.`, and `conv_fcn1`, `mask_fcn1` are called `conv_fcn.0`, `mask_fcn.0`.
 #[derive(Module, Debug)]
 pub struct GeneralizedRcnn {
     /// From the image to feature maps.
@@ -57,11 +57,11 @@ pub struct ScoredKeypoint {
     pub x: f64,
     /// Pixels, y down.
     pub y: f64,
-    /// As [`crate::config::KeypointScore`] says.
+    /// See [`crate::config::KeypointScore`].
     pub score: f64,
 }
 
-/// What was found in one image, best first, in pixels of the original image.
+/// Detections of one image, best first, in pixels of the original image.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Detections {
     /// Boxes, in pixels of the original image.
@@ -82,12 +82,12 @@ impl RcnnConfig {
     /// For training the device must carry autodiff (`device.autodiff()`, feature `training`).
     ///
     /// # Errors
-    /// Where [`RcnnConfig::validate`] finds one.
+    /// The errors of [`RcnnConfig::validate`].
     pub fn init(&self, device: &Device, seed: u64) -> Result<GeneralizedRcnn> {
         self.build(Initializer::new(device, seed))
     }
 
-    /// Builds the detector on `device` without drawing its parameters, for who sets all of them next.
+    /// Builds the detector on `device` without initial values, for a caller that sets all parameters next.
     ///
     /// # Errors
     /// A configuration that contradicts itself.
@@ -140,13 +140,13 @@ impl GeneralizedRcnn {
         (Tensor::from_data(data, &self.device()), sizes)
     }
 
-    /// Gives the training losses of a batch.
+    /// Returns the training losses of a batch.
     ///
-    /// `seed` draws the anchors and proposals that take part; give another one each step. Images
-    /// without objects are fine: they teach what is background.
+    /// `seed` draws the anchors and proposals in the losses; pass another one in each step. Images
+    /// without objects are allowed: they teach the background.
     ///
     /// # Errors
-    /// Where images and targets differ in number, or a target contradicts the configuration.
+    /// If images and targets differ in number, or a target contradicts the configuration.
     pub fn losses(&self, images: &[TransformedImage], targets: &[Target], seed: u64) -> Result<Losses> {
         let targets = self.resized_targets(images, targets)?;
         Ok(self.losses_of_resized(images, &targets, seed))
@@ -159,7 +159,7 @@ impl GeneralizedRcnn {
         targets: &[ResizedTarget],
         seed: u64,
     ) -> Losses {
-        // A stream for each image and purpose: what one image draws does not move the others.
+        // A stream for each image and purpose, so that the draws of one image do not change those of the others.
         let rngs = |purpose: u128| -> Vec<Pcg64Mcg> {
             let state = |idx: usize| purpose << 64 | u128::from(seed.wrapping_add((idx as u64) << 40));
             (0..images.len()).map(|idx| Pcg64Mcg::from_seed((state(idx) << 1 | 1).to_le_bytes())).collect()
@@ -183,7 +183,7 @@ impl GeneralizedRcnn {
         read_sync(self.detect_async(images))
     }
 
-    /// [`Self::detect`], awaited; for browsers, which hand over what a graphics card computed in no other way.
+    /// [`Self::detect`], asynchronous; for browsers, which give access to results of a graphics card only in this way.
     pub async fn detect_async(&self, images: &[TransformedImage]) -> Vec<Detections> {
         if images.is_empty() {
             return Vec::new();
@@ -196,7 +196,7 @@ impl GeneralizedRcnn {
         self.detections(images, &features, &proposals).await
     }
 
-    /// The second stage, back in pixels of the original images.
+    /// The second stage, converted to pixels of the original images.
     pub(crate) async fn detections(
         &self,
         images: &[TransformedImage],

@@ -1,13 +1,13 @@
-//! Every stage of the detector against a reference's outputs for the same image and weights.
+//! Compares every stage of the detector with a reference's outputs for the same image and weights.
 //!
 //! ```text
 //! preprocessed ─ features.p2…p6 ─ anchors.p2…p6 ─ proposals.* ─ detections.*      one image in inference
 //! targets.* ─ losses.* ─ gradients.<parameter>                                   one step of training
 //! ```
 //!
-//! The reference is a list of tensors by these names. What it lacks is not compared. Detections are in pixels of the
-//! image as given, targets in those of the resized image; polygons are x0 y0 x1 y1 …, one a
-//! box; masks 0 or 1.
+//! The reference is a list of tensors by these names. Tensors that it lacks are not compared. Detections are in
+//! pixels of the given image, targets in those of the resized image; polygons are x0 y0 x1 y1 …, one per box; masks
+//! are 0 or 1.
 
 use std::fmt;
 
@@ -28,14 +28,16 @@ use crate::target::ObjectMask;
 use crate::target::ResizedTarget;
 use sdg_layers::state_dict::{StateDict, WeightTensor};
 
-/// Samples an image, so many that every anchor and proposal takes part in the reference's losses: nothing is drawn.
+/// Number of samples per image, large enough that every anchor and proposal enters the reference's losses: nothing is
+/// drawn.
 const ALL_SAMPLES: usize = 1_000_000;
 
-/// Gradients this much smaller than the network's largest are zero but for rounding: that of a bias in front of a softmax over
-/// places, for one, since adding to all places changes nothing. Relative to themselves they are noise.
+/// Gradients smaller than this share of the network's largest are zero except for rounding, for example that of a bias
+/// before a softmax over positions, since adding to all positions changes nothing. Relative to themselves they are
+/// noise.
 const NOISE_OF_GRADIENTS: f32 = 1e-6;
 
-/// How far a stage may be off.
+/// Tolerances of a stage.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Tolerance {
@@ -43,7 +45,7 @@ pub enum Tolerance {
     Relative(f64),
     /// Largest difference, in the tensor's own unit.
     Absolute(f64),
-    /// Part of an image's pixels that may differ.
+    /// Share of an image's pixels that may differ.
     Pixels(f64),
 }
 
@@ -62,7 +64,7 @@ pub struct StageDifference {
     pub tolerance: Tolerance,
     /// Whether the difference is within the tolerance.
     pub passed: bool,
-    /// What else there is to say, such as two shapes that differ.
+    /// A further remark, such as two shapes that differ.
     pub remark: Option<String>,
 }
 
@@ -74,7 +76,7 @@ pub struct GoldenReport {
 }
 
 impl GoldenReport {
-    /// Whether there was something to compare and all of it is inside its tolerance.
+    /// Whether at least one tensor was compared and all are within their tolerances.
     pub fn passed(&self) -> bool {
         !self.stages.is_empty() && self.stages.iter().all(|stage| stage.passed)
     }
@@ -101,7 +103,7 @@ impl fmt::Display for GoldenReport {
 }
 
 impl RcnnConfig {
-    /// The same with every anchor and proposal in the losses, as the reference outputs were made.
+    /// The same with every anchor and proposal in the losses, as in the reference outputs.
     pub fn without_sampling(mut self) -> Self {
         self.rpn.sampler.batch_size_per_image = ALL_SAMPLES;
         self.roi_heads.sampler.batch_size_per_image = ALL_SAMPLES;
@@ -109,7 +111,7 @@ impl RcnnConfig {
     }
 }
 
-/// Runs `detector` on `image` and compares each stage with what `reference` expects.
+/// Runs `detector` on `image` and compares each stage with the values in `reference`.
 ///
 /// Names after `gradients.` are paths of this project's parameters. For losses and gradients the detector must be
 /// on a device with autodiff and configured by [`RcnnConfig::without_sampling`].
@@ -126,9 +128,9 @@ pub fn verify(detector: &GeneralizedRcnn, image: &RgbImage, reference: &StateDic
     Ok(GoldenReport { stages: comparer.stages })
 }
 
-/// Runs `detector` on `image` and gives what [`verify`] would compare, as a reference for another device or another
-/// precision. Where `targets` has the tensors that a step of training needs, losses and the gradients of all parameters
-/// are among it, and the targets themselves.
+/// Runs `detector` on `image` and returns the tensors that [`verify`] would compare, as a reference for another device
+/// or another precision. If `targets` has the tensors for a training step, the result also contains the losses, the
+/// gradients of all parameters, and the targets themselves.
 ///
 /// # Errors
 /// An image without pixels, or targets that do not fit each other.
@@ -145,7 +147,7 @@ pub fn record(detector: &GeneralizedRcnn, image: &RgbImage, targets: &StateDict)
 struct Comparer<'a> {
     reference: &'a StateDict,
     stages: Vec<StageDifference>,
-    /// Where there is one, what is found is put there and not compared.
+    /// If present, found tensors are stored there and not compared.
     recorded: Option<StateDict>,
 }
 
@@ -251,7 +253,7 @@ impl<'a> Comparer<'a> {
         }
     }
 
-    /// Places and scores of the reference's `[N, K, 3]`, which have a tolerance each.
+    /// Positions and scores of the reference's `[N, K, 3]`, which have separate tolerances.
     fn keypoints(&mut self, found: &Detections) {
         let name = "detections.keypoints";
         if self.recorded.is_some() {
@@ -340,7 +342,7 @@ impl<'a> Comparer<'a> {
         Ok(values.chunks_exact((values.len() / count).max(1)).map(|row| polygon(row).into()).collect())
     }
 
-    /// The objects that the reference was trained on for one step.
+    /// The objects on which the reference was trained for one step.
     fn target(&self, config: &RcnnConfig) -> Result<ResizedTarget> {
         let get = |name: &'static str, columns: usize| -> Result<&[f32]> {
             let found = self.reference.get(name);
@@ -396,7 +398,7 @@ impl<'a> Comparer<'a> {
     }
 }
 
-/// Place and score of every keypoint of every detection.
+/// Position and score of every keypoint of every detection.
 fn largest(values: &[f32]) -> f32 {
     values.iter().fold(0.0, |most, value| most.max(value.abs()))
 }

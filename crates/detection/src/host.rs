@@ -1,7 +1,7 @@
-//! From the device to the host: what is decided there (top-k, NMS, decoding) has to be read first.
+//! From the device to the host: the input of host steps (top-k, NMS, decoding) has to be read first.
 //!
-//! Inference is written asynchronously, because a browser gives results of its graphics card to asynchronous code only. Everywhere
-//! else burn's `read_sync` makes an ordinary function of it, which in a browser on a graphics card panics.
+//! Inference is written asynchronously, because a browser gives results of its graphics card only to asynchronous code.
+//! Elsewhere burn's `read_sync` makes an ordinary function of it, which panics in a browser with a graphics card.
 
 use burn::tensor::{Tensor, Transaction, read_sync};
 
@@ -10,15 +10,15 @@ pub(crate) fn host_values<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
     read_sync(read(tensor))
 }
 
-/// [`host_values`], awaited.
+/// [`host_values`], asynchronous.
 pub(crate) async fn read<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
     let data = tensor.into_data_async().await.expect("what the device computes can be read");
     data.try_to_vec_as::<f32>().expect("a float tensor reads as f32")
 }
 
-/// Both at once: the device is waited for once.
+/// Both at once, with one wait for the device.
 pub(crate) async fn read_both<const D: usize, const E: usize>(a: Tensor<D>, b: Tensor<E>) -> [Vec<f32>; 2] {
     let read = Transaction::default().register(a).register(b).execute_async().await;
-    let read: [_; 2] = read.expect("what the device computes can be read").try_into().expect("two were asked for");
+    let read: [_; 2] = read.expect("what the device computes can be read").try_into().expect("two were requested");
     read.map(|data| data.try_to_vec_as::<f32>().expect("a float tensor reads as f32"))
 }

@@ -1,7 +1,7 @@
-//! From the image as given to the network's input, and back.
+//! From the given image to the network's input, and back.
 //!
-//! The transform runs on the host and knows nothing of tensors, so threads that prepare batches can
-//! run it. Coordinates scale with the pixel edges: `x_resized = x_original · width_resized /
+//! The transform runs on the host without tensors, so that threads that prepare batches can run it.
+//! Coordinates scale with the pixel edges: `x_resized = x_original · width_resized /
 //! width_original`, which holds for pixel centres at (0.5, 0.5).
 
 use image::RgbImage;
@@ -18,7 +18,7 @@ pub struct ImageTransform {
     config: ImageTransformConfig,
 }
 
-/// An image ready for batching, with the sizes that lead back to the original.
+/// An image ready for batching, with the sizes for the conversion back to the original.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TransformedImage {
     /// Normalised channels, `[3, height, width]` row by row.
@@ -27,9 +27,9 @@ pub struct TransformedImage {
     pub height: usize,
     /// Width after resizing, without padding.
     pub width: usize,
-    /// Height of the image as given.
+    /// Height of the given image.
     pub original_height: usize,
-    /// Width of the image as given.
+    /// Width of the given image.
     pub original_width: usize,
 }
 
@@ -47,7 +47,7 @@ impl ImageTransform {
         self.apply_part(image, image.dimensions().into())
     }
 
-    /// The same for a part of an image of width and height `whole`, resized as the whole would be.
+    /// The same for a part of an image of width and height `whole`, resized by the factor of the whole image.
     ///
     /// # Errors
     /// As [`Self::apply`].
@@ -110,7 +110,7 @@ pub fn resized_size(rule: ResizeRule, width: u32, height: u32) -> (usize, usize)
     (round(w * scale), round(h * scale))
 }
 
-/// Width and height of a part of an image after the whole was resized.
+/// Width and height of a part of an image after the whole image was resized.
 fn part_size(rule: ResizeRule, part: [u32; 2], whole: [u32; 2]) -> (usize, usize) {
     let (width, height) = resized_size(rule, whole[0], whole[1]);
     let side = |part: u32, whole: u32, resized: usize| {

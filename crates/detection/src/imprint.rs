@@ -1,13 +1,13 @@
-//! Last layers made from the features of a few views of a part, before anything of that part is learnt.
+//! Last layers computed from the features of a few views of a part, before any training on that part.
 //!
 //! ```text
 //! views ─ box head ─ hidden [F] of each ─ mean: prototype p ─ class score  s·(p - m)·h - n·|p - m|² + c·h + b
 //!       └ keypoint head ─ map [C, P, P] of each, read at the keypoint ─ mean: descriptor d ─ map  t·(d - e)·f, doubled
 //! ```
 //!
-//! Shapes: F hidden width, C channels, P side of a pooled square, K keypoints, M prototypes. h and f are the features of
-//! what is classified; m, n, s, c, b and e, t are learnt in pretraining, for all parts at once. Both are linear in h and f,
-//! so that they are a row of the box predictor and a kernel of the keypoint head's transposed convolution.
+//! Shapes: F hidden width, C channels, P side of a pooled square, K keypoints, M prototypes. h and f are the classified
+//! features; m, n, s, c, b and e, t are learnt in pretraining, for all parts together. Both are linear in h and f, so
+//! that they can be written as a row of the box predictor and a kernel of the keypoint head's transposed convolution.
 //!
 //! # Source
 //! Snell, Swersky and Zemel, Prototypical Networks for Few-shot Learning (2017); Qi, Brown and Lowe, Low-Shot Learning
@@ -26,10 +26,10 @@ use crate::target::{ResizedTarget, Target};
 use sdg_layers::state_dict::{StateDict, WeightTensor};
 use sdg_layers::{Distribution, Initializer};
 
-/// First factors of the products of features: small, so that pretraining starts from undecided scores.
+/// Initial factors of the products of features: small, so that pretraining starts from undecided scores.
 const FIRST_SCALE: f64 = 0.05;
 
-/// What makes last layers of features.
+/// Computes last layers from features.
 #[derive(Module, Debug)]
 pub struct Imprint {
     /// For the box predictor.
@@ -39,7 +39,7 @@ pub struct Imprint {
 }
 
 impl Imprint {
-    /// Draws the parameters for a box head of so many hidden values and a keypoint head of so many channels.
+    /// Draws the parameters for a box head of this many hidden values and a keypoint head of this many channels.
     pub fn init(hidden: usize, channels: usize, init: &mut Initializer) -> Self {
         let class = ClassImprint::init(hidden, init);
         let mut constant = |count: usize, value| init.param([count], Distribution::Constant(value));
@@ -53,7 +53,7 @@ impl Imprint {
 pub struct ClassImprint {
     /// m, `[F]`.
     pub mean: Param<Tensor<1>>,
-    /// c, `[F]`: what speaks for any part.
+    /// c, `[F]`: the evidence for any part.
     pub common: Param<Tensor<1>>,
     /// s, `[1]`.
     pub scale: Param<Tensor<1>>,
@@ -64,7 +64,7 @@ pub struct ClassImprint {
 }
 
 impl ClassImprint {
-    /// Draws the parameters for so many hidden values.
+    /// Draws the parameters for this many hidden values.
     pub fn init(hidden: usize, init: &mut Initializer) -> Self {
         let mut constant = |count: usize, value| init.param([count], Distribution::Constant(value));
         Self {
@@ -102,8 +102,8 @@ impl KeypointImprint {
     }
 }
 
-/// Cells of a pooled square of `side` cells and their weights, by which the square is read linearly at a keypoint; `None`
-/// where it is unlabelled or outside of the box. Pixels of the resized image.
+/// Cells of a pooled square of `side` cells and their weights, for linear interpolation of the square at a keypoint;
+/// `None` if it is unlabelled or outside the box. Pixels of the resized image.
 pub fn reading_weights(keypoint: &Keypoint, corners: &Corners, side: usize) -> Option<[(usize, f32); 4]> {
     let [x1, y1, x2, y2] = corners.map(f64::from);
     let is_inside = (x1..=x2).contains(&keypoint.x) && (y1..=y2).contains(&keypoint.y);
@@ -126,15 +126,15 @@ pub fn reading_weights(keypoint: &Keypoint, corners: &Corners, side: usize) -> O
     ])
 }
 
-/// Kernel of four cells that doubles a map linearly, as the transposed convolution has it.
+/// Kernel of four cells that doubles a map linearly, in the form of the transposed convolution.
 const DOUBLING: [f32; 4] = [0.25, 0.75, 0.75, 0.25];
 
-/// Images that go through the network at a time.
+/// Number of images evaluated at a time.
 const BATCH: usize = 16;
 
 impl Imprint {
-    /// Gives the last layers of a detector of one class, by the parameters' names: class scores, and keypoint maps on top
-    /// of those that the detector has. Of each image, the first object is a view; nothing where there is none.
+    /// Returns the last layers of a detector of one class, by the parameters' names: class scores, and keypoint maps
+    /// added to those of the detector. The first object of each image is a view; without one the result is empty.
     ///
     /// # Errors
     /// Targets that do not fit the images.
@@ -171,7 +171,7 @@ impl Imprint {
         let (weights, biases) = self.class.classifier(sum / num_views as f64);
         let [weights, biases] = [values(weights), values(biases)];
         let zeros = vec![0.0; weights.len()];
-        // Behind the part stands the background, which everything is measured against.
+        // The background comes after the part; it is the reference for all scores.
         let rows = WeightTensor { shape: vec![2, weights.len()], values: [weights, zeros].concat() };
         layers.insert("roi_heads.box_predictor.cls_score.weight".into(), rows);
         let biases = WeightTensor { shape: vec![2], values: vec![biases[0], 0.0] };
@@ -193,12 +193,12 @@ impl Imprint {
     }
 }
 
-/// What the keypoint head shows at each keypoint, summed over views.
+/// The keypoint head's features at each keypoint, summed over views.
 #[derive(Default)]
 struct Descriptors {
     /// `[K, C]`.
     sum: Option<Tensor<2>>,
-    /// Views of each keypoint.
+    /// Number of views of each keypoint.
     counts: Vec<f32>,
 }
 
@@ -223,7 +223,7 @@ impl Descriptors {
         self.sum = Some(self.sum.take().map_or(read.clone(), |sum| sum + read));
     }
 
-    /// `[K, C]`; `None` where a keypoint was in no view.
+    /// `[K, C]`; `None` if a keypoint was in no view.
     fn means(self) -> Option<Tensor<2>> {
         let sum = self.sum.filter(|_| self.counts.iter().all(|count| *count > 0.0))?;
         let counts = Tensor::<1>::from_floats(self.counts.as_slice(), &sum.device()).reshape([self.counts.len(), 1]);
@@ -320,8 +320,8 @@ mod tests {
             assert_eq!(scores[2 * row + 1], 0.0);
         }
 
-        // What the keypoint's kernel adds is the descriptor's product with the map, doubled: away from the border, where
-        // the transposed convolution sees zeros, as the interpolation has it.
+        // The keypoint's kernel adds the product of the descriptor with the map, doubled as by the interpolation,
+        // except near the border, where the transposed convolution sees zeros.
         let [head, own_head] = [&detector, &imprinted].map(|d| d.roi_heads.keypoint_head.as_ref().unwrap());
         let maps = head.hidden(&features, &rois);
         let added = own_head.score_lowres.forward(maps.clone()) - head.score_lowres.forward(maps.clone());
@@ -361,7 +361,7 @@ mod tests {
     fn a_square_is_read_where_the_keypoint_lies() {
         let corners = [10.0, 20.0, 24.0, 34.0];
         let read = |x: f64, y: f64| reading_weights(&Keypoint::visible([x, y].into()), &corners, 14);
-        // The middle of a cell is that cell, between two cells both count.
+        // The centre of a cell is that cell; between two cells both count.
         assert_eq!(read(13.5, 20.5).unwrap()[0], (3, 1.0));
         let [left, right, ..] = read(14.0, 20.5).unwrap();
         assert_eq!((left, right), ((3, 0.5), (4, 0.5)));

@@ -13,7 +13,7 @@
 //! [`presets`] set them. The network runs on the device; anchors, matching, sampling, decoding and
 //! NMS run on the host in plain Rust, where they are small. Everything random takes a seed.
 //!
-//! Left out: files, threads and clocks; the optimiser and its schedule (crate `training`); image
+//! Elsewhere: files, threads and clocks; the optimiser and its schedule (crate `training`); image
 //! augmentation (crate `demonstration`).
 //!
 //! # Example

@@ -16,9 +16,9 @@ pub struct Losses {
     pub cls: Tensor<1>,
     /// Box deltas of the proposals.
     pub box_reg: Tensor<1>,
-    /// Heatmaps of the proposals, where the detector has a keypoint head.
+    /// Heatmaps of the proposals, if the detector has a keypoint head.
     pub keypoint: Option<Tensor<1>>,
-    /// Masks of the proposals, where the detector has a mask head.
+    /// Masks of the proposals, if the detector has a mask head.
     pub mask: Option<Tensor<1>>,
 }
 
@@ -76,7 +76,7 @@ fn binary_cross_entropies(logits: Tensor<1>, targets: &[f32]) -> Tensor<1> {
 ///
 /// # Shapes
 /// - `logits`: `[S, K]`
-/// - `targets`: `S` classes; `None` leaves the row out
+/// - `targets`: `S` classes; `None` skips the row
 pub fn cross_entropy(logits: Tensor<2>, targets: &[Option<usize>]) -> Tensor<1> {
     let [rows, _] = logits.dims();
     assert_eq!(rows, targets.len(), "one target for each row");
@@ -93,7 +93,7 @@ pub fn cross_entropy(logits: Tensor<2>, targets: &[Option<usize>]) -> Tensor<1> 
     picked.sum().neg()
 }
 
-/// Penalty on the difference of predicted and wanted deltas, summed.
+/// Penalty on the difference of predicted and target deltas, summed.
 ///
 /// # Shapes
 /// - `predicted`: `[S, 4]`

@@ -1,32 +1,32 @@
-//! Which ground-truth box each anchor or proposal stands for.
+//! Matching of anchors and proposals to ground-truth boxes.
 
 use crate::boxes::{Corners, iou};
 use crate::config::{LowQualityMatches, MatcherConfig};
 
-/// What an anchor or proposal is, after matching.
+/// The class of an anchor or proposal after matching.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Match {
     /// Background.
     Negative,
-    /// Too near to be background, too far to be an object: takes no part in the losses.
+    /// Between background and object: not part of the losses.
     Ignored,
     /// The object with this index.
     Positive(usize),
 }
 
-/// Matches every candidate to the ground-truth box it overlaps most.
+/// Matches every candidate to the ground-truth box with the largest overlap.
 ///
 /// Without ground truth every candidate is negative. With [`LowQualityMatches::Allowed`], the
-/// candidates that overlap a ground-truth box most of all candidates are positive whatever their
-/// IoU; each then stands for the box it overlaps most itself, which need not be that one
-/// (Detectron2 and torchvision agree in this).
+/// candidates with the largest overlap of a ground-truth box are positive at any IoU; each is then
+/// matched to the box that it overlaps most itself, which may be another one (Detectron2 and
+/// torchvision agree in this).
 pub fn match_boxes(candidates: &[Corners], gt_boxes: &[Corners], config: &MatcherConfig) -> Vec<Match> {
     if gt_boxes.is_empty() {
         return vec![Match::Negative; candidates.len()];
     }
     let mut matched_idxs = vec![0usize; candidates.len()];
     let mut best_iou = vec![0f32; candidates.len()];
-    // Few of the tens of thousands of anchors touch an object: the others' overlaps, all 0, are not computed.
+    // Few of the tens of thousands of anchors touch an object: the overlaps of the others, all 0, are not computed.
     let touching: Vec<Vec<(usize, f32)>> = gt_boxes
         .iter()
         .map(|gt| {
@@ -58,7 +58,7 @@ pub fn match_boxes(candidates: &[Corners], gt_boxes: &[Corners], config: &Matche
     if config.low_quality == LowQualityMatches::Allowed {
         for overlaps in &touching {
             let best = overlaps.iter().fold(0f32, |best, &(_, overlap)| best.max(overlap));
-            // An object outside every candidate has best overlap 0 with all of them.
+            // For an object outside every candidate the best overlap is 0 with all of them.
             if best <= 0.0 {
                 continue;
             }

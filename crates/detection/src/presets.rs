@@ -16,7 +16,7 @@ const IMAGENET_MEAN: [f32; 3] = [0.485, 0.456, 0.406];
 const IMAGENET_STD: [f32; 3] = [0.229, 0.224, 0.225];
 const ROI_WEIGHTS: BoxCoderConfig = BoxCoderConfig { weights: [10.0, 10.0, 5.0, 5.0] };
 
-/// What a detector's second stage finds.
+/// The output of a detector's second stage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RcnnKind {
     /// Boxes and classes.

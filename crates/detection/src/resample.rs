@@ -1,4 +1,4 @@
-//! Two ways to resize, each bit for bit (or nearly) that of a reference implementation.
+//! Two resizing methods, each (nearly) bit for bit equal to a reference implementation.
 
 use image::RgbImage;
 
@@ -35,9 +35,9 @@ fn round_to_byte(sum: i32) -> u8 {
     ((sum + (1 << (PRECISION_BITS - 1))) >> PRECISION_BITS).clamp(0, 255) as u8
 }
 
-/// Resizes as Pillow's `BILINEAR` does: along x, rounded to bytes, then along y.
+/// Resizes as Pillow's `BILINEAR`: along x, rounded to bytes, then along y.
 ///
-/// Gives interleaved RGB, `[height, width, 3]`.
+/// Returns interleaved RGB, `[height, width, 3]`.
 ///
 /// # Source
 /// Pillow's documented resampling: triangle filter, 22-bit coefficients, 8-bit intermediate.
@@ -82,14 +82,14 @@ pub fn antialiased_bytes(image: &RgbImage, width: usize, height: usize) -> Vec<u
 
 /// Resizes by the two by two nearest pixels, not rounded, 0 to 255.
 ///
-/// Gives interleaved RGB, `[height, width, 3]`.
+/// Returns interleaved RGB, `[height, width, 3]`.
 ///
 /// # Source
 /// `torch.nn.functional.interpolate(mode="bilinear", align_corners=False)`.
 pub fn bilinear(image: &RgbImage, width: usize, height: usize) -> Vec<f32> {
     let (in_width, in_height) = (image.width() as usize, image.height() as usize);
     let taps = |input: usize, output: usize| -> Vec<(usize, usize, f32)> {
-        // Single precision, as torch: at pixel 600 the weights differ in the fifth digit.
+        // Single precision, as in torch: at pixel 600 the weights differ in the fifth digit.
         let scale = input as f32 / output as f32;
         (0..output)
             .map(|i| {

@@ -38,7 +38,7 @@ pub struct ResidualBlock {
     pub conv2: Conv2d,
     /// 1×1, bottleneck only.
     pub conv3: Option<Conv2d>,
-    /// 1×1, where the shape changes.
+    /// 1×1, if the shape changes.
     pub shortcut: Option<Conv2d>,
 }
 
@@ -133,7 +133,7 @@ impl ResNet {
         net
     }
 
-    /// Gives res2 to res5.
+    /// Returns res2 to res5.
     ///
     /// # Shapes
     /// - `x`: `[N, 3, H, W]`, H and W multiples of 32
@@ -148,7 +148,7 @@ impl ResNet {
     }
 }
 
-/// Takes a module's parameters out of training.
+/// Excludes a module's parameters from training.
 pub(crate) fn frozen<M: Module>(module: M) -> M {
     struct Freezer;
     impl ModuleMapper for Freezer {

@@ -1,4 +1,4 @@
-//! Crops of one size from the pyramid, each box from the level that suits its size.
+//! Crops of one size from the pyramid, each from the level that matches its box's size.
 
 use burn::tensor::{Tensor, TensorData};
 use sdg_kernels::{RoiAlignParams, permute_maps, roi_align};
@@ -7,10 +7,10 @@ use crate::anchors::LEVEL_STRIDES;
 use crate::boxes::{Corners, area};
 use crate::config::{LevelEpsilon, RoiAlignment, RoiPoolerConfig, SamplingRatio};
 
-/// Levels that boxes are pooled from: p2 to p5.
+/// Levels from which boxes are pooled: p2 to p5.
 const POOLED_LEVELS: std::ops::RangeInclusive<usize> = 2..=5;
 
-/// A box and the image of the batch that it belongs to.
+/// A box and its image in the batch.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Roi {
     /// Index in the batch.
@@ -35,7 +35,7 @@ pub fn assign_level(corners: &Corners, config: &RoiPoolerConfig) -> usize {
 /// Pools every ROI into a square, in the order given.
 ///
 /// # Shapes
-/// - `features`: p2 to p6 (p6 is not pooled from), `[N, C, H_l, W_l]`
+/// - `features`: p2 to p6 (p6 is not used), `[N, C, H_l, W_l]`
 /// - output: `[R, C, S, S]`, R > 0
 pub fn pool(features: &[Tensor<4>; 5], rois: &[Roi], config: &RoiPoolerConfig) -> Tensor<4> {
     assert!(!rois.is_empty(), "at least one ROI");
@@ -73,12 +73,12 @@ pub fn pool(features: &[Tensor<4>; 5], rois: &[Roi], config: &RoiPoolerConfig) -
     if pooled.len() == 1 {
         return pooled.remove(0);
     }
-    // `order[row]` is the ROI in a row of the concatenation; the inverse leads back.
+    // `order[row]` is the ROI in a row of the concatenation; the inverse restores the order.
     let mut row_of_roi = vec![0; rois.len()];
     for (row, roi) in order.iter().enumerate() {
         row_of_roi[*roi] = row;
     }
-    // Seen as they stand in memory, channels last, so that whole crops are moved.
+    // Used in their memory order, channels last, so that whole crops are copied.
     let pooled = pooled.into_iter().map(|crops| crops.permute([0, 2, 3, 1])).collect();
     permute_maps(Tensor::cat(pooled, 0), &row_of_roi).permute([0, 3, 1, 2])
 }
@@ -112,7 +112,7 @@ mod tests {
     #[test]
     fn crops_keep_the_order_of_the_rois() {
         let device = Device::flex();
-        // Level l of image n is constant 10·n + l, so a crop tells where it came from.
+        // Level l of image n is constant 10·n + l, so that a crop shows its source.
         let features: [Tensor<4>; 5] = std::array::from_fn(|level| {
             let side = 256 >> level;
             let images =

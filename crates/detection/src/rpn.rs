@@ -1,11 +1,11 @@
 //! The region proposal network: a score and a box for every anchor, then the best few.
 //!
-//! Shapes: N images, C channels, A anchors a cell, L anchors of an image over all levels, in the
+//! Shapes: N images, C channels, A anchors per cell, L anchors of an image over all levels, in the
 //! order level, row, column, aspect ratio.
 //!
 //! Glossary: *objectness logits* are the scores of the anchors before the sigmoid; *deltas* lead
 //! from an anchor to a box; *proposals* are the boxes that remain after top-k and NMS. The network
-//! runs on the device; anchors, matching, decoding and NMS on the host, after one read each.
+//! runs on the device; anchors, matching, decoding and NMS run on the host, after one read each.
 
 use burn::module::Module;
 use burn::tensor::{Int, Tensor, read_sync};
@@ -21,10 +21,10 @@ use crate::losses;
 use crate::matcher::{Match, match_boxes};
 use crate::sampler::sample;
 
-/// Standard deviation of the first weights, in every layer of the head.
+/// Standard deviation of the initial weights, in every layer of the head.
 const HEAD_STD: f64 = 0.01;
 
-/// The convolutions that run over every level alike.
+/// The convolutions that run over every level.
 #[derive(Module, Debug)]
 pub struct RpnHead {
     /// 3×3.
@@ -46,7 +46,7 @@ pub struct RegionProposalNetwork {
     anchor_config: AnchorConfig,
 }
 
-/// What the head gives for a batch, with the anchors it belongs to.
+/// The head's output for a batch, with its anchors.
 #[derive(Debug, Clone)]
 pub struct RpnPredictions {
     /// `[N, L]`.
@@ -57,12 +57,12 @@ pub struct RpnPredictions {
     pub anchors: [Vec<Corners>; 5],
 }
 
-/// Boxes that may hold an object, best first.
+/// Boxes that may contain an object, best first.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Proposals {
     /// Boxes in pixels of the resized image.
     pub boxes: Vec<Corners>,
-    /// One logit an anchor, in the order of the anchors.
+    /// One logit per anchor, in the order of the anchors.
     pub objectness_logits: Vec<f32>,
 }
 
@@ -72,7 +72,7 @@ pub type ImageSize = [usize; 2];
 /// Training or inference.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mode {
-    /// Training: more proposals are kept, for the second stage to learn from.
+    /// Training: more proposals are kept for the second stage.
     Train,
     /// Inference.
     Test,
@@ -125,12 +125,12 @@ impl RegionProposalNetwork {
         }
     }
 
-    /// Picks the proposals of each image: best anchors of each level, decoded, clipped, NMS.
+    /// Selects the proposals of each image: best anchors of each level, decoded, clipped, NMS.
     pub fn propose(&self, predictions: &RpnPredictions, image_sizes: &[ImageSize], mode: Mode) -> Vec<Proposals> {
         read_sync(self.propose_async(predictions, image_sizes, mode))
     }
 
-    /// [`Self::propose`], awaited.
+    /// [`Self::propose`], asynchronous.
     pub async fn propose_async(
         &self,
         predictions: &RpnPredictions,
@@ -191,7 +191,7 @@ impl RegionProposalNetwork {
         }
     }
 
-    /// Gives the losses on objectness and deltas.
+    /// Returns the losses on objectness and deltas.
     ///
     /// `gt_boxes` of each image in pixels of the resized image; `rngs` draws the anchors of each.
     pub fn losses(
@@ -238,7 +238,7 @@ impl RegionProposalNetwork {
     }
 }
 
-/// Indices of the `k` largest values, largest first; of equal ones the earlier first.
+/// Indices of the `k` largest values, largest first; equal ones in their order.
 fn top_k(values: &[f32], k: usize) -> Vec<usize> {
     let mut order: Vec<usize> = (0..values.len()).filter(|i| !values[*i].is_nan()).collect();
     let by_value = |a: &usize, b: &usize| values[*b].total_cmp(&values[*a]).then(a.cmp(b));

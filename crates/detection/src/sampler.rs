@@ -1,4 +1,4 @@
-//! Which matched boxes take part in a loss.
+//! Selection of the matched boxes in a loss.
 
 use rand::seq::SliceRandom;
 use rand_pcg::Pcg64Mcg;
@@ -17,12 +17,13 @@ pub struct Sampled {
 
 /// Draws positives up to the configured fraction and fills up with negatives.
 ///
-/// Where everything fits, all is taken in order and the generator decides nothing.
+/// If everything fits, all are taken in order and the generator is not used.
 pub fn sample(matches: &[Match], config: &SamplerConfig, rng: &mut Pcg64Mcg) -> Sampled {
     sample_with_first(matches, config, 0.0, rng)
 }
 
-/// [`sample`] where a share of the negatives are the first in the list, of proposals those of the highest objectness.
+/// [`sample`] with a share of the negatives taken from the start of the list, which for proposals are those of the
+/// highest objectness.
 pub fn sample_with_first(matches: &[Match], config: &SamplerConfig, first_share: f64, rng: &mut Pcg64Mcg) -> Sampled {
     let mut positive = Vec::new();
     let mut negative = Vec::new();

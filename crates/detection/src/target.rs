@@ -1,4 +1,4 @@
-//! What is to be found in an image, and the same in pixels of the resized image.
+//! The objects in an image, and the same in pixels of the resized image.
 
 use sdg_geometry::{BoundingBox, Keypoint, Mask, Polygon};
 
@@ -7,38 +7,38 @@ use crate::config::{MaskTargets, RoiHeadsConfig};
 use crate::error::{DetectionError, Result};
 use crate::image_transform::TransformedImage;
 
-/// What is to be found in one image, in pixels of the original image.
+/// The objects in one image, in pixels of the original image.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Target {
     /// Boxes; none for an image without objects.
     pub boxes: Vec<BoundingBox>,
     /// Class of each box, from 0.
     pub labels: Vec<usize>,
-    /// Keypoints of each box; may be empty where the detector has no keypoint head.
+    /// Keypoints of each box; may be empty if the detector has no keypoint head.
     pub keypoints: Vec<Vec<Keypoint>>,
-    /// Mask of each box; may be empty where the detector has no mask head.
+    /// Mask of each box; may be empty if the detector has no mask head.
     pub masks: Vec<ObjectMask>,
 }
 
 /// The objects of one image, in pixels of the resized image.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ResizedTarget {
-    /// One box an object, in pixels of the resized image.
+    /// One box per object, in pixels of the resized image.
     pub boxes: Vec<Corners>,
     /// Class of each box.
     pub labels: Vec<usize>,
-    /// Keypoints of each box; empty where the detector has no keypoint head.
+    /// Keypoints of each box; empty if the detector has no keypoint head.
     pub keypoints: Vec<Vec<Keypoint>>,
-    /// Mask of each box; empty where the detector has no mask head.
+    /// Mask of each box; empty if the detector has no mask head.
     pub masks: Vec<ObjectMask>,
 }
 
-/// The part of an image that an object covers.
+/// The area of an image that an object covers.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ObjectMask {
     /// The union of these, in pixels.
     Polygons(Vec<Polygon>),
-    /// Bit by bit, as large as the image.
+    /// A bit per pixel, of the image's size.
     Bitmap(Mask),
 }
 
@@ -55,7 +55,7 @@ impl From<Mask> for ObjectMask {
 }
 
 impl ObjectMask {
-    /// The mask on the resized image, each pixel of which takes one of the original's.
+    /// The mask on the resized image; each pixel takes the value of one pixel of the original.
     fn resized(&self, image: &TransformedImage, kind: MaskTargets) -> Self {
         let [scale_x, scale_y] = image.resized_from_original();
         let mask = match self {
@@ -64,7 +64,7 @@ impl ObjectMask {
             }
             Self::Bitmap(mask) => mask,
         };
-        // Pillow takes the pixel under the centre, torch that under the corner.
+        // Pillow takes the pixel under the centre, torch the one under the corner.
         let offset = match kind {
             MaskTargets::Rasterized => 0.5,
             MaskTargets::Pooled => 0.0,

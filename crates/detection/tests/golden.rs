@@ -1,7 +1,7 @@
-//! Every stage against what Detectron2 and torchvision themselves gave for small random networks of all three kinds.
+//! Compares every stage with the outputs of Detectron2 and torchvision for small random networks of all three kinds.
 //!
-//! The files and the scripts that made them stand in `tests/golden`. `make test-torch` compares a whole R50 network, too, with a
-//! Python that has torch and torchvision (`SDG_TORCH_PYTHON`).
+//! The files and the scripts that made them are in `tests/golden`. `make test-torch` also compares a whole R50 network,
+//! with a Python that has torch and torchvision (`SDG_TORCH_PYTHON`).
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -36,7 +36,7 @@ fn read(path: &Path) -> StateDict {
         .collect()
 }
 
-/// Detectron2's and torchvision's names in this project's words.
+/// Converts Detectron2's and torchvision's names to this project's.
 fn renamed(name: &str) -> String {
     let mut name = name.replace("backbone.fpn_", "backbone.fpn.fpn_");
     for number in 1..=8 {
@@ -99,12 +99,12 @@ fn agrees(folder: &Path) {
     agrees_but_for(folder, &|_| false);
 }
 
-/// As `agrees`; a stage that is outside its tolerance may be excused.
+/// As `agrees`; a stage outside its tolerance may be excused.
 fn agrees_but_for(folder: &Path, excused: &dyn Fn(&StageDifference) -> bool) {
     let report = compared(&detector(folder), folder);
     println!("{}\n{report}", folder.display());
     assert!(!report.stages.is_empty() && report.stages.iter().all(|s| s.passed || excused(s)), "{report}");
-    // Every tensor was compared: all but the targets, and keypoints twice.
+    // Every tensor was compared: all except the targets, and keypoints twice.
     let reference = read(&folder.join("expected.safetensors"));
     for name in reference.keys().filter(|name| !name.starts_with("targets.")) {
         assert!(report.stages.iter().any(|stage| stage.name.starts_with(name)), "{name} was passed over");
@@ -143,10 +143,11 @@ fn torchvision_mask_agrees_at_every_stage() {
 
 /// Relative difference of a gradient from the one in double precision.
 ///
-/// In a whole network some of millions of activations lie within rounding of zero, and a ReLU lets a gradient through in
-/// one precision and not in the other. torch's own single precision is so up to 1.65e-3 from its double precision (behind
-/// the keypoint head's eight convolutions with a ReLU each), ours 1.1e-3, and the two are 1.7e-3 apart. So both are
-/// compared with double precision: ours must be within the bound that is owed, or at least as near as torch's.
+/// In a whole network some of millions of activations lie within rounding of zero, and a ReLU lets a gradient through
+/// in one precision and not in the other. So torch's own single precision differs by up to 1.65e-3 from its double
+/// precision (after the keypoint head's eight convolutions with a ReLU each), ours by 1.1e-3, and the two differ by
+/// 1.7e-3. Both are therefore compared with double precision: ours must be within the required bound, or at least as
+/// close as torch's.
 const WHOLE_GRADIENTS: f64 = 1e-3;
 
 /// The largest difference over the largest magnitude expected.

@@ -1,4 +1,4 @@
-//! A small detector learns, repeatably, and every parameter takes part.
+//! A small detector learns, repeatably, and every parameter contributes.
 
 use burn::module::{Module, ModuleVisitor, Param};
 use burn::optim::{AdamWConfig, GradientsParams};
@@ -98,7 +98,7 @@ fn a_tiny_mask_detector_learns_one_image() {
     let mut detector = tiny_of(RcnnKind::Mask { num_classes: 1 }).init(&device, 3).unwrap();
     let (image, target) = scene();
     let images = [transformed(&detector, &image)];
-    // The lower right half of the bar: a box alone cannot tell it.
+    // The lower right half of the bar, which a box alone does not determine.
     let corners = [[160.0, 70.0], [160.0, 110.0], [60.0, 110.0]];
     let triangle = Polygon { vertices: corners.map(Into::into).to_vec() };
     let targets = [Target { masks: vec![triangle.clone().into()], ..target }];
@@ -128,7 +128,7 @@ fn a_bitmap_teaches_as_its_polygon_does() {
     let bitmap = loss(polygon.rasterize(256, 192).into());
     let empty = loss(Mask::empty(256, 192).into());
     let polygon = loss(polygon.into());
-    // A first network is undecided, ln 2 a cell, so what differs is the sum over the cells that differ.
+    // An initial network is undecided, ln 2 per cell, so that the difference is the sum over the cells that differ.
     assert!((bitmap - polygon).abs() < 0.1 * (empty - polygon).abs(), "{bitmap} {polygon} {empty}");
 }
 

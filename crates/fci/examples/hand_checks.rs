@@ -1,16 +1,16 @@
-//! Does a hand do what it is told, and say so? `hand_checks HOST[:PORT] [WIDTH_MM]`: with WIDTH_MM, something so wide is between its
-//! fingers.
+//! Checks whether a hand obeys its commands and reports correctly: `hand_checks HOST[:PORT] [WIDTH_MM]`; with WIDTH_MM,
+//! an object of that width is between its fingers.
 //!
-//! Prints a line for each check and ends with an error where one of them fails.
+//! Prints a line for each check and ends with an error if one of them fails.
 
 use sdg_fci::client::{Hand, HandConfig};
 
-/// How far the fingers may be from where they were told to be, m.
+/// Tolerance of the fingers' commanded position, m.
 const TOLERANCE_M: f64 = 1.5e-3;
-/// Speed of the fingers against each other, m/s, and their force, N.
+/// Relative speed of the fingers, m/s, and their force, N.
 const SPEED_M_S: f64 = 0.1;
 const FORCE_N: f64 = 20.0;
-/// How much thinner or wider a part may be than the hand is told, m.
+/// Tolerance of a part's width below and above the commanded width, m.
 const EPSILON_M: f64 = 0.005;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -36,7 +36,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     check(is_there, &format!("moves to {:.0} mm", told_m * 1e3), format!("{width_m:.4} m"));
 
     hand.move_to(max_width_m, SPEED_M_S)?;
-    // Where something is between the fingers, a grasp of its width is one, and a grasp of another is none.
+    // With an object between the fingers, a grasp of its width succeeds, and a grasp of another width fails.
     let told_m = width_mm.map_or(0.03, |width_mm| width_mm * 1e-3);
     let grasped = hand.grasp(told_m, SPEED_M_S, FORCE_N, EPSILON_M, EPSILON_M)?;
     let state = hand.read_state()?;

@@ -1,9 +1,9 @@
-//! Does a robot stop for every limit, and for nothing else? `limit_checks HOST panda|fr3 [TRIES [joints]]`.
+//! Checks whether a robot stops for every limit, and only then: `limit_checks HOST panda|fr3 [TRIES [joints]]`.
 //!
-//! Runs one motion just inside and one just outside of every limit and prints a line for each; ends with an error where a
-//! motion inside was stopped, or one outside was not, or for another reason. Against a robot in real time, each motion has
-//! TRIES (1): a lost command may look like a broken limit. Where the limits of the joints in Cartesian motions are the robot's
-//! own, and not widened, `joints` tries those and folds the arm until it would touch itself, in place of all others.
+//! Runs one motion just inside and one just outside of every limit and prints a line for each; ends with an error if a
+//! motion inside was stopped, or if one outside was not stopped, or for another reason. With a robot in real time, each
+//! motion has TRIES (1), because a lost command may look like a violated limit. If the robot's own joint limits apply
+//! in Cartesian motions, and are not widened, `joints` tests only those, and folds the arm until it would touch itself.
 
 #[path = "../tests/limit_cases/mod.rs"]
 mod limit_cases;
@@ -50,7 +50,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             let (found, is_right) = loop {
                 tries += 1;
                 let found = match case.run(&mut robot, &home, is_inside) {
-                    // On the way to where the motion begins.
+                    // On the path to the start of the motion.
                     Err(FciError::Motion { errors, .. }) if tries < num_tries => {
                         println!("     on the way to {}: {errors}", case.name);
                         robot.automatic_error_recovery()?;

@@ -1,5 +1,5 @@
-//! How well a client keeps the robot's time: `loop_times HOST [SECONDS]` swings a joint by 0.1 rad and prints, as one JSON
-//! object, how long answers took and how many of the robot's cycles were answered.
+//! Measures the timing of a client: `loop_times HOST [SECONDS]` swings a joint by 0.1 rad and prints, as one JSON
+//! object, the answer times and the number of answered cycles of the robot.
 
 use std::ops::ControlFlow;
 
@@ -20,7 +20,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let (mut secs, mut lowest_rate, mut sum_rates, mut num_rates) = (0.0, 1.0_f64, 0.0, 0);
     let result = robot.control_joint_positions(InternalController::JointImpedance, |state, step| {
         secs += step.as_secs_f64();
-        // The rate of the first 100 cycles is that of fewer.
+        // The rate of the first 100 cycles covers fewer cycles.
         if secs > 0.1 {
             lowest_rate = lowest_rate.min(state.control_command_success_rate);
             sum_rates += state.control_command_success_rate;

@@ -1,4 +1,4 @@
-//! What ends a call of the client or a server.
+//! Errors that end a call of the client or a server.
 
 use std::io;
 use std::net::SocketAddr;
@@ -8,7 +8,7 @@ use crate::wire::Status;
 use crate::wire::robot_error::RobotErrors;
 use crate::wire_error::WireError;
 
-/// What ends a call of the client or a server.
+/// Errors that end a call of the client or a server.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
@@ -26,11 +26,11 @@ pub enum FciError {
     #[error("the {peer} speaks version {found} of the protocol, expected {expected}")]
     Version {
         peer: &'static str,
-        /// What this client speaks, in words.
+        /// The protocol versions of this client, in words.
         expected: String,
         found: u16,
     },
-    /// Bytes that are no message.
+    /// Bytes that are not a valid message.
     #[error("{address}: {source}")]
     Wire { address: SocketAddr, source: WireError },
     /// The robot refused a command.
@@ -41,7 +41,7 @@ pub enum FciError {
     Motion {
         /// The robot's answer to the Move.
         status: Status,
-        /// What the robot stopped for.
+        /// The errors for which the robot stopped.
         errors: RobotErrors,
         /// Share of the last 100 commands that the robot had received in time.
         success_rate: f64,
@@ -49,7 +49,7 @@ pub enum FciError {
     /// A command that must not be sent.
     #[error("{field}: expected {expected}, found {found}")]
     Command {
-        /// Which field of the command.
+        /// The field of the command.
         field: &'static str,
         expected: &'static str,
         found: String,

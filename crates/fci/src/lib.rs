@@ -1,4 +1,4 @@
-//! Franka Control Interface: a client that drives a robot, and a server that makes a simulation one.
+//! Franka Control Interface: a client that drives a robot, and a server that makes a simulation behave like one.
 //!
 //! ```text
 //!  client::Robot ──requests, TCP 1337──>  server ── torques ──> Plant (a simulation)
@@ -7,9 +7,9 @@
 //!  client::Hand  ──requests, TCP 1338──>  hand
 //! ```
 //!
-//! Version 5 of the protocol is the Panda's (libfranka 0.9), version 10 the FR3's (libfranka 0.18 and later). The server speaks 5, the
-//! client both. Nothing here knows of kinematics beyond what a [`server::Plant`] tells, and there is no asynchronous runtime:
-//! threads do.
+//! Version 5 of the protocol is the Panda's (libfranka 0.9), version 10 the FR3's (libfranka 0.18 and later). The
+//! server speaks 5, the client both. This crate knows kinematics only through a [`server::Plant`], and uses threads
+//! instead of an asynchronous runtime.
 //!
 //! ```no_run
 //! use std::ops::ControlFlow;

@@ -1,4 +1,4 @@
-//! The limits that a robot holds its client to.
+//! The limits that a robot applies to its client.
 
 use crate::wire::Version;
 
@@ -13,7 +13,7 @@ pub struct RateLimits {
     pub jerk: f64,
 }
 
-/// How a joint's largest velocity falls towards an end of its range: `sqrt(slope * distance) - offset`, not below 0.
+/// Decrease of a joint's largest velocity towards an end of its range: `sqrt(slope * distance) - offset`, at least 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct VelocityNearEnd {
     /// Subtracted from the root, rad/s.
@@ -23,7 +23,7 @@ pub struct VelocityNearEnd {
 }
 
 impl VelocityNearEnd {
-    /// The largest velocity (rad/s) towards an end that is `distance` (rad) away.
+    /// The largest velocity (rad/s) towards an end at `distance` (rad).
     fn at(self, distance: f64) -> f64 {
         ((self.slope * distance).max(0.0).sqrt() - self.offset).max(0.0)
     }
@@ -38,7 +38,7 @@ pub struct Limits {
     pub q_max: [f64; 7],
     /// Velocity, rad/s.
     pub velocity: [f64; 7],
-    /// What velocities are limited to besides, near the ends of the joints' ranges.
+    /// Additional velocity limits near the ends of the joints' ranges.
     pub velocity_near_ends: Option<[VelocityNearEnd; 7]>,
     /// Acceleration, rad/s².
     pub acceleration: [f64; 7],
@@ -52,12 +52,13 @@ pub struct Limits {
     pub translation: RateLimits,
     /// Limits of the end effector's rotation.
     pub rotation: RateLimits,
-    /// Of joint 3, where it is commanded as the elbow.
+    /// Limits of joint 3, if it is commanded as the elbow.
     pub elbow: RateLimits,
 }
 
 impl Limits {
-    /// The Panda's, as libfranka 0.9.2 limits rates to them (`rate_limiting.h`); ranges and torques as Franka publishes them.
+    /// The Panda's, as in the rate limits of libfranka 0.9.2 (`rate_limiting.h`); ranges and torques as published by
+    /// Franka.
     pub const PANDA: Limits = Limits {
         q_min: [-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8973],
         q_max: [2.8973, 1.7628, 2.8973, -0.0698, 2.8973, 3.7525, 2.8973],
@@ -71,8 +72,8 @@ impl Limits {
         rotation: RateLimits { velocity: 2.5, acceleration: 25.0, jerk: 12500.0 },
         elbow: RateLimits { velocity: 2.175, acceleration: 10.0, jerk: 5000.0 },
     };
-    /// The FR3's, as libfranka 0.21 limits rates to them (`rate_limiting.h`, whose functions of the position tell the ranges, too);
-    /// torques as Franka publishes them.
+    /// The FR3's, as in the rate limits of libfranka 0.21 (`rate_limiting.h`, whose position-dependent functions also
+    /// give the ranges); torques as published by Franka.
     pub const FR3: Limits = Limits {
         q_min: [-2.7501, -1.7918, -2.9065, -3.0481, -2.8101, 0.54092, -3.0196],
         q_max: [2.7501, 1.7918, 2.9065, -0.1458, 2.8101, 4.5205, 3.0196],
@@ -124,7 +125,7 @@ mod tests {
     fn an_fr3_slows_down_before_the_ends_of_its_joints_and_a_panda_does_not() {
         assert_eq!(Limits::PANDA.velocity_range(0, 2.89), [-2.175, 2.175]);
         assert_eq!(Limits::FR3.velocity_range(0, 0.0), [-2.62, 2.62]);
-        // A tenth of a radian before the end: sqrt(12 * 0.1) - 0.3 towards it, all of it away from it.
+        // A tenth of a radian before the end: sqrt(12 * 0.1) - 0.3 towards it, the full velocity away from it.
         let [away, towards] = Limits::FR3.velocity_range(0, 2.6501);
         assert!((towards - 0.795_445).abs() < 1e-6 && away == -2.62, "{away} {towards}");
         assert_eq!(Limits::FR3.velocity_range(5, 0.54092)[0], 0.0);

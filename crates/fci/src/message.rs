@@ -5,12 +5,13 @@ use std::io::{self, Read};
 use crate::wire::{Header, HeaderKind};
 use crate::wire_error::WireError;
 
-/// Memory for a message is taken in steps of this size as its bytes arrive, so that a header that announces much takes little.
+/// Memory for a message is allocated in steps of this size as its bytes arrive, so that a header that announces a large
+/// message costs little.
 const STEP: usize = 8192;
 
-/// Reads the next message; the inner error is a header that cannot be.
+/// Reads the next message; the inner error is an invalid header.
 ///
-/// Memory is taken as bytes arrive, and never more than the message has.
+/// Memory is allocated as bytes arrive, and never more than the message needs.
 ///
 /// # Errors
 /// The stream's end or its error.

@@ -1,14 +1,14 @@
-//! Poses as the protocol writes them, and twists between them.
+//! Poses in the protocol's form, and twists between them.
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3, Vector6};
 
 use crate::wire::Transform;
 
-/// How far the lengths of a commanded rotation's columns and rows may be off 1 (libfranka's bound).
+/// Largest deviation from 1 of the lengths of a commanded rotation's columns and rows (libfranka's bound).
 const LENGTH_TOLERANCE: f64 = 1e-5;
 
-/// Whether a matrix is a rotation and a translation, all finite, with the last row 0 0 0 1; what libfranka accepts, but no
-/// mirror.
+/// Whether a matrix is a rotation and a translation, all finite, with the last row 0 0 0 1; as libfranka accepts, but
+/// without mirrored ones.
 pub fn is_rigid(transform: &Transform) -> bool {
     if !transform.iter().all(|value| value.is_finite()) {
         return false;
@@ -38,14 +38,14 @@ pub fn transform(pose: &Isometry3<f64>) -> Transform {
     values
 }
 
-/// Translation and rotation vector, in the base frame, that lead from one pose to another.
+/// Translation and rotation vector, in the base frame, from one pose to another.
 pub(crate) fn difference(from: &Isometry3<f64>, to: &Isometry3<f64>) -> Vector6<f64> {
     let translation = to.translation.vector - from.translation.vector;
     let rotation = (to.rotation * from.rotation.inverse()).scaled_axis();
     Vector6::new(translation.x, translation.y, translation.z, rotation.x, rotation.y, rotation.z)
 }
 
-/// The pose that a small motion in the base frame leads to: the inverse of [`difference`].
+/// The pose after a small motion in the base frame: the inverse of [`difference`].
 pub(crate) fn moved(pose: &Isometry3<f64>, motion: &Vector6<f64>) -> Isometry3<f64> {
     let translation: Vector3<f64> = motion.fixed_rows::<3>(0).into();
     let turn = UnitQuaternion::from_scaled_axis(motion.fixed_rows::<3>(3).into_owned());
@@ -82,7 +82,7 @@ mod tests {
         assert!(!is_rigid(&values), "a mirror");
         values[0] = f64::NAN;
         assert!(!is_rigid(&values));
-        // Row by row instead of column by column: the translation stands in the bottom row.
+        // Row by row instead of column by column: the translation is in the bottom row.
         let mut transposed = transform(&Isometry3::identity());
         transposed[3] = 0.5;
         assert!(!is_rigid(&transposed));

@@ -1,6 +1,6 @@
-//! Bytes that are no message of the protocol.
+//! Bytes that are not a message of the protocol.
 
-/// Bytes that are no message.
+/// Bytes that are not a message.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
@@ -9,11 +9,11 @@ pub enum WireError {
     #[error("a {message} of at least {expected} bytes was expected, {found} were found")]
     Short {
         message: &'static str,
-        /// What was read up to here.
+        /// Number of bytes read so far.
         expected: usize,
         found: usize,
     },
-    /// A message goes on after its last field.
+    /// A message continues after its last field.
     #[error("a {message} of {expected} bytes was expected, {found} were found")]
     Long {
         message: &'static str,
@@ -25,6 +25,6 @@ pub enum WireError {
     #[error("a message of {min} to {max} bytes was expected, its header says {found}")]
     MessageSize { min: u32, max: u32, found: u32 },
     /// A number without a meaning.
-    #[error("{found} is no {field}")]
+    #[error("{found} is not a valid {field}")]
     Value { field: &'static str, found: u32 },
 }

@@ -1,4 +1,5 @@
-//! A client of a robot that makes mistakes in everything it sends: errors, no panic, no wait beyond the client's own bounds.
+//! A client of a robot with errors in everything it sends: the result is errors, no panic, and no wait beyond the
+//! client's own limits.
 
 use std::io::Write;
 use std::net::{TcpListener, UdpSocket};
@@ -18,11 +19,11 @@ use sdg_fci::wire::{
 
 const NUM_SESSIONS: usize = 150;
 const TIMEOUT: Duration = Duration::from_millis(50);
-/// Connecting twice (versions 5 and 10), the start of a motion, its end and its stop: each wait has its bound, recovery the longest
-/// one, which a closed connection cuts short.
+/// Connecting twice (versions 5 and 10), the start of a motion, its end and its stop: each wait has its limit, recovery
+/// the longest one, which a closed connection shortens.
 const MAX_SESSION: Duration = Duration::from_secs(25);
 
-/// As often as not with mistakes.
+/// With errors in half of the cases.
 fn maybe_mutated(mut bytes: Vec<u8>, rng: &mut Pcg64Mcg) -> Vec<u8> {
     if rng.random_bool(0.5) {
         mutate(&mut bytes, rng);
@@ -30,7 +31,7 @@ fn maybe_mutated(mut bytes: Vec<u8>, rng: &mut Pcg64Mcg) -> Vec<u8> {
     bytes
 }
 
-/// Welcomes clients, answers every request as a robot would, and follows with a few states; then hangs up.
+/// Accepts clients, answers every request as a robot would, and sends a few states; then disconnects.
 fn play_robot(listener: &TcpListener, rng: &mut Pcg64Mcg) -> std::io::Result<()> {
     let (mut stream, client) = listener.accept()?;
     stream.set_read_timeout(Some(TIMEOUT))?;
@@ -84,7 +85,7 @@ fn a_robot_that_makes_mistakes_is_an_error() {
     let address = listener.local_addr().unwrap().to_string();
     thread::spawn(move || {
         let rng = &mut Pcg64Mcg::seed_from_u64(1);
-        // Ends with the test's process; a client that hangs up first is an error of the stream.
+        // Ends with the test's process; a client that disconnects first is an error of the stream.
         loop {
             let _ = play_robot(&listener, rng);
         }

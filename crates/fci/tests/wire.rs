@@ -1,4 +1,4 @@
-//! Messages: their sizes and bytes, there and back, and a hundred thousand of them with mistakes.
+//! Messages: their sizes and bytes, encoding and decoding, and a hundred thousand of them with errors.
 
 use std::io::{self, Read};
 
@@ -58,7 +58,7 @@ fn state() -> RobotState {
     let blank = RobotState::default().encode(Version::V5);
     let mut bytes = vec![0; blank.len()];
     for (index, number) in bytes[8..8 + 284 * 8].chunks_exact_mut(8).enumerate() {
-        // Whole numbers survive version 10's shorter ones.
+        // Whole numbers survive version 10's single precision.
         number.copy_from_slice(&(index as f64 + 1.0).to_le_bytes());
     }
     bytes[..8].copy_from_slice(&77_u64.to_le_bytes());
@@ -114,7 +114,7 @@ fn fields_stand_where_libfranka_reads_them() {
     // 8 + 6 * 16 * 8 bytes before the mass; 26 numbers of masses and centres, 4 of elbows and 3 * 7 of torques before q.
     assert_eq!(number(776), state.ee_mass);
     assert_eq!(number(776 + 8 * (26 + 4 + 21)), state.q[0]);
-    // The modes stand behind 284 numbers but for the success rate, which is the last.
+    // The modes come after 284 numbers; only the success rate comes after them.
     assert_eq!(bytes[8 + 8 * 284..8 + 8 * 284 + 2], [3, 2]);
     assert_eq!(bytes[8 + 8 * 284 + 2], 1, "the first error");
     assert_eq!(bytes[8 + 8 * 284 + 2 + 40], 1, "the last error");
@@ -126,7 +126,7 @@ fn fields_stand_where_libfranka_reads_them() {
     assert_eq!(bytes[..8], [8, 7, 6, 5, 4, 3, 2, 1]);
     assert_eq!(bytes[8 + 8 * 38..8 + 8 * 38 + 2], [1, 1], "elbow and end");
 
-    // A Move counts its modes in four bytes, and its generators from the joint positions on.
+    // A Move has four bytes for its modes, and numbers its generators from joint positions.
     let bytes = requests()[1].encode(9, Version::V5).unwrap();
     assert_eq!(bytes[..20], [1, 0, 0, 0, 9, 0, 0, 0, 68, 0, 0, 0, 2, 0, 0, 0, 3, 0, 0, 0]);
     // The hand's commands have two bytes.
@@ -148,7 +148,7 @@ fn requests_survive_in_both_versions() {
             assert_eq!(Request::decode(&header, &bytes[HEADER_SIZE..], version).unwrap(), request);
         }
     }
-    // Walls, filters and the library are version 5's, the description is version 10's.
+    // Walls, filters and the library exist only in version 5, the description only in version 10.
     assert_eq!(num_missing, 4);
     for request in hand_requests() {
         let bytes = request.encode(5);
@@ -185,7 +185,7 @@ fn a_message_that_ends_early_or_late_says_by_how_much() {
     assert_eq!(long.to_string(), "a state of 2373 bytes was expected, 2374 were found");
 }
 
-/// A stream that notes the largest buffer that is offered to it: what its reader has taken memory for.
+/// A stream that records the largest buffer offered to it: the memory allocated by its reader.
 struct Watched<'a> {
     bytes: &'a [u8],
     largest_buffer: usize,
@@ -247,7 +247,7 @@ fn mistakes_in_messages_are_errors_and_take_no_memory() {
         };
         num_accepted += usize::from(is_accepted);
     }
-    // Some mutations change a number only, most break the message: both kinds were tried.
+    // Some mutations change only a number, most break the message: both kinds occur.
     assert!((NUM_MUTATIONS / 20..NUM_MUTATIONS * 3 / 4).contains(&num_accepted), "{num_accepted}");
 }
 
@@ -256,7 +256,7 @@ fn fuzzed_message(mut bytes: Vec<u8>, kind: HeaderKind, rng: &mut Pcg64Mcg) -> O
     mutate(&mut bytes, rng);
     let mut stream = Watched { bytes: &bytes, largest_buffer: 0 };
     let message = read_message(&mut stream, kind);
-    // What a header announces may be 4 MB: no buffer is larger than what arrived and a step, or than the message.
+    // A header may announce 4 MB: a buffer is never larger than the received data plus a step, nor than the message.
     let announced = bytes.get(..kind.size()).and_then(|bytes| Header::decode(bytes, kind).ok());
     let size = announced.map_or(kind.size(), |header| header.size as usize);
     assert!(stream.largest_buffer <= size.min(8192), "{} of {size}", stream.largest_buffer);

@@ -54,12 +54,13 @@ impl Angle {
         Self::from_radians(class as f64 * TAU / num_classes as f64)
     }
 
-    /// The shortest way from `other` to `self`, without its sign, in radians in `[0, π]`.
+    /// The shortest rotation from `other` to `self`, without its sign, in radians in `[0, π]`.
     pub fn distance(self, other: Self) -> f64 {
         (self - other).0.abs()
     }
 
-    /// As [`distance`](Self::distance), where turning by π changes nothing (lines, two-finger grippers): `[0, π/2]`.
+    /// As [`distance`](Self::distance), for directions that a turn by π does not change (lines, two-finger grippers):
+    /// `[0, π/2]`.
     pub fn distance_modulo_half_turn(self, other: Self) -> f64 {
         let distance = self.distance(other);
         distance.min(PI - distance)

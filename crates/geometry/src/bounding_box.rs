@@ -7,8 +7,8 @@ use crate::GeometryError;
 
 /// An axis-aligned box by two corners, in pixels (x right, y down).
 ///
-/// A box may lie partly or wholly outside an image; only [`clip`](Self::clip) confines it. A box made by
-/// [`new`](Self::new) has a positive area; one written by its fields need not.
+/// A box may lie partly or wholly outside an image; only [`clip`](Self::clip) limits it. A box made by
+/// [`new`](Self::new) has a positive area; one made from its fields may not.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct BoundingBox {
     /// Left edge.
@@ -101,7 +101,7 @@ impl BoundingBox {
         (self.x1..=self.x2).contains(&point.x) && (self.y1..=self.y2).contains(&point.y)
     }
 
-    /// Both axes multiplied, as when the image is resized.
+    /// Scales both axes, as when the image is resized.
     pub fn scaled(&self, scale_x: f64, scale_y: f64) -> Self {
         Self { x1: self.x1 * scale_x, y1: self.y1 * scale_y, x2: self.x2 * scale_x, y2: self.y2 * scale_y }
     }

@@ -1,6 +1,6 @@
 //! Compass search: one coordinate at a time, the step halved when no neighbour is better.
 
-/// When a search ends.
+/// The stopping criteria of a search.
 #[derive(Debug, Clone, Copy)]
 pub struct CompassSearch {
     /// First and last step, in units of the caller's neighbours.
@@ -9,14 +9,14 @@ pub struct CompassSearch {
     pub min_gain: f64,
     /// Rounds of at most eight evaluations each.
     pub max_rounds: usize,
-    /// No round begins after so many evaluations.
+    /// No round starts after this many evaluations.
     pub max_evaluations: usize,
 }
 
 impl CompassSearch {
     /// The best point found from `start` along four coordinates, and its score.
     ///
-    /// `neighbour` moves a point along a coordinate by a step with its sign; `None` where it may not go.
+    /// `neighbour` moves a point along a coordinate by a step with its sign; `None` if that move is not allowed.
     pub fn climb<P: Copy>(
         &self,
         start: P,
@@ -65,7 +65,7 @@ mod tests {
         let (top, best) = search.climb([0.0; 4], moved, score);
         assert!((top[0] - 3.0).abs() < 0.02 && (top[1] + 2.0).abs() < 0.02 && top[2].abs() < 0.02, "{top:?}");
         assert_eq!((top[3], best), (1.0, score(&top)));
-        // The bound of evaluations is asked between rounds of at most eight.
+        // The limit of evaluations is checked between rounds of at most eight.
         let short = CompassSearch { max_evaluations: 1, ..search };
         assert!(short.climb([0.0; 4], moved, score).1 < best);
     }

@@ -1,4 +1,4 @@
-//! What can be wrong with a shape.
+//! Errors of a shape.
 
 /// Why a shape could not be made or read.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

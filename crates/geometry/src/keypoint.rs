@@ -5,10 +5,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Angle, PlanarSimilarity, Polygon};
 
-/// What is known of a keypoint; COCO's `v`.
+/// The visibility of a keypoint; COCO's `v`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Visibility {
-    /// Not labelled, or outside the image: the place says nothing (COCO 0).
+    /// Not labelled, or outside the image: the position is meaningless (COCO 0).
     Unlabelled,
     /// Labelled though hidden (COCO 1).
     Occluded,
@@ -23,7 +23,7 @@ pub struct Keypoint {
     pub x: f64,
     /// Pixels down.
     pub y: f64,
-    /// Whether the place may be relied on.
+    /// Whether the position is valid.
     pub visibility: Visibility,
 }
 
@@ -38,14 +38,14 @@ impl Keypoint {
         Point2::new(self.x, self.y)
     }
 
-    /// Whether the place was labelled at all.
+    /// Whether the position was labelled at all.
     pub fn is_labelled(&self) -> bool {
         self.visibility != Visibility::Unlabelled
     }
 }
 
-/// The two points by which a person marks a grasp: the gripper's centre goes to their middle and its jaws close
-/// across the line. The direction from start to end is the grasp's angle.
+/// The two points by which a person marks a grasp: the gripper's centre moves to their midpoint and its jaws
+/// close across the line. The direction from start to end is the grasp's angle.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct GraspLine {
     /// The first point.
@@ -60,7 +60,7 @@ impl GraspLine {
         Self { start, end }
     }
 
-    /// The middle.
+    /// The midpoint.
     pub fn center(&self) -> Point2<f64> {
         nalgebra::center(&self.start, &self.end)
     }
@@ -81,7 +81,7 @@ impl GraspLine {
     /// # Source
     /// OpenDR single_demo_grasp: the two clicked points and ten between them.
     pub fn keypoints(&self, count: usize) -> Vec<Keypoint> {
-        assert!(count >= 2, "a line has two ends, so at least two keypoints; asked for {count}");
+        assert!(count >= 2, "a line needs at least two keypoints, found {count}");
         (0..count)
             .map(|k| {
                 let t = k as f64 / (count - 1) as f64;
@@ -90,10 +90,11 @@ impl GraspLine {
             .collect()
     }
 
-    /// How far the jaws must open to close on `part` across the middle of the line, in pixels: by the outermost crossings of its
-    /// outline there. The gripper closes symmetrically about the middle, so the wider half counts twice.
+    /// The jaw opening, in pixels, for closing on `part` across the midpoint of the line: from the outermost crossings
+    /// of its outline there. The gripper closes symmetrically about the midpoint, so that the wider half counts twice.
     ///
-    /// What is taught and what the annotation page shows of marks that state no opening, which other tools do not.
+    /// This opening is taught, and shown by the annotation page, for marks without an opening, as other tools write
+    /// them.
     pub fn opening_across(&self, part: &Polygon) -> f64 {
         let center = self.center();
         let along = (self.end - self.start).normalize();

@@ -11,7 +11,7 @@
 //! spans `[0, w]`. Camera: the optical frame, x right, y down, z forward. World: whatever `world_from_camera`
 //! says; in this project the robot's base. Angles are radians.
 //!
-//! What is deliberately absent: pictures (the `image` crate), tensors (burn), files.
+//! This crate deliberately has no pictures (the `image` crate), no tensors (burn) and no files.
 //!
 //! ```
 //! use sdg_geometry::{GraspLine, PlanarGrasp};

@@ -13,7 +13,7 @@ pub struct Mask {
 }
 
 impl Mask {
-    /// A mask with nothing in it.
+    /// An empty mask.
     pub fn empty(width: u32, height: u32) -> Self {
         Self { width, height, bits: vec![false; width as usize * height as usize] }
     }
@@ -116,7 +116,7 @@ impl RunLengthMask {
     /// The mask that the runs describe.
     ///
     /// # Errors
-    /// Runs that do not add up to height × width; found before memory is taken.
+    /// Runs that do not add up to height × width; detected before memory is allocated.
     pub fn decode(&self) -> Result<Mask, GeometryError> {
         let [height, width] = self.size;
         let expected = u64::from(height) * u64::from(width);

@@ -1,4 +1,4 @@
-/// What a camera is fixed to.
+/// The body to which a camera is fixed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mount {
     /// To the robot's hand: it moves with the flange.

@@ -1,16 +1,16 @@
-//! The outline of a part in a picture, as a careful person would click it: traced from a mask, then thinned out.
+//! The outline of a part in a picture, as a careful person would click it: traced from a mask, then simplified.
 
 use nalgebra::Point2;
 
 use crate::{Mask, Polygon};
 
-/// The most points that a person would click.
+/// Maximum number of points that a person would click.
 const MAX_VERTICES: usize = 56;
 
-/// How far the thinned outline may run from the traced one at first, in pixels.
+/// Initial largest distance of the simplified outline from the traced one, in pixels.
 const MIN_TOLERANCE_PX: f64 = 0.35;
 
-/// The outer outline of the largest piece of a mask, holes left out; `None` for a mask without a piece of any size.
+/// The outer outline of the largest piece of a mask, holes left out; `None` for an empty mask.
 ///
 /// It has 56 vertices at most: as many as a careful person would click.
 ///
@@ -28,8 +28,8 @@ pub fn outer_outline(mask: &Mask) -> Option<Polygon> {
     }
 }
 
-/// Walks along the pixels' edges with the mask on the right hand, once round each boundary; the longest way round
-/// is the outer outline of the largest piece.
+/// Follows the pixels' edges with the mask on the right-hand side, once around each boundary; the longest
+/// boundary is the outer outline of the largest piece.
 fn largest_boundary(mask: &Mask) -> Option<Vec<Point2<f64>>> {
     let (width, height) = (mask.width() as i64, mask.height() as i64);
     let inside = |x: i64, y: i64| x >= 0 && y >= 0 && x < width && y < height && mask.get(x as u32, y as u32);
@@ -47,12 +47,12 @@ fn largest_boundary(mask: &Mask) -> Option<Vec<Point2<f64>>> {
                 if heading == (1, 0) {
                     seen[(at.1 * width + at.0) as usize] = true;
                 }
-                // Middles of the pixels' edges: the walk then cuts corners as the outline of the real part does.
+                // Midpoints of the pixels' edges: the path then cuts corners as the outline of the real part does.
                 let middle = |a: i64, step: i64| a as f64 + 0.5 * step as f64;
                 corners.push(Point2::new(middle(at.0, heading.0), middle(at.1, heading.1)));
                 at = (at.0 + heading.0, at.1 + heading.1);
                 let right = (-heading.1, heading.0);
-                // The two pixels ahead, on either side of the way on.
+                // The two pixels ahead, on both sides of the path.
                 let ahead = |side: (i64, i64)| {
                     let x = at.0 + (heading.0 + side.0 - 1).div_euclid(2);
                     let y = at.1 + (heading.1 + side.1 - 1).div_euclid(2);
@@ -79,7 +79,7 @@ fn largest_boundary(mask: &Mask) -> Option<Vec<Point2<f64>>> {
     best.map(|(_, corners)| corners).filter(|corners| corners.len() >= 12)
 }
 
-/// Positive for a ring that runs clockwise as seen with y down; holes run the other way.
+/// Positive for a ring that runs clockwise as seen with y down; holes have the opposite sense.
 fn signed_area(ring: &[Point2<f64>]) -> f64 {
     (0..ring.len()).map(|idx| ring[idx].coords.perp(&ring[(idx + 1) % ring.len()].coords)).sum::<f64>() / 2.0
 }

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Angle, GraspLine, Keypoint};
 
-/// A top grasp in pixels: where the gripper's centre goes, how it is turned, how far it opens.
+/// A top grasp in pixels: position of the gripper's centre, its turn, its opening.
 ///
 /// The angle is that of the marked line, start to end; the jaws close across it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -21,20 +21,20 @@ pub struct PlanarGrasp {
 }
 
 impl PlanarGrasp {
-    /// The grasp that a marked line describes.
+    /// The grasp described by a marked line.
     pub fn from_line(line: &GraspLine, width: f64) -> Self {
         let center = line.center();
         Self { x: center.x, y: center.y, angle: line.angle(), width }
     }
 
-    /// Reads the grasp off keypoints on a line: the centre is their mean, the angle that of the least-squares line,
-    /// directed from the first keypoints to the last. Unlabelled keypoints are left out.
+    /// Computes the grasp from keypoints on a line: the centre is their mean, the angle that of the least-squares
+    /// line, directed from the first keypoints to the last. Unlabelled keypoints are ignored.
     ///
-    /// `None` when fewer than two labelled keypoints remain or when they all fall on one place.
+    /// `None` when fewer than two labelled keypoints remain or when they all coincide.
     ///
     /// # Source
     /// Paper, section IV-C. The original takes the mode of whole degrees and folds it; total least squares with
-    /// `atan2` has neither flaw.
+    /// `atan2` avoids both errors.
     pub fn from_keypoints(keypoints: &[Keypoint], width: f64) -> Option<Self> {
         let labelled: Vec<(f64, Point2<f64>)> = keypoints
             .iter()

@@ -1,11 +1,11 @@
-//! Turn, scale and shift in the image plane: where the demonstration lies in another image.
+//! Turn, scale and shift in the image plane: the pose of the demonstration in another image.
 
 use nalgebra::{Point2, Vector2};
 use serde::{Deserialize, Serialize};
 
 use crate::Angle;
 
-/// p' = scale · R(angle) · p + (tx, ty), in pixels with y down; never a mirror image.
+/// p' = scale · R(angle) · p + (tx, ty), in pixels with y down; never mirrored.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PlanarSimilarity {
     /// Factor of lengths, positive.
@@ -19,7 +19,7 @@ pub struct PlanarSimilarity {
 }
 
 impl PlanarSimilarity {
-    /// Leaves every point where it is.
+    /// The identity.
     pub const IDENTITY: Self = Self { scale: 1.0, angle: Angle::ZERO, tx: 0.0, ty: 0.0 };
 
     /// A shift to the right and down, in pixels.
@@ -72,7 +72,7 @@ impl PlanarSimilarity {
         )
     }
 
-    /// `self`, then a shift by so many pixels to the right and down.
+    /// `self`, followed by a shift of this many pixels to the right and down.
     pub fn shifted(&self, by: Vector2<f64>) -> Self {
         Self { tx: self.tx + by.x, ty: self.ty + by.y, ..*self }
     }

@@ -61,7 +61,7 @@ impl Polygon {
         Point2::new(x / (3.0 * doubled), y / (3.0 * doubled))
     }
 
-    /// The tight box around the vertices; a box of no size for no vertex.
+    /// The tight box around the vertices; an empty box without vertices.
     pub fn bounds(&self) -> BoundingBox {
         BoundingBox::around(self.vertices.iter().copied()).unwrap_or(BoundingBox { x1: 0.0, y1: 0.0, x2: 0.0, y2: 0.0 })
     }
@@ -119,10 +119,10 @@ impl Polygon {
     /// The part inside an image of `width` × `height` pixels, as one polygon; empty when nothing is inside.
     ///
     /// # Source
-    /// Sutherland and Hodgman 1974; a concave polygon cut into several pieces keeps them joined along the border.
+    /// Sutherland and Hodgman 1974; the pieces of a divided concave polygon stay connected along the border.
     pub fn clip(&self, width: f64, height: f64) -> Self {
         let mut vertices = self.vertices.clone();
-        // Each border as (axis, bound, which side is inside).
+        // Each border as (axis, bound, side that is inside).
         for (axis, bound, keep_below) in [(0, 0.0, false), (0, width, true), (1, 0.0, false), (1, height, true)] {
             let inside = |p: &Point2<f64>| if keep_below { p[axis] <= bound } else { p[axis] >= bound };
             let mut kept = Vec::with_capacity(vertices.len() + 4);
@@ -146,7 +146,7 @@ impl Polygon {
         Self { vertices: self.vertices.iter().map(|v| target_from_source.apply(v)).collect() }
     }
 
-    /// Both axes multiplied, as when the image is resized.
+    /// Scales both axes, as when the image is resized.
     pub fn scaled(&self, scale_x: f64, scale_y: f64) -> Self {
         Self { vertices: self.vertices.iter().map(|v| Point2::new(v.x * scale_x, v.y * scale_y)).collect() }
     }
@@ -186,7 +186,7 @@ mod tests {
         let square = |x: f64| Polygon::from_box(&BoundingBox { x1: x, y1: 0.0, x2: x + 32.0, y2: 32.0 });
         assert_eq!(square(0.0).share_inside(&square(16.0)), 0.5);
         assert_eq!(square(0.0).share_inside(&square(40.0)), 0.0);
-        // A quarter of the large square is the small one.
+        // The small square has a quarter of the large one's area.
         let small = Polygon::from_box(&BoundingBox { x1: 0.0, y1: 0.0, x2: 16.0, y2: 16.0 });
         assert_eq!((square(0.0).share_inside(&small), small.share_inside(&square(0.0))), (0.25, 1.0));
     }

@@ -1,4 +1,4 @@
-//! Which turns of a part cannot be told from none.
+//! The turns of a part that cannot be distinguished from no turn.
 
 use std::f64::consts::TAU;
 
@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::Angle;
 
-/// Turns about the vertical that change neither how a part looks nor how it is held.
+/// Turns about the vertical that change neither the appearance of a part nor its grasp.
 ///
 /// In JSON: `"none"`, `{"fold": 4}` or `"full"`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -16,14 +16,14 @@ pub enum RotationalSymmetry {
     /// Every direction looks different.
     #[default]
     None,
-    /// So many equal turns make a whole one, two at least: a turn by any of them cannot be seen.
+    /// This many equal turns make a full one, at least two: a turn by any of them is not visible.
     Fold(u32),
     /// The part looks the same at every turn.
     Full,
 }
 
 impl RotationalSymmetry {
-    /// The smallest of the turns that look like `turn`.
+    /// The smallest of the turns equivalent to `turn`.
     pub fn visible(self, turn: Angle) -> Angle {
         match self {
             Self::None => turn,
@@ -35,7 +35,7 @@ impl RotationalSymmetry {
         }
     }
 
-    /// The shortest turn from one direction to the other or to any that looks like it, in radians, not negative.
+    /// The shortest turn from one direction to the other or to an equivalent one, in radians, not negative.
     pub fn distance(self, one: Angle, other: Angle) -> f64 {
         self.visible(one - other).radians().abs()
     }

@@ -1,7 +1,9 @@
-//! How often model S accepts something in generated pictures without the part: `false_alarms [PARTS] [PICTURES] [SEED]`.
+//! The rate of false alarms of model S on generated pictures without the part: `false_alarms [PARTS] [PICTURES]
+//! [SEED]`.
 //!
-//! Teaches each of PARTS (100) generated parts and shows it PICTURES (25) of other things, of no look-alikes, under each of four conditions,
-//! 640×480 pixels large. SEED (4041) decides the parts; nothing was fitted on parts of that seed. The same arguments give the same output.
+//! Teaches each of PARTS (100) generated parts and searches PICTURES (25) of 640×480 pixels with other objects but no
+//! look-alikes under each of four conditions. SEED (4041) decides the parts; nothing was fitted on parts of that seed.
+//! The same arguments give the same output.
 
 mod drawn;
 
@@ -14,9 +16,9 @@ use sdg_part_generator::Condition;
 
 use crate::drawn::{Result, absent, draw_parts};
 
-/// Conditions in which other parts lie about.
+/// Conditions under which other parts are visible.
 const CONDITIONS: [Condition; 4] = [Condition::Nominal, Condition::Clutter, Condition::Dark, Condition::Glare];
-/// Parts drawn at once: all of them are in memory with their pictures.
+/// Parts drawn together: all of them are in memory with their pictures.
 const PARTS_AT_ONCE: usize = 5;
 const SIZE: [u32; 2] = [640, 480];
 
@@ -43,7 +45,7 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// Pictures on which anything is accepted, by condition.
+/// Pictures with any accepted detection, by condition.
 fn false_alarms(part: &FitPart, a_condition: usize) -> Result<Vec<u64>> {
     let mut options = TeachOptions::new(1);
     options.kind = ModelKind::S;

@@ -1,11 +1,12 @@
-//! Fits the check's constants again on generated parts, and prints what would change. It changes nothing.
+//! Fits the constants of the verification again on generated parts, and prints the differences. It changes nothing.
 //!
 //! `cargo run --release -p sdg-grasp --example fit_constants -- [--parts N] [--rounds N] [--size WxH[,WxH]] [--seed S]
 //! [--only NAME[,NAME]]`; `--only score` fits the weights of the score alone, which takes minutes instead of hours.
 //!
-//! Draws N parts (40), equally many of each picture size (320x240), half of them to fit on, half held out, and for each one demonstration and, a round (1), one picture
-//! under each of the generator's conditions and four without the part: two with look-alikes, two cluttered. The objective
-//! and the intervals are those of [`sdg_grasp::fitting`]. The same arguments give the same output.
+//! Draws N parts (40), equally many of each picture size (320x240), half of them for fitting, half held out. Each part
+//! has one demonstration and, per round (1 round), one picture under each of the generator's conditions and four
+//! without the part: two with look-alikes, two cluttered. The objective and the intervals are those of
+//! [`sdg_grasp::fitting`]. The same arguments give the same output.
 
 mod drawn;
 
@@ -60,7 +61,7 @@ fn read_size(text: &str) -> Result<[u32; 2]> {
 fn main() -> Result<()> {
     let arguments = Arguments::read(std::env::args().skip(1))?;
     let start = Instant::now();
-    // Every other part is held out, so that both halves have all sizes.
+    // Every other part is held out, so that both halves contain all sizes.
     let (mut parts, mut held_out) = (Vec::new(), Vec::new());
     let kinds = Condition::ALL
         .map(|condition| (SceneConfig::only(condition), arguments.rounds))

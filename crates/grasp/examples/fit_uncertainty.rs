@@ -1,11 +1,12 @@
-//! Fits the standard errors of a grasp in the plan view on generated parts, and prints what would change. It changes
+//! Fits the standard errors of a grasp in the plan view on generated parts, and prints the differences. It changes
 //! nothing.
 //!
 //! `cargo run --release -p sdg-grasp --example fit_uncertainty -- [PARTS [SEED]]`
 //!
-//! Draws PARTS parts (240), half of them to fit on and half held out, teaches model S on each in the plan view of its photo's
-//! camera, and finds it in one picture of each of the generator's conditions with the part, at 640x480 and at 320x240. The
-//! constants minimise the pinball loss at 68 % of the logarithm of the errors, with equal weight to each condition.
+//! Draws PARTS parts (240), half of them for fitting and half held out, teaches model S on each in the plan view of its
+//! photo's camera, and searches for it in one picture of each of the generator's conditions with the part, at 640x480
+//! and at 320x240. The constants minimise the pinball loss at 68 % of the logarithm of the errors, with equal weight to
+//! each condition.
 
 use std::ops::ControlFlow;
 
@@ -21,15 +22,15 @@ use sdg_part_generator::{Condition, DemonstrationPhoto, Part, PhotoConfig, Scene
 
 type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;
 
-/// What is found farther off than this is wrong, not inexact, in metres and radians.
+/// Larger errors count as a wrong detection instead of inaccuracy; in metres and radians.
 const MAX_ERROR: (f64, f64) = (0.01, 0.17);
 
-/// A part found.
+/// A found part.
 struct Row {
     condition: Condition,
     is_held_out: bool,
     position_m: f64,
-    /// `None` where the turn cannot be seen.
+    /// `None` where the turn is not visible.
     yaw_rad: Option<f64>,
     circumstances: Circumstances,
 }
@@ -38,7 +39,7 @@ fn over_table(camera: sdg_geometry::PosedCamera) -> CameraOverTable {
     CameraOverTable { camera, table_height_m: 0.0, workspace: None }
 }
 
-/// The photo with its marks straight above where they are, on the part's surface.
+/// The photo with its marks moved vertically onto the part's surface.
 fn marked_on_surface(shown: &DemonstrationPhoto, marked_m: f64, surface_m: f64) -> Result<Demonstration> {
     let mut demonstration = shown.demonstration.clone();
     let raised = |mark: Point2<f64>| {
@@ -69,7 +70,7 @@ fn rows(part_seed: u64, is_held_out: bool, size: [u32; 2]) -> Result<Vec<Row>> {
         let scenes = Scenes::new(std::slice::from_ref(&part), config, part_seed.wrapping_mul(100) + idx as u64)?;
         if detector.is_none() {
             let shown = scenes.photo(0);
-            // The generator's marks lie half as high as the part is there; a user measures the surface that he marks.
+            // The generator's marks are at half the part's height there; a user measures the surface of the marks.
             let surface_m = 2e-3 * f64::from(part.grasp().height_mm);
             let demonstration = marked_on_surface(shown, 0.5 * surface_m, surface_m)?;
             let (seen, lengths) =
@@ -138,7 +139,7 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// An error as a length, and what it depends on.
+/// An error as a length, and the quantities that it depends on.
 struct Measured {
     condition: Condition,
     is_held_out: bool,
@@ -151,7 +152,7 @@ impl Measured {
         Self {
             condition: row.condition,
             is_held_out: row.is_held_out,
-            // An error of a micrometre is none.
+            // Errors below a micrometre count as a micrometre.
             error_m: error_m.max(1e-6),
             circumstances: row.circumstances,
         }
@@ -172,10 +173,10 @@ fn report(name: &str, measured: &[Measured], shipped: &ErrorLength) {
     }
 }
 
-/// The quantile that is fitted: one standard deviation of a normal distribution.
+/// The fitted quantile: one standard deviation of a normal distribution.
 const QUANTILE: f64 = 0.68;
 
-/// The pinball loss over what is fitted on, each condition with the same weight.
+/// The pinball loss over the fitting half, with equal weight for each condition.
 fn loss(measured: &[Measured], length: &ErrorLength) -> f64 {
     let of_condition = |condition: Condition| {
         let of = || measured.iter().filter(|one| one.condition == condition && !one.is_held_out);
@@ -190,7 +191,7 @@ fn loss(measured: &[Measured], length: &ErrorLength) -> f64 {
     Condition::ALL.into_iter().map(of_condition).sum()
 }
 
-/// One constant after the other, by ever smaller factors, until nothing is gained.
+/// Changes one constant after the other, by decreasing factors, until nothing improves.
 fn fit(measured: &[Measured], start: &ErrorLength) -> ErrorLength {
     let moved = |length: &ErrorLength, which: usize, factor: f64| {
         let mut moved = *length;
@@ -202,7 +203,8 @@ fn fit(measured: &[Measured], start: &ErrorLength) -> ErrorLength {
         loop {
             let tried =
                 (0..4).flat_map(|which| [1.0 + step, 1.0 / (1.0 + step)].map(|factor| moved(&best.1, which, factor)));
-            // Two constants against each other, too: noise and its growth trade places.
+            // Also changes pairs of constants in opposite directions, because noise and its growth compensate each
+            // other.
             let traded = [(0, 1), (0, 3), (2, 3)].into_iter().flat_map(|(one, other)| {
                 [1.0 + step, 1.0 / (1.0 + step)].map(|factor| moved(&moved(&best.1, one, factor), other, 1.0 / factor))
             });

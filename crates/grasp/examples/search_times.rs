@@ -1,7 +1,8 @@
-//! How long model S looks at pictures: `search_times MODEL [--repeat N] [--size-tolerance LOW-HIGH] [--region X,Y,W,H] PICTURE…`.
+//! Search times of model S: `search_times MODEL [--repeat N] [--size-tolerance LOW-HIGH] [--region X,Y,W,H] PICTURE…`.
 //!
-//! Prints, for each picture, the median of its repeats in milliseconds, decoded picture to verdict, and what was accepted; then the
-//! median over the pictures. Repeats go round all pictures in turn, so that a busy moment does not fall on one of them alone.
+//! Prints, for each picture, the median of its repeats in milliseconds, from decoded picture to verdict, and the number
+//! of accepted detections; then the median over the pictures. Each repeat goes through all pictures, so that a short
+//! load of the machine does not affect one picture alone.
 
 use std::time::Instant;
 
@@ -44,7 +45,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         for (k, image) in images.iter().enumerate() {
             let start = Instant::now();
             let detections = model.detect(image, Verification::ByShape)?;
-            // The first round makes the model ready for the pictures' sizes.
+            // The first round prepares the model for the pictures' sizes.
             if round > 0 {
                 times[k].push(1e3 * start.elapsed().as_secs_f64());
             }

@@ -1,4 +1,4 @@
-//! Teaches from a photo and its annotation without the command line, and shows how: `teach IMAGE ANNOTATION OUT`.
+//! Teaches from a photo and its annotation without the command line: `teach IMAGE ANNOTATION OUT`.
 
 use std::ops::ControlFlow;
 

@@ -1,4 +1,4 @@
-//! Weights that teaching starts from, instead of from nothing.
+//! Initial weights for teaching, instead of random values.
 
 use std::collections::BTreeSet;
 
@@ -17,39 +17,39 @@ use crate::error::{GraspError, Result};
 
 /// Imported weights for the network of a preset.
 ///
-/// Every parameter of the network has a value here or is named as one that starts from nothing: what is left out by
-/// mistake would be taught from random values, unnoticed.
+/// Every parameter of the network has a value here or is listed as randomly initialised. Otherwise a parameter
+/// omitted by mistake would silently start from random values.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BaseWeights {
-    /// SHA-256 of the file that the weights come from, in hexadecimal digits; the taught model's file keeps it.
+    /// SHA-256 of the weights' file, in hexadecimal digits; the taught model's file keeps it.
     pub sha256: String,
     /// Values by the parameters' names.
     pub parameters: StateDict,
-    /// Parameters that stay as the seed draws them, such as predictors for other classes.
+    /// Parameters that keep their random initial values, such as predictors for other classes.
     pub reinitialized: BTreeSet<String>,
-    /// What makes last layers of a part's own views; empty for weights without.
+    /// Computes last layers from a part's own views; empty for weights without it.
     pub imprint: StateDict,
-    /// The comparison network, which is not taught; empty for weights without.
+    /// The comparison network, which is not taught; empty for weights without it.
     pub comparison: StateDict,
-    /// What model A's orientation CNN starts from; `None` for weights without.
+    /// The initial weights of model A's orientation CNN; `None` for weights without them.
     pub orientation: Option<OrientationStart>,
 }
 
 impl BaseWeights {
-    /// Whether they have a keypoint head, which preset `edge` also teaches models without keypoints with.
+    /// Whether they have a keypoint head, which preset `edge` also uses for teaching models without keypoints.
     pub(crate) fn has_keypoint_head(&self) -> bool {
         self.parameters.keys().any(|name| name.starts_with("roi_heads.keypoint_head."))
     }
 
-    /// Whether they are of our own pretraining, which makes last layers of a part's views.
+    /// Whether they come from our own pretraining, which computes last layers from a part's views.
     pub(crate) fn is_ours(&self) -> bool {
         !self.imprint.is_empty()
     }
 
-    /// The network that compares places of pictures with the demonstration; `None` for weights without.
+    /// The network that compares places of pictures with the demonstration; `None` for weights without it.
     ///
     /// # Errors
-    /// [`GraspError::BaseWeights`] where the values are another network's.
+    /// [`GraspError::BaseWeights`] if the values belong to another network.
     pub(crate) fn comparison(&self, device: &Device) -> Result<Option<ComparisonNetwork>> {
         if self.comparison.is_empty() {
             return Ok(None);
@@ -61,10 +61,10 @@ impl BaseWeights {
         }
     }
 
-    /// The detector with last layers made from views of the part; for weights of [`Self::is_ours`].
+    /// The detector with last layers computed from views of the part; for weights with [`Self::is_ours`].
     ///
     /// # Errors
-    /// Targets that do not fit the images; [`GraspError::BaseWeights`] where the imprint is another network's.
+    /// Targets that do not fit the images; [`GraspError::BaseWeights`] if the imprint belongs to another network.
     pub(crate) fn imprint(
         &self,
         detector: GeneralizedRcnn,
@@ -83,14 +83,15 @@ impl BaseWeights {
         Ok(state_dict::import(detector, &layers).0)
     }
 
-    /// Sets the network's parameters. What the preset freezes stays frozen.
+    /// Sets the network's parameters. Layers frozen by the preset stay frozen.
     ///
-    /// Frozen norms become a scale and a shift, with mean 0 and variance 1, which is the same function: a grasp model
-    /// is kept in half precision, where the variance of a channel that never fires, 1e-10 and less, would be zero.
+    /// Frozen norms are converted to a scale and a shift, with mean 0 and variance 1, which is the same function. A
+    /// grasp model is stored in half precision, where the variance of an inactive channel, 1e-10 or less, would be
+    /// zero.
     ///
     /// # Errors
-    /// [`GraspError::BaseWeights`] where a parameter has neither a value nor leave to start from nothing, where a value
-    /// has another shape, or where it belongs to no parameter.
+    /// [`GraspError::BaseWeights`] if a parameter has no value and is not listed as randomly initialised, if a value
+    /// has another shape, or if it belongs to no parameter.
     pub(crate) fn apply(&self, network: GeneralizedRcnn) -> Result<GeneralizedRcnn> {
         let eps = match network.config().backbone.norm {
             NormKind::FrozenBatch { eps } => Some(eps),
@@ -104,7 +105,7 @@ impl BaseWeights {
         }
     }
 
-    /// The frozen norms of the backbone, where these weights have all four parts of one.
+    /// The frozen norms of the backbone for which these weights have all four parts.
     fn folded_norms(&self, eps: Option<f64>) -> StateDict {
         const PARTS: [&str; 4] = ["weight", "bias", "running_mean", "running_var"];
         let mut norms = StateDict::new();
@@ -144,7 +145,7 @@ fn first_misfit(report: &ImportReport) -> Option<String> {
     if let Some(name) = report.missing.first() {
         return Some(format!("no {name} ({} missing)", report.missing.len()));
     }
-    report.unused.first().map(|name| format!("{name}, which the network has not"))
+    report.unused.first().map(|name| format!("{name}, which the network does not have"))
 }
 
 #[cfg(test)]
@@ -155,7 +156,7 @@ mod tests {
     use image::{Rgb, RgbImage};
     use sdg_detection::RcnnConfig;
 
-    /// torchvision's numerics and freezing on a network that takes no time.
+    /// torchvision's numerics and freezing on a small, fast network.
     fn narrow() -> RcnnConfig {
         let changes = r#"{"kind": "keypoint", "numerics": "torchvision", "keypoints": 12, "min_size_test": 64,
             "max_size_test": 64, "stem_out_channels": 8, "res2_out_channels": 8, "width_per_group": 4,
@@ -210,7 +211,7 @@ mod tests {
         let [scale, shift, mean, variance] = folded(norm.each_ref(), 1e-5);
         // (x - 2) / 2 * 3 + 0.5 = 1.5 x - 2.5
         assert!((scale.values[0] - 1.5).abs() < 1e-6 && (shift.values[0] + 2.5).abs() < 1e-6);
-        // Of a channel that never fires, whose variance half precision has not, the scale is left.
+        // Only the scale of an inactive channel remains, because half precision cannot hold its variance.
         assert!((scale.values[1] / 3.162e-6 - 1.0).abs() < 1e-3, "{}", scale.values[1]);
         assert_eq!((mean.values, variance.values), (vec![0.0; 2], vec![1.0 - 1e-5; 2]));
     }
@@ -238,6 +239,6 @@ mod tests {
         let mut unused = whole;
         let value = unused.parameters[bias].clone();
         unused.parameters.insert("roi_heads.mask_head.deconv.bias".to_owned(), value);
-        assert!(refused(&unused).contains("which the network has not"), "{}", refused(&unused));
+        assert!(refused(&unused).contains("which the network does not have"), "{}", refused(&unused));
     }
 }

@@ -4,7 +4,7 @@
 //! metadata   format          "sdg base weights 1"
 //!            preset          the preset that they are for
 //!            reinitialized   names of the parameters that teaching draws anew   (JSON)
-//!            anything else that tells how they were made: commit, seed, steps, parts, licence
+//!            further information about their creation: commit, seed, steps, parts, licence
 //! tensors    NAME            f16: the detector's parameters
 //!            imprint.*       f16: what makes its last layers of a part's views
 //!            orientation.*, orientation_imprint.*   f16: the same of the orientation CNN
@@ -27,22 +27,22 @@ use crate::safetensors_file::{self, TensorBytes, values_from_halves};
 const FORMAT_NAME: &str = "sdg base weights";
 const FORMAT: &str = "sdg base weights 1";
 
-/// The base weights that are shipped, made by `make base-weights`, and the file's SHA-256.
+/// The shipped base weights, made by `make base-weights`, and the file's SHA-256.
 #[cfg(feature = "base-weights")]
 pub(crate) static SHIPPED: &[u8] = include_bytes!("../weights/edge.safetensors");
 #[cfg(feature = "base-weights")]
 pub(crate) const SHIPPED_SHA256: &str = include_str!("../weights/edge.sha256");
 
-/// Base weights of our own and how they were made.
+/// Base weights of our own and their provenance.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BaseWeightsFile {
-    /// The preset that they are for.
+    /// The preset for which they are made.
     pub preset: String,
-    /// Parameters that teaching draws anew, since they are another part's.
+    /// Parameters that teaching initialises randomly, since they belong to another part.
     pub reinitialized: BTreeSet<String>,
     /// Values by the parameters' names.
     pub parameters: StateDict,
-    /// How they were made, by names such as `commit` and `seed`.
+    /// Their provenance, by keys such as `commit` and `seed`.
     pub origin: BTreeMap<String, String>,
 }
 
@@ -73,7 +73,7 @@ impl BaseWeightsFile {
     /// Reads the bytes of a file.
     ///
     /// # Errors
-    /// [`GraspError::BaseWeights`] for bytes that are no such file or hold values that are not finite.
+    /// [`GraspError::BaseWeights`] for bytes of another format and for values that are not finite.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self> {
         let mut origin = Self::origin_of(bytes)?;
         let mut take = |name: &str| origin.remove(name).ok_or_else(|| refused(&format!("no metadata \"{name}\"")));
@@ -99,7 +99,7 @@ impl BaseWeightsFile {
         Ok(Self { preset, reinitialized, parameters, origin })
     }
 
-    /// What a network takes from them; heads that it has not are left out. `sha256` is that of the file.
+    /// The weights that a network takes from them; heads that it lacks are left out. `sha256` is that of the file.
     ///
     /// # Errors
     /// [`GraspError::BaseWeights`] for weights of another preset, and a configuration that contradicts itself.
@@ -128,7 +128,7 @@ impl BaseWeightsFile {
         })
     }
 
-    /// The values whose names begin so, without that beginning.
+    /// The values whose names have this prefix, with the prefix removed.
     fn named(&self, beginning: &str) -> StateDict {
         let named =
             |(name, tensor): (&String, &WeightTensor)| Some((name.strip_prefix(beginning)?.to_owned(), tensor.clone()));

@@ -1,8 +1,8 @@
 //! Settings of the search, the refinement and the score, with the origin of each value.
 //!
-//! Values that were fitted stand here, so that they can be fitted again: `cargo run --release -p sdg-grasp --example
-//! fit_constants` does so on generated parts. docs/decisions/010-constants.md lists these and all other constants of this
-//! crate with their origin, docs/decisions/007-score.md how the score was found.
+//! The fitted values are in this file, so that they can be fitted again: `cargo run --release -p sdg-grasp --example
+//! fit_constants` fits them on generated parts. docs/decisions/010-constants.md lists these and all other constants of
+//! this crate with their origin, docs/decisions/007-score.md how the score was found.
 
 use std::ops::RangeInclusive;
 
@@ -11,34 +11,35 @@ use sdg_shape::SearchConfig;
 use crate::error::{GraspError, Result};
 use crate::evidence_kind::EvidenceKind;
 
-/// How a demonstration is compared with an image, searched for in it, and accepted or refused.
+/// How a demonstration is compared with an image, how it is searched for, and how it is accepted or refused.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct CheckConfig {
-    /// What the search over a whole image looks for, and, in its `shape`, how demonstration and image are compared anywhere.
-    /// Its scales are the size tolerance.
+    /// The settings of the search over a whole image and, in its `shape`, of every comparison of demonstration and
+    /// image. Its scales are the size tolerance.
     pub search: SearchConfig,
-    /// What the evidence is worth.
+    /// The weights of the evidence.
     pub score: ScoreConfig,
-    /// Most detections listed for a picture.
+    /// Maximum number of detections listed for a picture.
     pub max_detections: usize,
 }
 
 impl CheckConfig {
-    /// Sizes of a part over the nominal one that are searched for by default: hand-held photographs of one part
-    /// vary by 0.81 to 1.14, and cameras by 0.75 to 1.3 of their height. Chosen from that.
+    /// Default range of a part's size relative to the nominal one: it varies from 0.81 to 1.14 in hand-held
+    /// photographs of one part, and from 0.75 to 1.3 for other camera heights. Chosen from that.
     pub const DEFAULT_SIZE_TOLERANCE: RangeInclusive<f64> = 0.75..=1.35;
-    /// The same for a camera that is always as far from the part as it was for the photo: the simulated workcell's. A lever that
-    /// resembles the pendulum agrees with it by 0.66 when it may shrink to four fifths.
+    /// The same for a camera at the same distance as for the photo: that of the simulated workcell. A lever that
+    /// resembles the pendulum agrees with it by 0.66 if its size may shrink to four fifths.
     pub const FIXED_HEIGHT_TOLERANCE: RangeInclusive<f64> = 0.97..=1.03;
-    /// The same in a plan view, where the size is known and look-alikes of another size are found to be refused by it.
+    /// The same in a plan view, where the size is known; look-alikes of another size are found there so that the size
+    /// refuses them.
     pub const KNOWN_SIZE_TOLERANCE: RangeInclusive<f64> = 0.9..=1.11;
-    /// Most detections in one picture by default. Chosen by hand.
+    /// Default maximum number of detections in one picture. Chosen by hand.
     pub const DEFAULT_MAX_DETECTIONS: usize = 100;
 
     /// The values of [`Default`], as a constant.
     ///
-    /// The search's least agreement was chosen by hand: right poses agree by more, but for one of a hundred.
+    /// The search's minimum agreement was chosen by hand: all but one in a hundred right poses agree by more.
     pub const DEFAULT: Self = Self {
         search: {
             let mut search = SearchConfig::DEFAULT;
@@ -52,8 +53,8 @@ impl CheckConfig {
     };
 
     /// # Errors
-    /// [`GraspError::InvalidConfig`] for a value of `score` or a size tolerance out of range; the rest of `search` is checked
-    /// where a search is made of it.
+    /// [`GraspError::InvalidConfig`] for a value of `score` or a size tolerance out of range; the rest of `search` is
+    /// checked when a search is made from it.
     pub(crate) fn check(&self) -> Result<()> {
         let (low, high) = (*self.search.scales.start(), *self.search.scales.end());
         let finite = self.score.terms().iter().all(|(_, term)| {
@@ -81,30 +82,32 @@ impl Default for CheckConfig {
     }
 }
 
-/// How one kind of evidence becomes log-odds: `weight` times the distance of its value, kept in `range`, from `neutral`.
+/// Converts one kind of evidence to log-odds: `weight` times the difference of its value, clamped to `range`, from
+/// `neutral`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Term {
-    /// Log-odds for a unit of the value.
+    /// Log-odds per unit of the value.
     pub weight: f64,
-    /// The value that speaks neither for nor against the part: half-way between right poses' median and wrong ones'.
+    /// The value that is neutral: half-way between the medians of right and wrong poses.
     pub neutral: f64,
-    /// Values beyond count as these: no evidence decides alone.
+    /// Values are clamped to this range, so that no evidence decides alone.
     pub range: [f64; 2],
 }
 
-/// What the evidence is worth; see [`crate::Contributions`] for what each term is.
+/// The weights of the evidence; see [`crate::Contributions`] for the terms.
 ///
-/// Fitted on 160 generated parts, none a shipped part, a photograph or one that the likeness was trained on: `fit_constants
-/// --parts 160 --size 640x480,320x240 --seed 11 --only score` (docs/decisions/007-score.md). Ranges, hue, size and bias were set by
-/// hand; the ranges so that no term rejects alone. The network's weight was fitted on models C of ten generated parts: only its
-/// silence counts, because a network proposes look-alikes as well as the part.
+/// Fitted on 160 generated parts, which exclude shipped parts, photographs and the training parts of the likeness:
+/// `fit_constants --parts 160 --size 640x480,320x240 --seed 11 --only score` (docs/decisions/007-score.md). Ranges,
+/// hue, size and bias were set by hand; with these ranges no term rejects alone. The network's weight was fitted on
+/// models C of ten generated parts: only a missing proposal counts, because a network proposes look-alikes as well as
+/// the part.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct ScoreConfig {
-    /// Whether pictures show lengths: then the size is that of the demonstration, and otherwise that of the surest detection in
-    /// the picture.
+    /// Whether pictures have known lengths: then the size is compared with the demonstration's, and otherwise with that
+    /// of the best detection in the picture.
     pub is_size_known: bool,
-    /// Log-odds where all evidence is neutral.
+    /// Log-odds if all evidence is neutral.
     pub bias: f64,
     /// Of [`sdg_shape::Evidence::edges`].
     pub edges: Term,
@@ -114,17 +117,18 @@ pub struct ScoreConfig {
     pub hue: Term,
     /// Of [`sdg_shape::Evidence::visible`].
     pub visible: Term,
-    /// Of the squared difference of ln sizes between a detection and the picture's surest.
+    /// Of the squared difference of ln sizes between a detection and the best one in the picture.
     pub size: Term,
     /// Of [`sdg_shape::Evidence::outside`].
     pub outside: Term,
-    /// Of the mean agreement of other things with the part.
+    /// Of the mean agreement of other objects with the part.
     pub resemblance: Term,
     /// Of [`sdg_shape::CloseLook::likeness`].
     pub likeness: Term,
-    /// Of [`sdg_shape::CloseLook::details`], against a pose. From the tuned side of a split (docs/decisions/026-details.md), as the next.
+    /// Of [`sdg_shape::CloseLook::details`], against a pose. Fitted on the tuned side of a split
+    /// (docs/decisions/026-details.md), like the next field.
     pub details: Term,
-    /// Of the same, for a pose. Between the two the network tells little: nothing counts.
+    /// Of the same, for a pose. Values between the two count as neutral.
     pub details_for: Term,
     /// Of [`sdg_shape::CloseLook::bare`].
     pub table: Term,
@@ -132,9 +136,9 @@ pub struct ScoreConfig {
     pub rim: Term,
     /// Of [`sdg_shape::CloseLook::added`].
     pub added: Term,
-    /// Of how much better [`sdg_shape::CloseLook::mirrored`] fits than the photo.
+    /// Of the difference by which [`sdg_shape::CloseLook::mirrored`] fits better than the photo.
     pub mirror: Term,
-    /// Of ln of how much likelier the network's score is on the part than elsewhere.
+    /// Of ln of the likelihood ratio of the network's score, on the part over elsewhere.
     pub network: Term,
 }
 
@@ -142,17 +146,18 @@ impl ScoreConfig {
     /// The values of [`Default`], as a constant.
     pub const DEFAULT: Self = SCORE;
 
-    /// The same where pictures show lengths. A part of another size is then another part, whatever else speaks for it.
+    /// The same where pictures have known lengths. A part of another size is then another part, regardless of other
+    /// evidence.
     pub(crate) fn of_known_size(self) -> Self {
         Self { is_size_known: true, size: KNOWN_SIZE, ..self }
     }
 
-    /// The same where lengths are known and heights are not: within the sizes that are looked for, none speaks for or against a part.
+    /// The same where lengths are known and heights are not: every size within the search range is neutral.
     pub(crate) fn of_any_height(self) -> Self {
         Self { is_size_known: true, size: term(0.0, 0.0, 0.0, 0.01), ..self }
     }
 
-    /// The most that a kind of evidence adds for a part.
+    /// The largest positive contribution of a kind of evidence.
     pub(crate) fn most_of(&self, kind: EvidenceKind) -> f64 {
         match kind {
             EvidenceKind::Network => self.network.most(),
@@ -201,13 +206,13 @@ impl Default for ScoreConfig {
 }
 
 impl Term {
-    /// The log-odds of a value: its distance from the neutral one, within the range, times the weight.
+    /// The log-odds of a value: its distance from the neutral value, clamped to the range, times the weight.
     pub(crate) fn log_odds(&self, value: f64) -> f64 {
         let [low, high] = self.range;
         self.weight * (value.clamp(low, high) - self.neutral)
     }
 
-    /// The most of any value.
+    /// The largest for any value.
     fn most(&self) -> f64 {
         self.range.map(|value| self.log_odds(value)).into_iter().fold(f64::MIN, f64::max)
     }
@@ -217,8 +222,9 @@ const fn term(weight: f64, neutral: f64, low: f64, high: f64) -> Term {
     Term { weight, neutral, range: [low, high] }
 }
 
-/// Of the squared ln of a size over the demonstration's, which a refined pose gives to about 2.5 % where a slanted view shows a
-/// part's walls: half of the inverse square of that, to 10 %. Chosen by hand from six rendered pictures.
+/// Of the squared ln of a size over the demonstration's. A refined pose has a size error of about 2.5 % if a slanted
+/// view shows a part's walls; the weight is half of the inverse square of that, to 10 %. Chosen by hand from six
+/// rendered pictures.
 const KNOWN_SIZE: Term = term(-800.0, 0.0, 0.0, 0.01);
 
 const SCORE: ScoreConfig = ScoreConfig {

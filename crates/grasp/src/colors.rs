@@ -1,4 +1,4 @@
-//! Whether a picture has colours: a monochrome camera's has none, and its parts are compared with the photo in grey.
+//! Whether a picture has colours; a monochrome camera's has none, and its parts are compared with the photo in grey.
 
 use image::buffer::ConvertBuffer;
 use image::{GrayImage, RgbImage};
@@ -11,16 +11,16 @@ pub(crate) enum Colors {
 }
 
 impl Colors {
-    /// Of a picture: without them, all three values of a pixel are the same, but for what rounding leaves.
+    /// Of a picture: without colours, the three values of a pixel are equal up to rounding.
     pub(crate) fn of(image: &RgbImage) -> Self {
-        /// What JPEG's own colour space leaves of a grey.
+        /// The difference that JPEG's colour conversion leaves in a grey pixel.
         const ROUNDING: u8 = 2;
         let is_gray = |[r, g, b]: [u8; 3]| r.max(g).max(b) - r.min(g).min(b) <= ROUNDING;
         if image.pixels().all(|pixel| is_gray(pixel.0)) { Self::None } else { Self::There }
     }
 }
 
-/// The picture as a monochrome camera shows it.
+/// The picture as a monochrome camera would record it.
 pub(crate) fn gray(image: &RgbImage) -> RgbImage {
     let gray: GrayImage = image.convert();
     gray.convert()

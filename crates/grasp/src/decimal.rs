@@ -1,9 +1,9 @@
-//! Numbers that JSON gives back to the bit.
+//! Numbers that JSON restores exactly.
 //!
-//! `serde_json` reads a number exactly when it has at most 15 digits or so; longer ones may come back one unit in the
-//! last place off, and then a model read from its file would give slightly other scores than the model that was written.
+//! `serde_json` reads a number exactly when it has at most 15 digits or so; longer ones may change by one unit in the
+//! last place, and a model read from its file would give slightly different scores than the written model.
 
-/// Rounded to nine decimals. Exact in JSON below about nine million; what is not finite stays so.
+/// Rounded to nine decimals. Exact in JSON below about nine million; values that are not finite are unchanged.
 pub(crate) fn decimal(value: f64) -> f64 {
     const SCALE: f64 = 1e9;
     (value * SCALE).round() / SCALE

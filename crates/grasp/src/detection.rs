@@ -1,4 +1,4 @@
-//! What is found in an image: a grasp with its score, and where the demonstration lies.
+//! The result of a search in an image: a grasp with its score, and the pose of the demonstration.
 
 use std::iter::repeat;
 
@@ -14,44 +14,45 @@ use crate::sighting::Sighting;
 use crate::verdict::Contributions;
 use crate::verification::PlacedDemonstration;
 
-/// One grasp found in an image; places in pixels of the image as given.
+/// One grasp found in an image; positions are in pixels of the given image.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GraspDetection {
     /// Calibrated, in `[0, 1]`: at least 0.5 is accepted.
     pub score: f64,
-    /// The network's own score, in `[0, 1]`; zero for what no network has seen (model S, what only the search found).
+    /// The network's own score, in `[0, 1]`; zero without a network's proposal (model S, and parts found by the search
+    /// only).
     pub network_score: f64,
-    /// How well the demonstration agrees with the image there, in `[0, 1]`; `None` without verification.
+    /// Agreement of the demonstration with the image there, in `[0, 1]`; `None` without verification.
     pub agreement: Option<f64>,
-    /// What the score is made of; `None` without verification.
+    /// The contributions to the score; `None` without verification.
     pub evidence: Option<Contributions>,
     /// The box around the part.
     pub bbox: BoundingBox,
-    /// Keypoints along the grasp line, each with the network's score; empty for models without.
+    /// Keypoints along the grasp line, each with the network's score; empty for models without keypoints.
     pub keypoints: Vec<(Point2<f64>, f64)>,
-    /// The demonstration's outline as it lies in the image; `None` without verification.
+    /// The demonstration's outline at its pose in the image; `None` without verification.
     pub outline: Option<Polygon>,
     /// Grasp point, direction and width, in pixels.
     pub grasp: PlanarGrasp,
-    /// What the turn was first read from.
+    /// The source of the first estimate of the turn.
     pub turn_source: TurnSource,
-    /// Mean brightness there over that of the demonstration; 1 without verification.
+    /// Mean brightness there divided by that of the demonstration; 1 without verification.
     pub light: f64,
 }
 
 impl GraspDetection {
-    /// Whether the part is there.
+    /// Whether the score accepts it as the part.
     pub fn is_accepted(&self) -> bool {
         self.score >= 0.5
     }
 
-    /// Whether the part lies in a region of the picture: its grasp point, and at least half of its outline's area.
+    /// Whether the part lies in a region of the picture: its grasp point, and at least half of its outline's area, do.
     pub fn lies_in(&self, region: &SearchRegion) -> bool {
         let bounds = || Polygon::from_box(&self.bbox);
         region.has(&self.grasp.center(), &self.outline.clone().unwrap_or_else(bounds))
     }
 
-    /// Why it is not accepted, in words: the strongest objection. `None` for what is accepted.
+    /// The reason for a refusal, in words: the strongest objection. `None` for an accepted detection.
     pub fn refused(&self) -> Option<&'static str> {
         if self.is_accepted() {
             return None;
@@ -60,21 +61,21 @@ impl GraspDetection {
         Some(evidence.strongest_objection().map_or("all evidence together is too weak", EvidenceKind::objection))
     }
 
-    /// The further demonstration, or the setting, that would help where this is the part and was refused.
+    /// The further demonstration, or the setting, that would help if this is the part although it was refused.
     pub fn advice(&self) -> Option<Advice> {
         let evidence = self.evidence.as_ref().filter(|_| !self.is_accepted())?;
         evidence.advice(self.light)
     }
 }
 
-/// A detection and what it was made of.
+/// A detection and the data from which it was made.
 pub(crate) struct Found {
     pub(crate) detection: GraspDetection,
     /// `None` without verification.
     pub(crate) placement: Option<Placement>,
 }
 
-/// Where a demonstration lies in an image, and what else a later image of the sequence needs.
+/// Where a demonstration lies in an image, and the other data that a later image of the sequence needs.
 #[derive(Debug, Clone)]
 pub(crate) struct Placement {
     pub(crate) demonstration_idx: usize,
@@ -115,7 +116,7 @@ impl Placement {
 }
 
 impl Sighting<'_> {
-    /// A detection as the demonstration says, where it lies.
+    /// The detection at the pose of the demonstration.
     pub(crate) fn detection(self, score: f64, evidence: Contributions, num_keypoints: usize) -> GraspDetection {
         let PlacedDemonstration { demonstration, image_from_marks, agreement, .. } = self.placed;
         let outline = self.placed.outline();

@@ -1,8 +1,8 @@
-//! Where a network computes: the backends of this build, and what this machine offers them.
+//! The device of a network's computation: the backends of this build, and their devices on this machine.
 //!
-//! `flex`, burn's CPU backend with this project's kernels, is always there. The others are cargo features, compiled only
-//! for who asks, since each brings minutes of compile time: `ndarray` (burn's older CPU backend, slow, a
-//! reference), `wgpu` (any graphics card, through Vulkan, Metal or DirectX 12) and `cuda` (NVIDIA's).
+//! `flex`, burn's CPU backend with this project's kernels, is always available. The others are optional cargo features,
+//! since each takes minutes to compile: `ndarray` (burn's older CPU backend, slow, a reference), `wgpu` (any graphics
+//! card, through Vulkan, Metal or DirectX 12) and `cuda` (NVIDIA's).
 
 use std::fmt;
 use std::str::FromStr;
@@ -29,7 +29,7 @@ impl ComputeBackend {
     /// All backends, the default first.
     pub const ALL: [Self; 4] = [Self::Flex, Self::NdArray, Self::Wgpu, Self::Cuda];
 
-    /// As typed at the command line; also the cargo feature's name.
+    /// The name on the command line, which is also the cargo feature's name.
     pub fn name(self) -> &'static str {
         match self {
             Self::Flex => "flex",
@@ -39,7 +39,7 @@ impl ComputeBackend {
         }
     }
 
-    /// Whether it was compiled into this build.
+    /// Whether it is compiled into this build.
     pub fn is_built(self) -> bool {
         match self {
             Self::Flex => true,
@@ -49,7 +49,7 @@ impl ComputeBackend {
         }
     }
 
-    /// The devices that it finds on this machine, by their own names; none where the build lacks it.
+    /// The names of the devices that it finds on this machine; empty if the build lacks it.
     pub fn devices(self) -> Vec<String> {
         let cpu = || format!("CPU, {} threads", std::thread::available_parallelism().map_or(1, usize::from));
         match self {
@@ -75,7 +75,7 @@ impl ComputeBackend {
             Self::NdArray => Ok(Device::ndarray()),
             #[cfg(all(feature = "wgpu", not(target_family = "wasm")))]
             Self::Wgpu => open_wgpu(),
-            // A browser lends a card to who awaits it only.
+            // A browser gives access to a graphics card only asynchronously.
             #[cfg(all(feature = "wgpu", target_family = "wasm"))]
             Self::Wgpu => Err(self.not_there("Device::wgpu_options().init_async(), awaited")),
             #[cfg(feature = "cuda")]
@@ -98,7 +98,7 @@ impl ComputeBackend {
     }
 }
 
-/// The names that devices give themselves.
+/// The names that devices report.
 #[cfg(any(feature = "wgpu", feature = "cuda"))]
 fn names(of: burn::tensor::DeviceType) -> Vec<String> {
     let devices = Device::enumerate(of).into_vec();
@@ -106,7 +106,7 @@ fn names(of: burn::tensor::DeviceType) -> Vec<String> {
     devices.into_iter().map(name).collect()
 }
 
-/// Opened once, since a runtime is: later calls share the device.
+/// Opened once because the runtime allows only one; later calls share the device.
 #[cfg(all(feature = "wgpu", not(target_family = "wasm")))]
 fn open_wgpu() -> Result<Device> {
     use std::sync::OnceLock;

@@ -1,11 +1,11 @@
-//! What can be wrong with a grasp model, its file or its grasps.
+//! Errors of a grasp model, its file or its grasps.
 
 /// Why a model could not be taught, read or used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum GraspError {
-    /// A letter or name that is no model's.
+    /// A letter or name of no model.
     #[error(transparent)]
     UnknownModel(#[from] sdg_demonstration::UnknownModel),
     /// A preset that this version lacks.
@@ -18,11 +18,11 @@ pub enum GraspError {
     /// A device that no version has.
     #[error("expected a device out of {}, found \"{found}\"", .known.join(", "))]
     UnknownBackend {
-        /// The names that exist.
+        /// The existing names.
         known: Vec<&'static str>,
         found: String,
     },
-    /// A device that was not compiled in.
+    /// A device whose backend was not compiled in.
     #[error(
         "expected a device out of {}, which this build has; found \"{asked}\"",
         .built.join(", ")
@@ -31,10 +31,10 @@ pub enum GraspError {
     /// A device that this machine does not have.
     #[error("expected a device for {backend} on this machine, found {found}")]
     NoSuchDevice { backend: &'static str, found: String },
-    /// Bytes that are no grasp model.
+    /// Bytes that are not a grasp model.
     #[error("expected a grasp model file of this project, found {found}")]
     NotAModel {
-        /// What the bytes are, as far as their beginning shows.
+        /// The kind of the bytes, as far as their start shows.
         found: String,
     },
     /// A grasp model file of another version.
@@ -42,14 +42,14 @@ pub enum GraspError {
         "expected a grasp model of format version {expected}, found version {found}: it was written by another sdg"
     )]
     OtherVersion { expected: u32, found: String },
-    /// A grasp model file that contradicts itself or was cut short.
+    /// A grasp model file that is inconsistent or was truncated.
     #[error("the grasp model file is damaged: expected {expected}, found {found}")]
     Damaged {
-        /// What was expected.
+        /// The expected content.
         expected: String,
         found: String,
     },
-    /// An image that holds nothing to look at.
+    /// An image that is too small.
     #[error("expected an image of at least {least} × {least} pixels, found {width} × {height}")]
     ImageTooSmall { least: u32, width: u32, height: u32 },
     /// A region that cannot be searched.
@@ -71,7 +71,7 @@ pub enum GraspError {
     NoLengths,
     /// A part that the gripper cannot take.
     #[error(
-        "the part is {:.0} mm wide where it is to be grasped, and the gripper opens {:.0} mm",
+        "the part is {:.0} mm wide at the grasp, and the gripper opens {:.0} mm",
         .width_m * 1e3, .max_opening_m * 1e3
     )]
     TooWide {
@@ -86,14 +86,14 @@ pub enum GraspError {
     /// Demonstrations that do not show one part.
     #[error("expected demonstrations of one part: {expected}; found {found}")]
     ContradictingDemonstrations {
-        /// What the earlier ones say.
+        /// The value in the earlier ones.
         expected: String,
         found: String,
     },
     /// A part with too few pixels in its photo.
     #[error(
-        "expected a part of at least {least} pixels in its photo, found {width:.0} × {height:.0}: photograph it from nearer, \
-         or with more pixels"
+        "expected a part of at least {least} pixels in its photo, found {width:.0} × {height:.0}: photograph it from \
+         a shorter distance, or with more pixels"
     )]
     PartTooSmall {
         least: f64,
@@ -112,7 +112,7 @@ pub enum GraspError {
         number: usize,
     },
     /// A demonstration in which there is no shape to compare.
-    #[error("the demonstration cannot be laid over images: {0}")]
+    #[error("the demonstration cannot be compared with images: {0}")]
     Shape(#[from] sdg_shape::ShapeError),
     /// A value of a configuration out of its range.
     #[error("expected {name} {expected}, found {found}")]
@@ -136,7 +136,7 @@ pub enum GraspError {
     /// A preset that starts from weights, and none given.
     #[cfg(feature = "teach")]
     #[error(
-        "the preset {preset} starts from weights, and this build carries none for it: expected base weights, found none"
+        "the preset {preset} needs base weights, and this build contains none for it: expected base weights, found none"
     )]
     NeedsBaseWeights { preset: &'static str },
     /// Base weights for another network.
@@ -160,14 +160,14 @@ pub enum GraspError {
     #[cfg(feature = "teach")]
     #[error(transparent)]
     Training(#[from] sdg_training::TrainingError),
-    /// The observer asked to stop before there was a network to keep.
+    /// The observer requested a stop before there was a network to keep.
     #[cfg(feature = "teach")]
     #[error("stopped while the orientation CNN was taught: there is no model to keep")]
     StoppedTooEarly,
     /// Teaching ended with a network that does not find the part.
     #[cfg(feature = "teach")]
     #[error(
-        "after {steps} steps the network leads to the part in {hits} of {positives} held-back samples: too few to keep; \
+        "after {steps} steps the network finds the part in {hits} of {positives} held-back samples: too few for a usable model; \
          give it more time, or a demonstration with a clearer outline"
     )]
     NotLearnt {

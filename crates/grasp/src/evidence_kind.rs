@@ -17,17 +17,17 @@ pub enum EvidenceKind {
     Size,
     /// The share outside the picture.
     Outside,
-    /// Resemblance of other things.
+    /// Resemblance of other objects.
     Resemblance,
-    /// The network that knows parts from background.
+    /// The network that distinguishes parts from background.
     Likeness,
-    /// The network that knows parts from their look-alikes.
+    /// The network that distinguishes parts from their look-alikes.
     Details,
     /// Table where the part should be.
     Table,
-    /// Outline without edge.
+    /// Outline without an edge.
     Rim,
-    /// Edges that the photo does not have.
+    /// Edges that are absent from the photo.
     Added,
     /// A better fit of the mirror image.
     Mirror,
@@ -54,43 +54,43 @@ impl EvidenceKind {
         }
     }
 
-    /// The reason in words where it speaks against a detection.
+    /// The reason in words if it speaks against a detection.
     pub fn objection(self) -> &'static str {
         match self {
             Self::Network => "the network does not see the part there",
-            Self::Edges => "too few of the part's edges are there",
+            Self::Edges => "too few of the part's edges are found",
             Self::Surface => "the surface looks different: another side, print, gloss or light",
             Self::Hue => "it has another colour: another part, or other light",
             Self::Visible => "too little of it is visible",
             Self::Size => "it has another size",
             Self::Outside => "too much of it lies outside the picture",
-            Self::Resemblance => "other things look much like this part",
+            Self::Resemblance => "other objects look similar to this part",
             Self::Likeness => "photo and picture, laid over each other, do not show the same part",
-            Self::Details => "a feature or print of the part is not there, or is elsewhere",
+            Self::Details => "a feature or print of the part is missing, or is elsewhere",
             Self::Table => "bare table is seen where the part should be",
-            Self::Rim => "a part of its outline is not there",
+            Self::Rim => "a part of its outline is missing",
             Self::Added => "there is more inside its outline than in the photo",
             Self::Mirror => "the mirror image fits better",
         }
     }
 
-    /// Whether it says where part and picture differ also where it speaks for the part less than it could.
+    /// Whether its places of difference are shown also if it supports the part less than it could.
     pub(crate) fn is_local(self) -> bool {
         !matches!(self, Self::Network | Self::Resemblance | Self::Likeness | Self::Details)
     }
 }
 
-/// What would help where a refused detection is the part after all; the words are the caller's, who has options or buttons.
+/// The advice for a refused detection that is the part after all; the caller words it with its options or buttons.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Advice {
-    /// A wider tolerance of size, or with a calibrated camera a look at its file and the height of the marks.
+    /// A wider size tolerance or, with a calibrated camera, a check of its file and of the height of the marks.
     CheckSize,
     /// A further photo in darker light.
     DarkerPhoto,
     /// A further photo in brighter light.
     BrighterPhoto,
-    /// Uncover the part, or a further photo from this side.
+    /// Uncover the part, or take a further photo from this side.
     Uncover,
     /// A further photo from this side.
     OtherSide,

@@ -1,4 +1,4 @@
-//! The explanation of a detection, above all of a refused one: its size, and where picture and demonstration differ.
+//! The explanation of a detection, mainly of a refused one: its size, and where picture and demonstration differ.
 
 use image::RgbImage;
 use sdg_geometry::PlanarSimilarity;
@@ -11,13 +11,13 @@ use crate::search_window::SearchWindow;
 use crate::sizes::SizeRange;
 use crate::verification::{SearchedImage, differences};
 
-/// How far the corners of a detection's outline may lie from those of the demonstration's laid over them, in pixels. They come
-/// out of the same pose; only a slanted camera's picture of it differs.
+/// Tolerance in pixels between the corners of a detection's outline and of the demonstration's outline laid over it.
+/// Both come from the same pose and differ only for a slanted camera.
 const MAX_OFF_PX: f64 = 0.5;
 
 impl GraspModel {
-    /// The part's size in the picture over its size in the photo, other numbers of pixels allowed for: of the sizes that it may
-    /// have then, over the nearest. `None` for what was not laid over the picture (no verification), or over a plan view of it.
+    /// The part's size in the picture over its size in the photo, adjusted for other numbers of pixels: relative to the
+    /// nearest of the sizes that are then possible. `None` without verification, and in a plan view.
     pub fn size_of(&self, detection: &GraspDetection, [width, height]: [u32; 2]) -> Option<f64> {
         let (demonstration_idx, pose) = self.pose_of(detection)?;
         let demonstration = &self.demonstrations[demonstration_idx];
@@ -26,7 +26,7 @@ impl GraspModel {
         Some(SizeRange::nearest(&ranges, pose.scale)?.log_size(pose.scale).exp())
     }
 
-    /// Where the picture differs from the demonstration under each of its detections; `None` as [`Self::size_of`].
+    /// Where the picture differs from the demonstration under each of its detections; `None` as for [`Self::size_of`].
     pub fn differences(&self, image: &RgbImage, detections: &[&GraspDetection]) -> Vec<Option<Differences>> {
         let poses: Vec<_> = detections.iter().map(|detection| self.pose_of(detection)).collect();
         if poses.iter().all(Option::is_none) {
@@ -51,7 +51,7 @@ impl GraspModel {
         poses.into_iter().map(|pose| pose.and_then(at)).collect()
     }
 
-    /// Which demonstration's outline the detection has, and where its cut-out lies in the image.
+    /// The demonstration to which the detection's outline belongs, and the position of its cut-out in the image.
     fn pose_of(&self, detection: &GraspDetection) -> Option<(usize, PlanarSimilarity)> {
         let seen = &detection.outline.as_ref()?.vertices;
         self.demonstrations.iter().enumerate().find_map(|(idx, demonstration)| {

@@ -1,4 +1,4 @@
-//! The facts that a model file has about its teaching.
+//! The facts about the teaching that a model file contains.
 
 pub use sdg_demonstration::ModelKind;
 use sdg_geometry::RotationalSymmetry;
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::lengths::Lengths;
 use crate::region::SearchRegion;
 
-/// What a part's turn was first read from, before the demonstration was laid over it.
+/// The source of the first estimate of a part's turn, before the demonstration was laid over it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
@@ -18,14 +18,14 @@ pub enum TurnSource {
     Keypoints,
     /// Model D: SIFT keypoints of the part's texture.
     Texture,
-    /// Model D where there is too little texture: the mask's outline, which may be half a turn off.
+    /// Model D with too little texture: the mask's outline, which may be wrong by half a turn.
     Outline,
-    /// Model S and second opinions: every turn was tried.
+    /// Model S and detections found by the search only: every turn was tried.
     Search,
 }
 
 impl TurnSource {
-    /// The name, as files and `--json` have it.
+    /// The name in files and in `--json`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Crop => "crop",
@@ -37,39 +37,39 @@ impl TurnSource {
     }
 }
 
-/// How a model came to be and how good it was found to be.
+/// How a model was made and its measured quality.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TeachingFacts {
-    /// Decides every random choice.
+    /// The seed of every random choice.
     pub seed: u64,
-    /// Which turns of the part cannot be told from none, as was told at teaching.
+    /// The part's symmetry, as given at teaching.
     #[serde(default, skip_serializing_if = "is_without_symmetry")]
     pub symmetry: RotationalSymmetry,
-    /// Smallest and largest size over the nominal one at which the part is looked for.
+    /// Smallest and largest size over the nominal one within which the part is searched.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub size_tolerance: Option<[f64; 2]>,
-    /// What it knows of lengths; `None` for a model taught without a camera.
+    /// Its lengths; `None` for a model taught without a camera.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lengths: Option<Lengths>,
-    /// The part of pictures that is searched; all of them where `None`. Teaching itself does not go by it.
+    /// The searched region of pictures; `None` for whole pictures. Teaching itself does not use it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub region: Option<SearchRegion>,
-    /// Samples that the network saw.
+    /// Number of training samples.
     pub samples: usize,
     /// Optimiser steps.
     pub steps: usize,
     /// Wall-clock time from demonstration to model.
     pub seconds: f64,
-    /// How good it was found to be; `None` for model S, which is taught without samples.
+    /// Measured quality; `None` for model S, which is taught without samples.
     #[serde(flatten)]
     pub validation: Option<ValidationFacts>,
-    /// How the orientation CNN came to be; `None` for models without.
+    /// How the orientation CNN was made; `None` for models without one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub orientation: Option<OrientationFacts>,
-    /// The result on pictures without the part; `None` where none were given.
+    /// The result on pictures without the part; `None` if none were given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub negatives: Option<NegativeFacts>,
-    /// SHA-256 of the weights that teaching started from; `None` when it started from nothing.
+    /// SHA-256 of the weights that teaching started from; `None` if it started from random values.
     pub base_weights_sha256: Option<String>,
 }
 
@@ -77,21 +77,22 @@ fn is_without_symmetry(symmetry: &RotationalSymmetry) -> bool {
     *symmetry == RotationalSymmetry::None
 }
 
-/// How the score was calibrated on the user's pictures without the part.
+/// The calibration of the score on the user's pictures without the part.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct NegativeFacts {
     /// Number of pictures.
     pub pictures: usize,
-    /// Those in which the calibrated model accepts nothing.
+    /// Number of pictures in which the calibrated model accepts nothing.
     pub refused: usize,
-    /// What every score has in log-odds for them; at most 0.
+    /// Log-odds that they add to every score; at most 0.
     pub log_odds: f64,
 }
 
-/// How good a model was found to be on held-back samples.
+/// The quality of a model on held-back samples.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ValidationFacts {
-    /// Share of the parts found within 9.2 demonstration pixels (`sdg_training::HIT_PX`) and 10°, in `[0, 1]`, network alone.
+    /// Share of the parts found within 9.2 demonstration pixels (`sdg_training::HIT_PX`) and 10°, in `[0, 1]`, by the
+    /// network alone.
     #[serde(rename = "validation_hit_rate")]
     pub hit_rate: f64,
     /// Median error in pixels of the demonstration, after verification.
@@ -102,14 +103,14 @@ pub struct ValidationFacts {
     pub error_degrees: f64,
 }
 
-/// How model A's orientation CNN came to be, and how good it was found to be.
+/// How model A's orientation CNN was made, and its measured quality.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct OrientationFacts {
     /// Number of crops that it was trained on.
     pub crops: usize,
     /// Optimiser steps.
     pub steps: usize,
-    /// Share of held-back crops with the angle read within 10°, in `[0, 1]`.
+    /// Share of held-back crops with an angle error of at most 10°, in `[0, 1]`.
     pub hit_rate: f64,
     /// Median error on them, in degrees.
     pub error_degrees: f64,

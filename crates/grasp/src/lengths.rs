@@ -1,30 +1,31 @@
-//! What a model knows of lengths: part of its file.
+//! A model's lengths: part of its file.
 
 use serde::{Deserialize, Serialize};
 
 use crate::error::{GraspError, Result};
 
-/// A micrometre for a pixel, and a part as high as a person. Chosen by hand.
+/// A micrometre per pixel, and a part as high as a person. Chosen by hand.
 const MAX_PIXELS_PER_M: f64 = 1e6;
 const MAX_HEIGHT_M: f64 = 2.0;
 
-/// What a model that was taught with a camera knows of lengths.
+/// The lengths of a model that was taught with a camera.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Lengths {
-    /// Pixels of the demonstrations for a metre.
+    /// Pixels of the demonstrations per metre.
     pub pixels_per_m: f64,
     /// Height of the marks' plane over the table, in metres.
     pub mark_height_m: f64,
     /// Height over the table at which the gripper closes, in metres.
     pub grasp_height_m: f64,
-    /// From where the first photo showed the part: see `slant` in plan_view/mod.rs. 0 in models of before.
+    /// The direction from which the first photo shows the part: see `slant` in plan_view/mod.rs. 0 in models of earlier
+    /// versions.
     #[serde(default)]
     pub slant: [f64; 2],
 }
 
 impl Lengths {
     /// # Errors
-    /// [`GraspError::Damaged`] for what no camera and no part has.
+    /// [`GraspError::Damaged`] for impossible values.
     pub(crate) fn check(&self) -> Result<()> {
         let Self { pixels_per_m, mark_height_m, grasp_height_m, slant } = *self;
         let is_height = |height: f64| (0.0..MAX_HEIGHT_M).contains(&height);

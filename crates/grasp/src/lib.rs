@@ -16,19 +16,19 @@
 //! |---|---|
 //! | image | the picture as given, or the plan view made of it ([`CameraOverTable`]); pixels, y down, the first pixel's centre at (0.5, 0.5) |
 //! | photo | the demonstration's picture, in its own pixels |
-//! | cut-out | what the model keeps of the photo: a crop around the part, in pixels of its own |
+//! | cut-out | the crop of the photo around the part that the model keeps, in its own pixels |
 //! | view, working | image and cut-out halved or resized for one range of sizes; the search runs in these |
 //! | `a_from_b` | a transform that takes coordinates of frame b to frame a; poses are `image_from_cutout`, a similarity |
 //! | candidate | a box of the network read as a pose, not yet verified |
 //! | evidence | measurements at a pose (edges, surface, hue, visible share, size …), each of which adds log-odds to the score |
 //! | score | logistic of their sum, in (0, 1); a detection of at least 0.5 is accepted |
 //! | agreement | edges and surface together, in [0, 1], from `sdg-shape` |
-//! | `log_size` | ln of the size in the image over the nearest size that is looked for |
+//! | `log_size` | ln of the size in the image over the nearest size in the search range |
 //! | x, y, angle, width | a planar grasp: centre in pixels, angle of the grasp line from x towards y, opening in pixels |
 //! | tcp, flange, base | frames of the arm; metres, z of the tcp along the approach |
 //!
-//! What is deliberately absent: files, clocks in detection, threads (bytes in, bytes out, so that the same code runs in
-//! a browser), the robot and the simulator. Without the feature `teach` no autodiff, optimiser or augmentation is
+//! This crate deliberately has no files, no clock in detection, no threads (bytes in, bytes out, so that the same code
+//! runs in a browser), no robot and no simulator. Without the feature `teach` no autodiff, optimiser or augmentation is
 //! compiled.
 //!
 //! From the bytes of a model and of an image to a grasp:

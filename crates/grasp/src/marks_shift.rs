@@ -1,14 +1,15 @@
-//! Where the marks lie in a picture when they stand higher or lower than the outline.
+//! The position of the marks in a picture if they are higher or lower than the outline.
 //!
-//! A camera sees what stands higher shifted away from the point straight below it, by a share of its distance from there; for a
-//! camera that looks straight down that point is the middle of the picture:
+//! A higher point appears shifted away from the point vertically below the camera, by a share of its distance from
+//! there; for a camera that looks vertically down that point is the centre of the picture:
 //! ```text
 //! shift = η · (place in the picture − its middle) − the same in the photo        η = height / (distance − height)
 //! ```
-//! η is unknown. The marks' surroundings, edges and colours, are laid over the picture along that line and, since no camera
-//! looks quite straight down, some way beside it; a shift is taken where they agree clearly better than where the outline has
-//! them. Fitted on the tuned sets of datasets/split.toml and base-weights/physical/split.toml: the marks of 304 of 312 parts
-//! come to lie within 4 % of the diagonal, of 268 without any shift (docs/decisions/027-heights-and-slants.md).
+//! η is unknown. The marks' surroundings, edges and colours, are laid over the picture along that line and, since no
+//! camera looks exactly down, some way beside it; a shift is accepted if they agree clearly better there than at the
+//! outline's pose. Fitted on the tuned sets of datasets/split.toml and base-weights/physical/split.toml: the marks of
+//! 304 of 312 parts lie within 4 % of the diagonal, and of 268 without a shift
+//! (docs/decisions/027-heights-and-slants.md).
 
 use image::RgbImage;
 use image::imageops::interpolate_bilinear;
@@ -18,26 +19,27 @@ use sdg_shape::{Picture, ShapeConfig, ShapeTemplate, Surface};
 
 use crate::taught_marks::TaughtMarks;
 
-/// The surroundings reach so many lengths of the grasp line from its middle: farther away lies what stands at another height.
-/// The line counts as no shorter than this share of the diagonal. With 0.8 lengths the edges of 11 of 32 flanges tell the shift,
-/// with 0.6 those of 30.
+/// Radius of the surroundings about the centre of the grasp line, in lengths of the line: points farther away are at
+/// another height. The line counts as at least this share of the diagonal. With 0.8 lengths the edges of 11 of 32
+/// flanges determine the shift, with 0.6 those of 30.
 const SURROUNDINGS: f64 = 0.6;
 const MIN_LINE_SHARE: f64 = 0.2;
-/// Least and largest η: a mark 40 mm high under a camera 300 mm above the table has 0.15. Chosen by that reasoning.
+/// Smallest and largest η: a mark 40 mm high under a camera 300 mm above the table has 0.15. Chosen from that.
 const HEIGHT_SHARES: (f64, f64) = (-0.04, 0.18);
-/// How far from the line, and along it where the part lies near the picture's middle, a shift is looked for; in diagonals.
+/// Search range beside the line, and along it if the part is near the picture's centre; in diagonals.
 const MAX_ASIDE: f64 = 0.04;
 /// First and last step of the search, in diagonals. Chosen for time.
 const STEP: f64 = 0.01;
 const LAST_STEP: f64 = 0.0025;
-/// What a diagonal of shift along the line and across it costs in agreement of edges and surface together, in `[0, 2]`, and what
-/// a shift must gain. Fitted (see above); half and double change the count by at most 3.
+/// Penalty of a diagonal of shift along the line and across it, in agreement of edges and surface together, in `[0,
+/// 2]`, and the minimum gain of a shift. Fitted (see above); half and double the values change the count by at most 3.
 const COST_ALONG: f64 = 3.0;
 const COST_ACROSS: f64 = 5.0;
 const MIN_GAIN: f64 = 0.2;
-/// Where what is raised meets the outline's plane, in the surroundings' radii. With 2.0 a flange's holes beside its boss move with it.
+/// Where the raised area meets the outline's plane, in the surroundings' radii. With 2.0 a flange's holes beside its
+/// boss move with it.
 const FOOT: f64 = 1.3;
-/// What is kept of the picture about the part, in lengths of its box: as far as a close look sees.
+/// Extent of the picture kept around the part, in lengths of its box: the range of a close look.
 const MARGIN: f64 = 0.35;
 
 /// The surroundings of a demonstration's marks.
@@ -45,23 +47,24 @@ const MARGIN: f64 = 0.35;
 pub(crate) struct MarksShift {
     edges: ShapeTemplate,
     surface: Surface,
-    /// The middle of the grasp line, how far its surroundings reach, and the middle of the photo, in pixels of the cut-out.
+    /// The centre of the grasp line, the radius of its surroundings, and the centre of the photo, in pixels of the
+    /// cut-out.
     middle: Point2<f64>,
     reach: f64,
     photo_middle: Point2<f64>,
-    /// Of the outline's box, in pixels of the cut-out.
+    /// Diagonal of the outline's box, in pixels of the cut-out.
     diagonal: f64,
 }
 
 impl MarksShift {
-    /// `marks` are in pixels of `cutout`. `None` where there are too few edges about them.
+    /// `marks` are in pixels of `cutout`. `None` if there are too few edges around them.
     pub(crate) fn new(cutout: &RgbImage, marks: &TaughtMarks, config: &ShapeConfig) -> Option<Self> {
         let bounds = marks.region().bounds();
         let diagonal = bounds.width().hypot(bounds.height());
         let middle = marks.grasp.center();
         let reach = SURROUNDINGS * marks.grasp.length().max(MIN_LINE_SHARE * diagonal);
         let surroundings = circle(middle, reach);
-        // No outline is special there.
+        // No outline has a special weight there.
         let mut config = config.clone();
         config.outline_weight = 1.0;
         Some(Self {
@@ -74,10 +77,10 @@ impl MarksShift {
         })
     }
 
-    /// `image_from_cutout`, or the same shifted to where the marks' surroundings are seen. Deterministic.
+    /// `image_from_cutout`, or the same shifted to the position of the marks' surroundings. Deterministic.
     ///
     /// # Units and frames
-    /// Pixels of the picture; `below_camera` is the point of the table straight below the camera.
+    /// Pixels of the picture; `below_camera` is the point of the table vertically below the camera.
     pub(crate) fn placed(
         &self,
         picture: &Picture<'_>,
@@ -103,7 +106,7 @@ impl MarksShift {
         let unshifted = value([0.0; 2]);
         let mut best = ([0.0; 2], unshifted);
         for at in grid(along_bounds) {
-            // The surface, which takes most of the time, agrees by at most 1.
+            // The agreement of the surface, which takes most of the time, is at most 1.
             if edges(at) + 1.0 > best.1 {
                 let found = value(at);
                 if found > best.1 {
@@ -129,7 +132,7 @@ impl MarksShift {
     }
 }
 
-/// A part of a picture in which a raised middle lies where the outline has it.
+/// A part of a picture in which a raised centre is at the outline's position.
 pub(crate) struct Straightened {
     pub(crate) image: RgbImage,
     /// The upper left corner in the picture.
@@ -137,11 +140,11 @@ pub(crate) struct Straightened {
 }
 
 impl MarksShift {
-    /// The picture about the part, with the marks' surroundings moved back from where `image_from_marks` has them, and the sides of
-    /// what is raised less and less, from its top to its foot.
+    /// The picture around the part, with the marks' surroundings moved back from their position by `image_from_marks`,
+    /// and the flanks of the raised area moved by less and less from its top to its foot.
     ///
     /// # Units and frames
-    /// Pixels of the picture; the corner lies at multiples of `coarsest_pixel`, so that pyramids are the same.
+    /// Pixels of the picture; the corner lies at multiples of `coarsest_pixel`, so that the pyramids are equal.
     pub(crate) fn straightened(
         &self,
         image: &RgbImage,
@@ -201,8 +204,8 @@ mod tests {
     const SIZE: [u32; 2] = [480, 360];
     const RADIUS: f64 = 50.0;
 
-    /// A disc with six holes about `middle`; on it a boss with a bore that stands `eta` of its distance from the picture's middle
-    /// further out.
+    /// A disc with six holes about `middle`; on it a boss with a bore that is displaced outwards by `eta` of its
+    /// distance from the picture's centre.
     fn disc(middle: Point2<f64>, eta: f64) -> RgbImage {
         let picture_middle = Point2::new(f64::from(SIZE[0]), f64::from(SIZE[1])) / 2.0;
         let boss = middle + eta * (middle - picture_middle);
@@ -228,7 +231,7 @@ mod tests {
         })
     }
 
-    /// Taught in the middle of a photo, where nothing is shifted.
+    /// Taught in the centre of a photo, where nothing is shifted.
     fn taught() -> MarksShift {
         let middle = Point2::new(240.0, 180.0);
         let outline = circle(middle, RADIUS);

@@ -1,4 +1,4 @@
-//! The grasp model: what was taught, and how it looks at an image.
+//! The grasp model: its taught data, and detection in an image.
 //!
 //! ```text
 //! RgbImage ─┬─ Network: detections, each read as a pose of the demonstration ─ laid over the image, refined ─┐
@@ -27,7 +27,8 @@ use crate::taught::TaughtDemonstration;
 use crate::verdict::{Clues, Contributions, judge_picture, judge_picture_of_sequence};
 use crate::verification::{PlacedDemonstration, SearchedImage, Shot};
 
-/// No part can be told in an image with a shorter side. Chosen by hand, not measured: a level of the pyramid has 24 pixels.
+/// Minimum shorter side of an image for recognising a part. Chosen by hand, not measured: a level of the pyramid has 24
+/// pixels.
 const MIN_SIDE_PX: u32 = 32;
 
 /// A grasp model: taught from demonstrations, finds planar grasps.
@@ -41,13 +42,13 @@ pub struct GraspModel {
     pub(crate) facts: TeachingFacts,
 }
 
-/// Whether detections are laid over the demonstration.
+/// Whether the demonstration is laid over detections.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Verification {
-    /// Every detection is refined and scored by the demonstration.
+    /// Every detection is refined and scored with the demonstration.
     #[default]
     ByShape,
-    /// The network alone decides and places. Model S has no network: it looks as ever.
+    /// The network alone scores and places. Model S has no network: its search is unchanged.
     Off,
 }
 
@@ -57,8 +58,8 @@ impl GraspModel {
         self.network.as_ref().map_or(ModelKind::S, Network::kind)
     }
 
-    /// The same network read as another model; `None` where the two are not taught alike (see [`ModelKind::taught_as`]).
-    /// Its calibration stays, though the network's errors were judged by the first reading.
+    /// The same network read as another model; `None` if the two are not taught in the same way (see
+    /// [`ModelKind::taught_as`]). The calibration is kept, although it was fitted to the errors of the first reading.
     pub fn read_as(self, kind: ModelKind) -> Option<Self> {
         if self.kind() == kind {
             return Some(self);
@@ -77,12 +78,12 @@ impl GraspModel {
         &self.demonstrations[0].marks.label
     }
 
-    /// How it was taught, and how good it was found to be.
+    /// How it was taught, and its measured quality.
     pub fn facts(&self) -> &TeachingFacts {
         &self.facts
     }
 
-    /// The demonstrations, cut to the part.
+    /// The demonstrations, cropped to the part.
     pub fn demonstrations(&self) -> &[TaughtDemonstration] {
         &self.demonstrations
     }
@@ -93,8 +94,8 @@ impl GraspModel {
         self
     }
 
-    /// The same model whose search of a whole image compares `num_points` edge points at each pose; taught models have 64.
-    /// The calibration stays.
+    /// The same model whose search of a whole image compares `num_points` edge points at each pose; taught models use
+    /// 64. The calibration stays.
     ///
     /// # Errors
     /// A number of points outside 8 to 1024.
@@ -102,7 +103,7 @@ impl GraspModel {
         self.with_check(|check| check.search.num_points = num_points)
     }
 
-    /// The same model with other bounds of a part's size over the nominal one; its file tells those that it was taught with.
+    /// The same model with other bounds of a part's size over the nominal one; its file keeps those of its teaching.
     ///
     /// # Errors
     /// Bounds that do not lie within 0.5 to 1 and 1 to 2.
@@ -110,7 +111,7 @@ impl GraspModel {
         self.with_check(|check| check.search.scales = tolerance.clone())
     }
 
-    /// The same model that finds at most so many parts in a picture; 100 otherwise.
+    /// The same model with another maximum number of parts in a picture; the default is 100.
     ///
     /// # Errors
     /// [`GraspError::InvalidConfig`] for 0.
@@ -125,22 +126,22 @@ impl GraspModel {
         })
     }
 
-    /// The same model that searches this part of pictures alone; all of them with `None`. A model file keeps it.
+    /// The same model that searches only this region of pictures; `None` for whole pictures. A model file keeps it.
     ///
     /// # Errors
-    /// A region without pixels; where it says what pictures it is for, one that reaches out of them, and one that the part does not fit in.
-    /// Other regions are checked with each picture.
+    /// A region without pixels; if it names the size of its pictures, one that extends beyond them, or one that the
+    /// part does not fit in. Other regions are checked with each picture.
     pub fn with_region(self, region: Option<SearchRegion>) -> Result<Self> {
         if self.facts.region == region {
             return Ok(self);
         }
         if let Some(region) = &region {
-            // Of a model that knows lengths the demonstrations are plan views, whose pixels are not the picture's.
+            // A model with known lengths has plan views as demonstrations, whose pixels are not the picture's.
             check_region(region, self.facts.lengths.is_none().then_some(&self.demonstrations))?;
         }
         let CheckConfig { search, max_detections, .. } = self.demonstrations[0].check();
         let wanted = max_matches(*max_detections, region.is_some());
-        // Another configuration makes the search ready again, which takes milliseconds.
+        // Another configuration makes a new search, which takes milliseconds.
         let mut model = match search.max_matches == wanted {
             true => self,
             false => self.with_check(|check| check.search.max_matches = wanted)?,
@@ -149,23 +150,23 @@ impl GraspModel {
         Ok(model)
     }
 
-    /// The part of pictures that is searched; all of them where `None`.
+    /// The searched region of pictures; `None` for whole pictures.
     pub fn region(&self) -> Option<&SearchRegion> {
         self.facts.region.as_ref()
     }
 
-    /// The same model for plan views as fine as its demonstrations.
+    /// The same model for plan views of its demonstrations' resolution.
     pub(crate) fn of_known_size(self) -> Result<Self> {
         let mut model = self.with_check(|check| {
             check.search.scales = CheckConfig::KNOWN_SIZE_TOLERANCE;
             check.score = check.score.of_known_size();
         })?;
-        // A plan view has as many pixels a metre, however many it has.
+        // A plan view has the same number of pixels per metre for any number of pixels.
         model.demonstrations.iter_mut().for_each(|demonstration| demonstration.marks.photo_size = None);
         Ok(model)
     }
 
-    /// Bounds of a part's size over the nominal one, within which it is looked for.
+    /// Bounds of a part's size over the nominal one within which it is searched.
     pub fn size_tolerance(&self) -> RangeInclusive<f64> {
         self.demonstrations[0].check().search.scales.clone()
     }
@@ -181,15 +182,15 @@ impl GraspModel {
     }
 
     /// Finds the part in an image, best score first. Detections below 0.5 are listed too, for callers that show
-    /// what was refused and why: [`GraspDetection::is_accepted`] tells.
+    /// refused detections and the reasons; see [`GraspDetection::is_accepted`].
     ///
     /// # Errors
-    /// An image too small to show anything.
+    /// An image that is too small.
     pub fn detect(&self, image: &RgbImage, verification: Verification) -> Result<Vec<GraspDetection>> {
         read_sync(self.detect_async(image, verification))
     }
 
-    /// [`Self::detect`], awaited; for browsers, which hand over what a graphics card computed in no other way.
+    /// [`Self::detect`], asynchronous; for browsers, which give access to results of a graphics card only in this way.
     ///
     /// # Errors
     /// As there.
@@ -198,7 +199,7 @@ impl GraspModel {
         Ok(found.into_iter().map(|found| found.detection).collect())
     }
 
-    /// [`Self::detect_async`], each detection with what tracking goes on from.
+    /// [`Self::detect_async`], each detection with the data that tracking needs.
     pub(crate) async fn find_async(&self, image: &RgbImage, verification: Verification) -> Result<Vec<Found>> {
         let size = [image.width(), image.height()];
         let Some(region) = self.region() else {
@@ -209,7 +210,8 @@ impl GraspModel {
         self.find_in(&window.cut(image), &window, verification, |detection| detection.lies_in(region)).await
     }
 
-    /// What is found in the image that a window was cut out as, in pixels of the whole, of which that counts for which `counts` holds.
+    /// Detections in an image that is a window of a larger one, in pixels of the whole; only those for which `counts`
+    /// holds.
     pub(crate) async fn find_in(
         &self,
         image: &RgbImage,
@@ -240,7 +242,7 @@ impl GraspModel {
         Ok(found)
     }
 
-    /// As a level camera sees it, or a slanted one where that explains the picture better.
+    /// As seen by a level camera, or by a slanted one if that explains the picture better.
     async fn find_at_any_slant(&self, image: &RgbImage, shot: &Shot) -> Result<Vec<Found>> {
         let (level, slant) = self.find_at_slant(image, shot, true).await?;
         let Some(made_level) = slant.and_then(|slant| LevelImage::new(image, shot, &slant)) else { return Ok(level) };
@@ -251,7 +253,7 @@ impl GraspModel {
         Ok(level)
     }
 
-    /// What is found in an image that was taken so, and the slant that its best places suggest where it is asked for.
+    /// Detections in an image at this slant, and the slant that its best matches suggest, if it is asked for.
     async fn find_at_slant(&self, image: &RgbImage, shot: &Shot, suggest: bool) -> Result<(Vec<Found>, Option<Slant>)> {
         let searched = SearchedImage::of(image, shot, &self.demonstrations);
         let proposals = match &self.network {
@@ -279,7 +281,7 @@ impl GraspModel {
         }
     }
 
-    /// Scores them, first each alone, then by the size of the surest among them.
+    /// Scores them, first each alone, then relative to the size of the best among them.
     fn judged(&self, sightings: Vec<Sighting<'_>>) -> Vec<Found> {
         let clues: Vec<Clues> = sightings.iter().map(|sighting| self.clues(sighting)).collect();
         let judged = judge_picture(&clues, &self.demonstrations[0].check().score);
@@ -294,14 +296,15 @@ impl GraspModel {
             .collect()
     }
 
-    /// What the verdict is to know of a place.
+    /// The verdict's inputs for a place.
     pub(crate) fn clues(&self, sighting: &Sighting<'_>) -> Clues {
         let PlacedDemonstration { evidence, log_size, .. } = sighting.placed;
         let network = self.score_calibration.log_likelihood_ratio(sighting.network_score);
         Clues { evidence, log_size, network, resemblance: self.score_calibration.resemblance }
     }
 
-    /// The scores of all places in one picture of a sequence in which parts had that size before, as [`Clues::log_size`].
+    /// The scores of all places in one picture of a sequence in which parts had that size before, as in
+    /// [`Clues::log_size`].
     pub(crate) fn judge_in_sequence(
         &self,
         clues: &[Clues],
@@ -316,17 +319,17 @@ impl GraspModel {
     }
 }
 
-/// Most matches of a search after which so many detections are listed. Where a part of the picture is searched, of better matches outside
-/// none may take the place of one that counts.
+/// Maximum number of matches of a search whose result lists this many detections. If only a region is searched, better
+/// matches outside must not displace matches inside.
 fn max_matches(max_detections: usize, is_cut: bool) -> usize {
     if is_cut { max_detections.max(CheckConfig::DEFAULT_MAX_DETECTIONS) } else { max_detections }
 }
 
-/// Of detections of the same part the best one stays: by the overlap of their outlines, or of their boxes where there are no
-/// outlines. Of those that ended in the same pose it is the one that the network was surest of, and not a matter of the
-/// last bit.
+/// Keeps the best of several detections of the same part, compared by the overlap of their outlines, or of their boxes
+/// without outlines. Of detections that ended in the same pose the one with the highest network score stays, so that
+/// the result does not depend on the last bit.
 fn drop_repeated(found: &mut Vec<Found>) {
-    // Chosen by hand: above the rounding of single precision, below any difference that tells poses apart.
+    // Chosen by hand: above the rounding of single precision, below any difference that distinguishes poses.
     const SAME_SCORE: f64 = 1e-4;
     let mut kept: Vec<Found> = Vec::with_capacity(found.len());
     for next in found.drain(..) {

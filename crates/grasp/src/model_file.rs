@@ -38,10 +38,10 @@ use crate::safetensors_file::{self, TensorBytes};
 use crate::taught::TaughtDemonstration;
 use crate::taught_marks::TaughtMarks;
 
-/// The version written here. Any change that an older reader would misread raises it.
+/// The version written here. It is increased by any change that an older reader would misread.
 pub const FORMAT_VERSION: u32 = 3;
 
-/// More demonstrations than anybody takes; bounds the work on a forged file.
+/// More demonstrations than any use needs; limits the work on a forged file.
 const MAX_DEMONSTRATIONS: usize = 1000;
 
 /// The metadata of a file, without its weights.
@@ -119,7 +119,7 @@ impl GraspModel {
     /// Reads a model from a file's bytes and puts it on `device`.
     ///
     /// # Errors
-    /// Bytes that are no grasp model, one of another version, or one that was cut short or altered.
+    /// Bytes of another format, of another version, truncated or altered.
     pub fn from_bytes(bytes: &[u8], device: &Device) -> Result<Self> {
         let metadata = read_metadata(bytes)?;
         let file = SafeTensors::deserialize(bytes).map_err(|error| GraspError::Damaged {
@@ -270,7 +270,7 @@ impl Metadata {
     }
 }
 
-/// Reads the header and makes sure that it is a grasp model of this version.
+/// Reads the header and checks that it is a grasp model of this version.
 fn read_metadata(bytes: &[u8]) -> Result<Metadata> {
     let (header_length, header) =
         SafeTensors::read_metadata(bytes).map_err(|_| GraspError::NotAModel { found: describe(bytes) })?;
@@ -291,7 +291,7 @@ fn read_metadata(bytes: &[u8]) -> Result<Metadata> {
     Ok(Metadata(metadata))
 }
 
-/// What bytes are that are no safetensors file, for the error's sake.
+/// The kind of bytes that are not a safetensors file, for the error.
 fn describe(bytes: &[u8]) -> String {
     let known: [(&[u8], &str); 5] = [
         (b"\x89PNG", "a PNG image"),
@@ -304,7 +304,7 @@ fn describe(bytes: &[u8]) -> String {
         return "an empty file".to_owned();
     }
     let kind = known.iter().find(|(magic, _)| bytes.starts_with(magic)).map(|(_, name)| (*name).to_owned());
-    kind.unwrap_or_else(|| format!("{} bytes that are no safetensors file, or only the start of one", bytes.len()))
+    kind.unwrap_or_else(|| format!("{} bytes that are not a safetensors file, or only its beginning", bytes.len()))
 }
 
 fn to_json<T: Serialize>(value: &T) -> String {
@@ -337,7 +337,7 @@ mod tests {
     use sdg_detection::presets::edge_of;
     use sdg_geometry::{BoundingBox, GraspLine, Polygon, RotationalSymmetry};
 
-    /// A model of an untaught network: everything that a file holds, in no time.
+    /// A model of an untaught network: everything that a file contains, made quickly.
     fn untaught(kind: ModelKind) -> GraspModel {
         let outline = Polygon::from_box(&BoundingBox { x1: 20.0, y1: 20.0, x2: 100.0, y2: 50.0 });
         let cutout = RgbImage::from_fn(120, 70, |x, y| {
@@ -407,7 +407,7 @@ mod tests {
             assert!(bytes.len() < 12_000_000, "{kind}: {} bytes", bytes.len());
             let read = GraspModel::from_bytes(&bytes, &Device::flex()).unwrap();
             assert_eq!(read.kind(), kind);
-            // Half precision was rounded once: a second round changes nothing.
+            // Half precision was rounded once; rounding again changes nothing.
             assert_eq!(read.to_bytes().unwrap(), bytes, "{kind}");
             let summary = summarize(&bytes).unwrap();
             assert_eq!((summary.model, summary.object.as_str()), (kind, "bar"));

@@ -3,9 +3,8 @@
 //! ```text
 //! network score ─ logistic, fitted on held-back augmentations ─ score of an unverified detection
 //! ```
-//! Scores are compared in log-odds: there those of right and of wrong detections are spread about their medians, whereas
-//! probabilities crowd next to 0 and 1.
-//! A verified detection is scored by all evidence ([`crate::verdict`]).
+//! Scores are compared in log-odds, where those of right and of wrong detections are spread about their medians;
+//! probabilities accumulate near 0 and 1. A verified detection is scored by all evidence ([`crate::verdict`]).
 
 use serde::{Deserialize, Serialize};
 
@@ -16,26 +15,25 @@ use crate::decimal::decimal;
 /// Maps a raw score to (0, 1) so that `threshold` becomes 0.5.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct NetworkCalibration {
-    /// The raw score that becomes 0.5.
+    /// The raw score that is mapped to 0.5.
     pub threshold: f64,
     /// Steepness: the logistic's slope, per unit of the raw score's log-odds.
     pub slope: f64,
 }
 
-/// Scores are taken to lie at least so far from 0 and 1.
+/// Scores are clamped to this distance from 0 and 1.
 const MIN_PROBABILITY: f64 = 1e-4;
-/// Least spread of scores on one side, in log-odds: a handful of equal ones says little of those to come. Chosen by that
-/// reasoning, not measured.
+/// Minimum spread of scores on one side, in log-odds: a few equal scores say little about later ones. Derived from
+/// that, not measured.
 const MIN_SPREAD: f64 = 0.3;
-/// The percentiles, on the side that faces the other scores, that say how far the scores are spread; of a normal distribution
-/// they lie 1.28 standard deviations from the median.
+/// The percentiles, on the side towards the other scores, that measure the spread; for a normal distribution they are
+/// 1.28 standard deviations from the median.
 const FACING_PERCENT: f64 = 10.0;
 const FACING_DEVIATIONS: f64 = 1.281_551_6;
-/// Deviations between the median of the wrong scores and the threshold for each between it and that of the right ones: of
-/// normal distributions 5 % of the wrong ones are accepted where 10 % of the right ones are refused (1.645 over 1.282).
+/// Ratio of the deviations from the threshold to the median of the wrong scores and to that of the right ones: for
+/// normal distributions 5 % of the wrong ones are accepted while 10 % of the right ones are refused (1.645 over 1.282).
 const WRONG_PER_RIGHT_DEVIATION: f64 = 1.2836;
-/// Bounds of the slope, so that a handful of scores makes neither a step nor a flat line. Chosen by that reasoning, not
-/// measured.
+/// Bounds of the slope, so that a few scores make neither a step nor a flat line. Derived from that, not measured.
 const SLOPE_BOUNDS: (f64, f64) = (0.5, 4.0);
 
 /// The log-odds of a raw score.
@@ -49,16 +47,16 @@ fn probability(log_odds: f64) -> f64 {
 }
 
 impl NetworkCalibration {
-    /// Leaves a score where it is.
+    /// Leaves a score unchanged.
     pub const NEUTRAL: Self = Self { threshold: 0.5, slope: 1.0 };
 
-    /// Finds the threshold between the raw scores of right and wrong detections, by how many deviations separate it from the
-    /// median of the right ones and from that of the wrong ones. Each side's deviation is that of its scores towards the
-    /// other, so that neither one odd picture nor those that are nowhere near the threshold move it.
+    /// Finds the threshold between the raw scores of right and wrong detections, from its distance in deviations to the
+    /// medians of both. The deviation of each side is that of its scores towards the other side, so that single
+    /// outliers and scores far from the threshold do not move it.
     ///
-    /// `None` without a right score; without a wrong one, `no_wrong` stands for them. `usual` is the threshold, in log-odds, that
-    /// networks of this kind have, if that is known: the threshold is no lower, since samples of a few other things say little of those to
-    /// come, and half-way to it from above.
+    /// `None` without a right score; without a wrong one, `no_wrong` replaces them. `usual` is the usual threshold of
+    /// networks of this kind, in log-odds, if it is known: the threshold is at least `usual`, because samples of a few
+    /// other objects say little about later ones, and from above it is moved half-way to `usual`.
     pub fn fit(right: &[f64], wrong: &[f64], no_wrong: f64, usual: Option<f64>) -> Option<Self> {
         let in_log_odds = |scores: &[f64]| -> Vec<f64> {
             scores.iter().copied().filter(|score| score.is_finite()).map(log_odds).collect()
@@ -77,7 +75,7 @@ impl NetworkCalibration {
         let weight = WRONG_PER_RIGHT_DEVIATION * of_wrong;
         let threshold = (right * weight + wrong * of_right) / (weight + of_right);
         let threshold = usual.map_or(threshold, |usual| threshold.max(usual).midpoint(usual));
-        // The slope of the logistic that is likeliest for two normal distributions of one deviation.
+        // The most likely slope of the logistic for two normal distributions of equal deviation.
         let deviation = 0.5 * (of_right + of_wrong);
         let slope = ((right - wrong) / deviation.powi(2)).clamp(SLOPE_BOUNDS.0, SLOPE_BOUNDS.1);
         Some(Self { threshold: decimal(probability(threshold)), slope: decimal(slope) })

@@ -1,7 +1,7 @@
-//! Log-odds of a place from a network's proposal, or from having none.
+//! Log-odds of a place from a network's proposal, or from the lack of one.
 //!
-//! A network that was taught for half a minute also gives detections on other things, and misses parts: neither a proposal
-//! nor its absence is strong evidence. How strong, is measured while teaching, on held-back samples:
+//! A network that was taught for half a minute also gives detections on other objects, and misses parts, so that
+//! neither a proposal nor its absence is strong evidence. Its strength is measured on held-back samples while teaching:
 //!
 //! ```text
 //! held-back samples with the part ─ places on the part ────────┐
@@ -13,23 +13,25 @@ use serde::{Deserialize, Serialize};
 
 use crate::network_calibration::{NetworkCalibration, log_odds};
 
-/// A score this far below the threshold, in log-odds, does not speak against the part: by so much pictures score lower than
-/// held-back samples (the housing's right places 3.7 in the median, and 5.5; docs/decisions/013-base-weights.md).
+/// A score this far below the threshold, in log-odds, does not speak against the part: pictures score lower than
+/// held-back samples by about this much (the housing's right places by a median of 3.7, and 5.5;
+/// docs/decisions/013-base-weights.md).
 #[cfg(any(feature = "teach", test))]
 const PICTURES_SCORE_LOWER_BY: f64 = 2.0;
 
-/// How often the network was silent, unsure and sure, on the part and on other things.
+/// Counts of the network's outputs (silent, unsure, sure) on the part and on other objects.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct NetworkEvidence {
     on_part: [u32; 3],
     elsewhere: [u32; 3],
-    /// How far below the threshold the network counts as sure, in log-odds; 0 in files of earlier versions.
+    /// Distance below the threshold, in log-odds, at which the network still counts as sure; 0 in files of earlier
+    /// versions.
     #[serde(default)]
     margin: f64,
 }
 
 impl NetworkEvidence {
-    /// From the network's scores on the part and on other things, 0 where it proposes nothing.
+    /// From the network's scores on the part and on other objects, 0 without a proposal.
     #[cfg(any(feature = "teach", test))]
     pub(crate) fn new(on_part: &[f64], elsewhere: &[f64], calibration: &NetworkCalibration) -> Self {
         let mut evidence = Self { margin: PICTURES_SCORE_LOWER_BY, ..Self::default() };
@@ -42,7 +44,7 @@ impl NetworkEvidence {
         evidence
     }
 
-    /// The network's output at a place: nothing, something, or something not far below its threshold at least.
+    /// The network's output at a place: none, a low score, or a score of at least the threshold minus the margin.
     fn class(&self, score: f64, calibration: &NetworkCalibration) -> usize {
         match score {
             0.0 => 0,
@@ -51,7 +53,8 @@ impl NetworkEvidence {
         }
     }
 
-    /// ln of how much likelier such a score is on the part than elsewhere. Every class counts as seen once more than it was.
+    /// ln of the likelihood ratio of such a score, on the part over elsewhere. One is added to the count of every
+    /// class.
     pub(crate) fn log_likelihood_ratio(&self, score: f64, calibration: &NetworkCalibration) -> f64 {
         let class = self.class(score, calibration);
         let share = |counts: &[u32; 3]| f64::from(counts[class] + 1) / f64::from(counts.iter().sum::<u32>() + 3);
@@ -70,7 +73,7 @@ mod tests {
         let good = NetworkEvidence::new(&[0.9; 30], &[0.0; 30], &CALIBRATION);
         assert!((good.log_likelihood_ratio(0.95, &CALIBRATION) - 31f64.ln()).abs() < 1e-12);
         assert!((good.log_likelihood_ratio(0.0, &CALIBRATION) + 31f64.ln()).abs() < 1e-12);
-        // Half a log-odds more than the margin below the threshold, and less.
+        // Half a log-odds further below the threshold than the margin, and half less.
         assert_eq!(good.log_likelihood_ratio(0.25, &CALIBRATION), 0.0);
         assert!(good.log_likelihood_ratio(0.4, &CALIBRATION) > 3.0);
         let poor = NetworkEvidence::new(&[0.9, 0.25, 0.0], &[0.9, 0.25, 0.0], &CALIBRATION);

@@ -8,12 +8,13 @@ use crate::model::GraspModel;
 use crate::taught::TaughtDemonstration;
 
 impl GraspModel {
-    /// The same model for calibrated cameras, as if its photos had been taken from straight above and far away. `lengths` say how
-    /// many pixels of the first photo a metre of the part's surface has; finer photos are made as coarse as `max_pixels_per_m`,
-    /// with which cameras over a table are served better. Of several photos each is taken to show the part as long as the first.
+    /// The same model for calibrated cameras, as if its photos had been taken vertically from above at a large
+    /// distance. `lengths` gives the pixels of the first photo per metre of the part's surface; finer photos are
+    /// reduced to `max_pixels_per_m`, which suits cameras over a table better. The part is assumed to have the same
+    /// length in all photos.
     ///
     /// # Errors
-    /// Lengths that no part has, and a part of which the coarser photo shows too little.
+    /// Impossible lengths, and a part that is too small in the reduced photo.
     pub fn with_lengths(self, lengths: Lengths, max_pixels_per_m: f64) -> Result<Self> {
         lengths.check()?;
         let pixels_per_m = lengths.pixels_per_m.min(max_pixels_per_m);
@@ -37,7 +38,7 @@ fn resized(demonstration: TaughtDemonstration, factor: f64) -> Result<TaughtDemo
     let check = demonstration.check().clone();
     let TaughtDemonstration { cutout, marks, .. } = demonstration;
     let side = |length: u32| ((f64::from(length) * factor).round() as u32).max(1);
-    // Marks go with the pixels, of which there is a whole number.
+    // Marks are scaled by the ratio of the whole numbers of pixels.
     let factor = f64::from(side(cutout.width())) / f64::from(cutout.width());
     let marks = marks.resized(factor);
     let cutout = imageops::resize(&cutout, side(cutout.width()), side(cutout.height()), FilterType::Triangle);

@@ -5,34 +5,34 @@ use sdg_geometry::{PlanarGrasp, PosedCamera};
 
 use crate::GraspError;
 
-/// The heights that a photo cannot tell: known from the part, or measured once.
+/// The heights that a photo does not show: known from the part, or measured once.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GraspPlane {
-    /// Height of the marks' plane in the base frame, in metres. The original takes the table's height for it and so
-    /// misses by parallax; a part of 40 mm seen 150 px off the axis is then placed 11 mm wrong.
+    /// Height of the marks' plane in the base frame, in metres. The original uses the table's height and so has a
+    /// parallax error: 11 mm for a part of 40 mm seen 150 px off the axis.
     pub mark_height_m: f64,
     /// Height of the gripper's centre point when it closes, in the base frame, in metres.
     pub grasp_height_m: f64,
 }
 
-/// Where the gripper closes, and how wide the part is there.
+/// The grasp pose, and the width of the part there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GraspPose {
-    /// Takes the tool centre point's frame to the robot's base, metres: z points down to the table, y is the
-    /// direction in which the jaws close, x runs along the marked line.
+    /// Transform from the tool centre point's frame to the robot's base, metres: z points down to the table,
+    /// y is the closing direction of the jaws, x runs along the marked line.
     pub base_from_tcp: Isometry3<f64>,
     /// The part's width between the jaws, in metres.
     pub jaw_width_m: f64,
 }
 
 impl GraspPose {
-    /// Sends the grasp through the pinhole camera onto the grasp plane.
+    /// Projects the grasp through the pinhole camera onto the grasp plane.
     ///
     /// # Units and frames
     /// `grasp` in pixels of `camera`, whose world is the robot's base; `max_opening_m` is the gripper's stroke.
     ///
     /// # Errors
-    /// A ray that misses the plane, or a part wider than the gripper opens.
+    /// A ray that misses the plane, or a part wider than the gripper's opening.
     ///
     /// # Source
     /// Paper, section V-A (perception node); the original scales pixels by camera height / focal length instead.
@@ -50,7 +50,7 @@ impl GraspPose {
             })
         };
         let center = on_plane(grasp.center())?;
-        // A short step along the line, so that perspective does not bend the direction.
+        // A short step along the line, so that perspective does not change the direction.
         let (sin, cos) = grasp.angle.radians().sin_cos();
         let ahead = on_plane(grasp.center() + nalgebra::Vector2::new(cos, sin))?;
         let along = (ahead - center).normalize();
@@ -105,7 +105,7 @@ mod tests {
 
     #[test]
     fn a_turn_to_the_right_in_the_image_turns_the_gripper_with_it() {
-        // Image y points against base y here, so +90° in the image is the direction -y of the base.
+        // Image y is opposite to base y here, so that +90° in the image is the direction -y of the base.
         let grasp = PlanarGrasp { x: 320.0, y: 240.0, angle: Angle::from_degrees(90.0), width: 22.0 };
         let pose = GraspPose::from_planar(&half_a_metre_above(0.4, 0.0), &grasp, &PLANE, 0.08).unwrap();
         assert!((pose.base_from_tcp * Vector3::x() + Vector3::y()).norm() < 1e-9);

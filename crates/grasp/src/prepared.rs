@@ -1,12 +1,12 @@
-//! A demonstration made ready for pictures in which the part has about a known size.
+//! A demonstration prepared for pictures in which the part has a roughly known size.
 //!
 //! ```text
 //! cut-out ─ resized ─────────────┐
 //!                                ├─ the part is as large in both, and no larger than needed
 //! picture ─ halved some times ───┘
 //! ```
-//! A photo of a telephone shows a part by a thousand pixels; a quarter of them places it as well and takes a sixteenth of
-//! the time.
+//! A telephone's photo shows a part by a thousand pixels; a quarter of them places it equally well and takes a
+//! sixteenth of the time.
 
 use std::sync::{Arc, Mutex};
 
@@ -20,21 +20,22 @@ use crate::round_top::RoundTop;
 use crate::sizes::SizeRange;
 use crate::taught_marks::TaughtMarks;
 
-/// Largest extent of a part that is worked with, in pixels. Chosen for time: no more than a fraction of a pixel is lost.
+/// Largest extent of a part at the working resolution, in pixels. Chosen for time: it costs at most a fraction of a
+/// pixel.
 const MAX_EXTENT_PX: f64 = 256.0;
-/// Most that a cut-out is enlarged: pictures are halved rather. Chosen by hand, not measured.
+/// Largest enlargement of a cut-out; a picture that would need more is halved instead. Chosen by hand, not measured.
 const MAX_ENLARGEMENT: f64 = 1.19;
-/// Nearer to its own size than this, a cut-out stays as it is. Chosen by hand, not measured.
+/// A cut-out within this ratio of its own size is not resized. Chosen by hand, not measured.
 const SAME_SIZE: f64 = 0.02;
-/// Sizes that are kept ready: a stream of pictures has one or two.
+/// Number of cached sizes: a stream of pictures has one or two.
 const MAX_KEPT: usize = 4;
 
-/// How picture and cut-out are brought to one size.
+/// The resizing that gives picture and cut-out the same scale.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct WorkingSize {
-    /// How often the picture is halved.
+    /// Number of times the picture is halved.
     pub(crate) halvings: u32,
-    /// By how much the cut-out is resized.
+    /// Resizing factor of the cut-out.
     pub(crate) cutout_scale: f64,
 }
 
@@ -53,7 +54,7 @@ impl WorkingSize {
         Self { halvings, cutout_scale: if is_same { 1.0 } else { cutout_scale } }
     }
 
-    /// The picture's pixels for one of the halved picture's.
+    /// Picture pixels per pixel of the halved picture.
     pub(crate) fn shrink(&self) -> f64 {
         f64::from(1u32 << self.halvings)
     }
@@ -63,9 +64,9 @@ impl WorkingSize {
 #[derive(Debug)]
 pub(crate) struct Prepared {
     pub(crate) search: ShapeSearch,
-    /// `None` where there are too few edges about the marks, and for a part of revolution.
+    /// `None` if there are too few edges around the marks, and for a part of revolution.
     pub(crate) marks_shift: Option<MarksShift>,
-    /// Of a part of revolution alone.
+    /// For a part of revolution only.
     pub(crate) round_top: Option<RoundTop>,
 }
 
@@ -87,7 +88,7 @@ impl Prepared {
     }
 }
 
-/// The sizes of one demonstration that were asked for last. Made in milliseconds, and the same whenever they are made.
+/// The most recently used sizes of one demonstration. Each takes milliseconds, and is the same at any time.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct PreparedSizes {
     kept: Arc<Mutex<Vec<Kept>>>,
@@ -102,12 +103,12 @@ struct Kept {
 #[derive(Debug, Clone, PartialEq)]
 struct PreparedKey {
     cutout_scale: f64,
-    /// Sizes looked for, over the working size.
+    /// The range of sizes, relative to the working size.
     scales: std::ops::RangeInclusive<f64>,
 }
 
 impl PreparedSizes {
-    /// The demonstration for sizes in `range`, for pictures brought to `working`.
+    /// The demonstration for sizes in `range`, for pictures resized by `working`.
     ///
     /// # Errors
     /// A part with nothing to compare at that size.
@@ -119,7 +120,7 @@ impl PreparedSizes {
         range: &SizeRange,
         config: &SearchConfig,
     ) -> Result<Arc<Prepared>> {
-        // Over the cut-out as it was resized, in the halved picture.
+        // The pose of the resized cut-out in the halved picture.
         let over_working = |scale: &f64| scale / working.shrink() / working.cutout_scale;
         let scales = over_working(range.scales.start())..=over_working(range.scales.end());
         let key = PreparedKey { cutout_scale: working.cutout_scale, scales };
@@ -150,7 +151,7 @@ mod tests {
         assert_eq!(size(120.0, 1.01), WorkingSize { halvings: 0, cutout_scale: 1.0 });
         // 1000 px in the photo and in the picture: 250 of 256 px after two halvings.
         assert_eq!(size(1000.0, 1.0), WorkingSize { halvings: 2, cutout_scale: 0.25 });
-        // 60 px in the photo, 180 in the picture: 90 px in a picture halved once would enlarge the cut-out.
+        // 60 px in the photo, 180 in the picture: 90 px in a picture halved once would require an enlarged cut-out.
         assert_eq!(size(60.0, 3.0), WorkingSize { halvings: 2, cutout_scale: 0.75 });
         assert_eq!(size(300.0, 0.5), WorkingSize { halvings: 0, cutout_scale: 0.5 });
     }

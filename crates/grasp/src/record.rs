@@ -1,35 +1,35 @@
-//! A detection as other programs read it: what `sdg detect --json` prints and what the browser's page is handed.
+//! A detection for other programs: the output of `sdg detect --json`, and the input of the browser's page.
 
 use serde::Serialize;
 
 use crate::detection::GraspDetection;
 use crate::{Contributions, ModelKind, TurnSource};
 
-/// A [`GraspDetection`] under the names that files and programs rely on; pixels and degrees.
+/// A [`GraspDetection`] with the field names that files and programs rely on; pixels and degrees.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DetectionRecord {
     /// Calibrated, in `[0, 1]`: at least 0.5 is accepted.
     pub score: f64,
-    /// The network's own, in `[0, 1]`; null where no network was asked (model S).
+    /// The network's own, in `[0, 1]`; null without a network (model S).
     pub network_score: Option<f64>,
-    /// How well the demonstration agrees with the image, in `[0, 1]`; null without verification.
+    /// Agreement of the demonstration with the image, in `[0, 1]`; null without verification.
     pub agreement: Option<f64>,
     /// Left, top, right, bottom.
     #[serde(rename = "box")]
     pub bounds: [f64; 4],
-    /// x, y and the network's score of each; empty for models without.
+    /// x, y and the network's score of each; empty for models without keypoints.
     pub keypoints: Vec<[f64; 3]>,
     /// The outline's corners; absent without verification.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub polygon: Option<Vec<[f64; 2]>>,
     /// Grasp point, direction and width.
     pub grasp: GraspRecord,
-    /// What the turn was first read from.
+    /// The source of the first estimate of the turn.
     pub turn_source: TurnSource,
-    /// What the score is made of, in log-odds; absent without verification.
+    /// The contributions to the score, in log-odds; absent without verification.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub evidence: Option<Contributions>,
-    /// Why it is not accepted, in words; absent for what is.
+    /// The reason for a refusal, in words; absent for an accepted detection.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub refused: Option<&'static str>,
 }

@@ -1,7 +1,7 @@
-//! The part of a picture that is searched.
+//! The region of a picture that is searched.
 //!
-//! A part lies in the region where its grasp point does and at least half of its area. It is judged with everything about it, though it
-//! reaches out of the region (search_window.rs).
+//! A part lies in the region if its grasp point and at least half of its area do. It is judged together with its
+//! surroundings, even where it extends beyond the region (search_window.rs).
 
 use std::fmt;
 
@@ -9,34 +9,34 @@ use nalgebra::Point2;
 use sdg_geometry::{BoundingBox, PlanarSimilarity, Polygon};
 use serde::{Deserialize, Serialize};
 
-/// A part counts with at least this share of its area in the region: with less, most of it lies elsewhere. Chosen by hand.
+/// Minimum share of a part's area in the region. Chosen by hand.
 const MIN_SHARE: f64 = 0.5;
 
-/// A rectangle of a picture, of whole pixels: only parts in it are looked for.
+/// A rectangle of whole pixels in a picture: only parts in it are searched.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SearchRegion {
     /// Left edge.
     pub x: u32,
     /// Upper edge.
     pub y: u32,
-    /// Pixels across.
+    /// Width in pixels.
     pub width: u32,
-    /// Pixels down.
+    /// Height in pixels.
     pub height: u32,
     /// Width and height of the pictures for which it was given; `None` for pictures of any size.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub picture: Option<[u32; 2]>,
 }
 
-/// Why a region cannot be searched.
+/// The reason why a region cannot be searched.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum RegionError {
-    /// No pixel.
+    /// It has no pixel.
     #[error("expected a region of at least 1 × 1 pixels, found {region}")]
     Empty { region: SearchRegion },
-    /// It reaches out of the picture.
+    /// It extends beyond the picture.
     #[error("expected a region within the picture of {width} × {height} pixels, found {region}")]
     Outside { region: SearchRegion, width: u32, height: u32 },
     /// A picture of another size.
@@ -68,7 +68,7 @@ impl SearchRegion {
         Self { x, y, width, height, picture: None }
     }
 
-    /// The same for pictures of that width and height alone.
+    /// The same for pictures of that width and height only.
     pub fn of_picture(self, size: [u32; 2]) -> Self {
         Self { picture: Some(size), ..self }
     }
@@ -79,10 +79,10 @@ impl SearchRegion {
         BoundingBox { x1, y1, x2: x1 + width, y2: y1 + height }
     }
 
-    /// Whether it lies in a picture of this width and height, and is for it.
+    /// Whether it lies in a picture of this width and height, and is given for such pictures.
     ///
     /// # Errors
-    /// A region without pixels, one that reaches out of the picture, one that was given for pictures of another size.
+    /// A region without pixels, one that extends beyond the picture, one that was given for pictures of another size.
     pub fn check(&self, [width, height]: [u32; 2]) -> std::result::Result<(), RegionError> {
         self.check_pixels()?;
         if let Some([expected_width, expected_height]) = self.picture.filter(|expected| *expected != [width, height]) {
@@ -99,8 +99,8 @@ impl SearchRegion {
         if self.width == 0 || self.height == 0 { Err(RegionError::Empty { region: *self }) } else { Ok(()) }
     }
 
-    /// Whether a part with this outline, in its pixels, that is grasped at `grasp_point` lies in it: the point, and at least half of the
-    /// outline's area.
+    /// Whether a part with this outline, in its pixels, and this `grasp_point` lies in it: the point does, and at least
+    /// half of the outline's area.
     pub(crate) fn has(&self, grasp_point: &Point2<f64>, outline: &Polygon) -> bool {
         let BoundingBox { x1, y1, x2, y2 } = self.bounds();
         // The lower and right edges belong to the next region.

@@ -1,9 +1,9 @@
-//! Where the marks of a part of revolution lie in a picture.
+//! The position of the marks of a part of revolution in a picture.
 //!
-//! The outline of a screw that lies on its side is seen at the height of its axis, its marks on its upper side: higher by the part's
-//! own radius there. How far a camera sees them shifted follows from that; what surrounds them looks different in every roll and tells
-//! nothing. Where the part lies in the same roll, edges on its upper side agree, too, and hold its pose higher than the outline; the
-//! outline alone tells how much.
+//! The outline of a screw that lies on its side is at the height of its axis; its marks are on its upper side, higher
+//! by the part's radius there. This determines their shift in a camera's picture. Their surroundings differ in every
+//! roll and carry no information. If the part lies in the same roll, edges on its upper side also agree and hold its
+//! pose above the outline; the distance is found from the outline alone.
 
 use nalgebra::{Point2, Vector2};
 use sdg_geometry::PlanarSimilarity;
@@ -14,9 +14,9 @@ use crate::taught_marks::TaughtMarks;
 /// The marks on the upper side of a part of revolution.
 #[derive(Debug, Clone)]
 pub(crate) struct RoundTop {
-    /// How far above the axis they lie, in pixels of the cut-out.
+    /// Their height above the axis, in pixels of the cut-out.
     rise: f64,
-    /// The middle of the photo, in pixels of the cut-out.
+    /// The centre of the photo, in pixels of the cut-out.
     photo_middle: Point2<f64>,
 }
 
@@ -27,19 +27,20 @@ impl RoundTop {
         Self { rise, photo_middle: marks.photo_middle.map_or(marks.grasp.center(), Point2::from) }
     }
 
-    /// How far from the outline the camera sees the marks.
+    /// The shift of the marks relative to the outline in the camera's picture.
     ///
     /// # Units and frames
-    /// Pixels of the picture, the focal length too; `below_camera` is the point of the table straight below the camera.
+    /// Pixels of the picture, the focal length too; `below_camera` is the point of the table vertically below the
+    /// camera.
     fn shift(&self, focal_px: f64, below_camera: Point2<f64>, image_from_cutout: &PlanarSimilarity) -> Vector2<f64> {
         let nearer = self.rise * image_from_cutout.scale / focal_px;
         nearer * (image_from_cutout.apply(&self.photo_middle) - below_camera)
     }
 
-    /// `image_from_cutout`, which all edges agree on, shifted to where the camera sees the marks.
+    /// `image_from_cutout`, on which all edges agree, shifted to the position of the marks in the picture.
     ///
     /// # Units and frames
-    /// As for [`RoundTop::shift`]; `field` is of the picture.
+    /// As for [`RoundTop::shift`]; `field` belongs to the picture.
     pub(crate) fn placed(
         &self,
         search: &ShapeSearch,
@@ -59,12 +60,12 @@ mod tests {
 
     #[test]
     fn marks_go_outwards_by_their_height_over_the_distance() {
-        // Marks 12 px above the axis; the photo was taken with them below the camera.
+        // Marks 12 px above the axis; the camera was vertically above them for the photo.
         let top = RoundTop { rise: 12.0, photo_middle: Point2::new(40.0, 10.0) };
         let pose = PlanarSimilarity { tx: 460.0, ty: 90.0, scale: 1.25, ..PlanarSimilarity::IDENTITY };
         let at = pose.apply(&Point2::new(40.0, 10.0));
         let shift = top.shift(600.0, Point2::new(320.0, 240.0), &pose);
-        // 15 px of 600 px, of the distance from below the camera.
+        // 15 px of 600 px, of the distance from the point below the camera.
         let expected = 0.025 * (at - Point2::new(320.0, 240.0));
         assert!((shift - expected).norm() < 1e-9, "{shift}");
     }

@@ -1,7 +1,7 @@
-//! Bytes of a safetensors file, the same bytes for the same content.
+//! Writes a safetensors file; the same content gives the same bytes.
 //!
-//! The `safetensors` crate reads (and checks) what is written here. It writes its metadata in the order of a hash
-//! map, which differs from run to run; "the same seed, the same file" needs a writer with an order.
+//! The `safetensors` crate reads (and checks) these files. It writes metadata in the order of a hash map, which
+//! differs from run to run; for the same file from the same seed a writer with a fixed order is needed.
 
 use std::collections::BTreeMap;
 
@@ -13,7 +13,7 @@ use serde_json::{Map, Value, json};
 pub(crate) enum TensorBytes {
     /// Weights.
     F16(Vec<u8>),
-    /// Anything else, such as a picture's file.
+    /// Other data, such as a picture's file.
     U8(Vec<u8>),
 }
 
@@ -35,12 +35,12 @@ impl TensorBytes {
 pub(crate) fn values_from_halves(bytes: &[u8]) -> Vec<f32> {
     let halves: Vec<f16> = bytes.chunks_exact(2).map(|pair| f16::from_le_bytes([pair[0], pair[1]])).collect();
     let mut values = vec![0.0; halves.len()];
-    // Eight at a time, where the processor can.
+    // Eight at a time, if the processor supports it.
     halves.convert_to_f32_slice(&mut values);
     values
 }
 
-/// Puts a file together: header length, header, tensors in the order of their names.
+/// Assembles a file: header length, header, tensors in the order of their names.
 pub(crate) fn write(
     metadata: &BTreeMap<String, String>,
     tensors: &BTreeMap<String, (Vec<usize>, TensorBytes)>,
@@ -48,7 +48,7 @@ pub(crate) fn write(
     let mut header = Map::new();
     header.insert("__metadata__".to_owned(), json!(metadata));
     let mut offset = 0;
-    // Wider elements first: the format wants every tensor aligned to its element.
+    // Wider elements first: the format requires every tensor to be aligned to its element size.
     let in_file: Vec<_> = [true, false]
         .into_iter()
         .flat_map(|wide| tensors.iter().filter(move |(_, (_, bytes))| matches!(bytes, TensorBytes::F16(_)) == wide))

@@ -1,9 +1,10 @@
-//! What is cut out of an image to search a region of it.
+//! The window of an image that is cut out to search a region of it.
 //!
 //! ```text
 //! picture ─ region ─ region and a margin, cut out ─ searched ─ detections in pixels of the picture ─ those that lie in the region
 //! ```
-//! The margin is half the part's length, so that parts that reach out of the region are seen whole. What lies further out is not read.
+//! The margin is half the part's length, so that parts that extend beyond the region are complete in the window. Pixels
+//! further out are not read.
 
 use image::{RgbImage, imageops};
 use nalgebra::Point2;
@@ -17,19 +18,20 @@ use crate::taught::TaughtDemonstration;
 use crate::verification::Shot;
 use sdg_shape::PixelRect;
 
-/// What is cut out about the region, in lengths of the part: how far a part reaches out of which half lies in the region.
+/// Margin of the window around the region, in lengths of the part: the largest extent beyond the region of a part with
+/// half of its area inside.
 const MARGIN: f64 = 0.5;
-/// Pixels beyond that, for the gradients' smoothing. Chosen by hand.
+/// Additional pixels, for the gradients' smoothing. Chosen by hand.
 const BORDER_PX: f64 = 4.0;
-/// Corners of what is cut out lie at multiples of so many pixels of the halved picture, so that all levels of its pyramid have the pixels
-/// that the whole picture's have.
+/// Window corners are at multiples of this many pixels of the halved picture, so that all levels of its pyramid have
+/// the pixels of the whole picture's levels.
 const GRID_PX: u32 = 8;
 
-/// Whether a region can be searched, as far as that is known without a picture: for pixels, and where it says what pictures it is for,
-/// whether it lies in them and the part of demonstrations fits in.
+/// Whether a region can be searched, as far as that is known without a picture: it has pixels, it lies within the
+/// pictures for which it is given, if their size is given, and the demonstrations' part fits in.
 ///
 /// # Errors
-/// As [`SearchRegion::check`], and a region that the part does not fit in.
+/// As for [`SearchRegion::check`], and a region that the part does not fit in.
 pub(crate) fn check_region(region: &SearchRegion, demonstrations: Option<&Vec<TaughtDemonstration>>) -> Result<()> {
     let Some(picture) = region.picture else { return Ok(region.check_pixels()?) };
     region.check(picture)?;
@@ -39,7 +41,7 @@ pub(crate) fn check_region(region: &SearchRegion, demonstrations: Option<&Vec<Ta
     Ok(())
 }
 
-/// The part of an image that is cut out, and the size of the whole.
+/// The window of an image, and the size of the whole image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct SearchWindow {
     pub(crate) rect: PixelRect,
@@ -52,8 +54,8 @@ impl SearchWindow {
         Self { rect: PixelRect { left: 0, top: 0, width, height }, whole: [width, height] }
     }
 
-    /// What is to be seen of an image of size `whole` so that parts in `bounds`, in its pixels, are judged with all that is about them;
-    /// `region` is what the user gave.
+    /// The window of an image of size `whole` that contains everything needed to judge parts in `bounds`, in its
+    /// pixels; `region` is the user's.
     ///
     /// # Errors
     /// [`RegionError::SmallerThanPart`].
@@ -96,7 +98,7 @@ impl SearchWindow {
         imageops::crop_imm(image, left, top, width, height).to_image()
     }
 
-    /// How what is cut out was taken by a level camera.
+    /// The shot of the window by a level camera.
     pub(crate) fn shot(&self) -> Shot {
         let middle = |whole: u32, from: u32| 0.5 * f64::from(whole) - f64::from(from);
         let [width, height] = self.whole;
@@ -106,12 +108,12 @@ impl SearchWindow {
         }
     }
 
-    /// Moves from its pixels to those of the whole.
+    /// Moves from its pixels to those of the whole image.
     pub(crate) fn whole_from_window(&self) -> PlanarSimilarity {
         PlanarSimilarity::translation(f64::from(self.rect.left), f64::from(self.rect.top))
     }
 
-    /// What was found in it, in pixels of the whole.
+    /// Detections of the window, in pixels of the whole image.
     pub(crate) fn in_whole(&self, found: &mut Found) {
         let shift = self.whole_from_window();
         let PlanarSimilarity { tx, ty, .. } = shift;
@@ -133,7 +135,8 @@ impl SearchWindow {
     }
 }
 
-/// Length and width of a polygon: its longest distance, and that between the two parallel lines nearest to each other that it fits between.
+/// Length and width of a polygon: its longest distance, and the smallest distance between two parallel lines that
+/// enclose it.
 fn extents(polygon: &Polygon) -> [f64; 2] {
     let hull = convex_hull(polygon.vertices.iter().copied());
     let distances = hull.iter().flat_map(|a| hull.iter().map(move |b| (b - a).norm()));

@@ -1,14 +1,14 @@
-//! How large a part may be in a picture whose camera is not known.
+//! The possible sizes of a part in a picture of an uncalibrated camera.
 //!
-//! A photo and a picture may have other numbers of pixels because one was resized, or because one was cropped. Which, the
-//! files do not say, so both are tried: **same pixels**, a part covers as many pixels as in its photo, and **same frame**,
-//! it covers the same share of the picture. About each, sizes are free within the model's tolerance.
+//! A photo and a picture may have different numbers of pixels because one was resized or cropped. The files do not say
+//! which, so both hypotheses are tried: **same pixels**, a part covers as many pixels as in its photo, and **same
+//! frame**, it covers the same share of the picture. Around each, sizes vary within the model's tolerance.
 
 use std::ops::RangeInclusive;
 
 use sdg_geometry::{Angle, PlanarSimilarity};
 
-/// Sizes that are looked for at once, in pixels of the picture per pixel of the demonstration's photo.
+/// A range of sizes that is searched at once, in pixels of the picture per pixel of the demonstration's photo.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct SizeRange {
     pub(crate) scales: RangeInclusive<f64>,
@@ -16,16 +16,16 @@ pub(crate) struct SizeRange {
     nominal: Vec<f64>,
 }
 
-/// Hypotheses this near to each other are one. Chosen by hand, not measured.
+/// Hypotheses within this ratio are one. Chosen by hand, not measured.
 const SAME_LOG: f64 = 0.03;
-/// Ranges that overlap are searched at once if the largest size is at most so many times the smallest: one template, with its edges
-/// at one resolution, serves no more. At 3, drillscrews taught at three quarters of the pixels were found once in nine, at 1.9
-/// seven times. Chosen by hand between these two.
+/// Overlapping ranges are searched together if the largest size is at most this many times the smallest, because one
+/// template has its edges at one resolution. At 3, drillscrews taught at three quarters of the pixels were found in one
+/// of nine cases, at 1.9 in seven. Chosen by hand between these two.
 const MAX_RATIO: f64 = 1.9;
 
 impl SizeRange {
-    /// The ranges to look in, none of them overlapping another where one search can do for both; `photo` and `picture` are
-    /// width and height.
+    /// The ranges to search, merged where one search covers two overlapping ranges; `photo` and `picture` are width and
+    /// height.
     pub(crate) fn all(photo: Option<[u32; 2]>, picture: [u32; 2], tolerance: &RangeInclusive<f64>) -> Vec<Self> {
         let shorter = |[width, height]: [u32; 2]| f64::from(width.min(height));
         let same_frame = photo.map_or(1.0, |photo| shorter(picture) / shorter(photo));
@@ -43,12 +43,12 @@ impl SizeRange {
         vec![same_pixels, Self { scales: about(same_frame), nominal: vec![same_frame] }]
     }
 
-    /// Of several ranges the one that a scale lies in or least far outside of.
+    /// Of several ranges the one that contains a scale or is nearest to it.
     pub(crate) fn nearest(ranges: &[Self], scale: f64) -> Option<&Self> {
         ranges.iter().min_by(|a, b| a.distance(scale).total_cmp(&b.distance(scale)))
     }
 
-    /// The middle of the range, by ratio.
+    /// The geometric mean of the range.
     pub(crate) fn middle(&self) -> f64 {
         (self.scales.start() * self.scales.end()).sqrt()
     }
@@ -62,7 +62,7 @@ impl SizeRange {
             .unwrap_or_else(|| scale.ln())
     }
 
-    /// How far a scale lies outside, as a difference of ln; 0 inside.
+    /// Distance of a scale from the range, as a difference of ln; 0 inside.
     pub(crate) fn distance(&self, scale: f64) -> f64 {
         (self.scales.start() / scale).ln().max((scale / self.scales.end()).ln()).max(0.0)
     }

@@ -1,11 +1,11 @@
-//! A camera without calibration that looks at the table at a slant: the picture made level, searched, and what was found there
-//! brought back.
+//! A camera without calibration that looks at the table at a slant: the picture is rectified to a level view and
+//! searched, and the detections are mapped back.
 //!
 //! ```text
-//! level search ─ best places ─ how much they are shortened ─ slant ─ picture made level ─ search ─ worth more? ─ brought back
+//! level search ─ best places ─ their shortening ─ slant ─ rectified picture ─ search ─ better? ─ transformed back
 //! ```
-//! All parts lie on one plane, so a few sure places say for all how it lies. From one shortened part alone both ends of the slant
-//! can be the far one: the one under which the place agrees better with the photo is taken.
+//! All parts lie on one plane, so that a few sure places determine the slant for all. A single shortened part leaves
+//! open which end of the slant is the far one; the slant with the better agreement of the place with the photo is used.
 
 use image::RgbImage;
 use nalgebra::{Point2, Vector2};
@@ -16,31 +16,32 @@ use crate::detection::{Found, GraspDetection};
 use crate::sighting::Sighting;
 use crate::verification::{SearchedImage, Shot, agreement_in, foreshortening, usual_focal_px};
 
-/// Places that are asked, the best first, and what they agree by at least. Chosen by hand, for time.
+/// Number of places used, best first, and their minimum agreement. Chosen by hand, for time.
 const NUM_ASKED: usize = 4;
 const MIN_AGREEMENT: f64 = 0.25;
-/// A place of which fewer edges lie on crests tells nothing. Chosen by hand.
+/// Minimum share of edges on crests; a place below it carries no information. Chosen by hand.
 const MIN_CONSENSUS: f64 = 0.3;
-/// Spread of ln shortening about that of the slant. Chosen by hand.
+/// Standard deviation of ln shortening relative to that of the slant. Chosen by hand.
 const SHORTENING_NOISE: f64 = 0.12;
-/// A smaller tilt shortens by less than 3 %: as good as none.
+/// A smaller tilt shortens by less than 3 % and is ignored.
 const MIN_TILT: f64 = 0.24;
-/// What a slant must explain of the shortening that a level camera leaves: less is the noise of the fits. Chosen by hand, for time:
-/// whether the places agree better decides.
+/// Minimum share of the shortening, relative to a level camera, that a slant must explain: less is noise of the fits.
+/// Chosen by hand, for time; the agreement of the places decides.
 const MIN_EXPLAINED: f64 = 0.1;
-/// What a slanted place, and then the picture, must agree better than the level one. Of places that a camera slanted by 30° sees the
-/// best gains 0.07 to 0.16, of a level camera's at most 0.02 (tuned sets).
+/// Minimum gain of agreement over the level view, of a slanted place and then of the picture. For places seen by a
+/// camera slanted by 30° the best gains 0.07 to 0.16, for a level camera at most 0.02 (tuned sets).
 const SLANT_GAIN: f64 = 0.03;
-/// Where nothing is accepted in the level picture, a slant may as well make another part of the photo's, a longer one above all:
-/// then one must be sure. Of the tuned sets' pictures without the part three more would have a false alarm otherwise.
+/// If nothing is accepted in the level picture, a slant can also make another part, mainly a longer one, similar to the
+/// photo; then a sure detection is required. Otherwise three more of the tuned sets' pictures without the part would
+/// have a false alarm.
 const SURE: f64 = 0.9;
-/// The level picture reaches so far from its middle at most, in sides of the picture.
+/// Largest distance of the level picture's border from its centre, in sides of the picture.
 const MAX_REACH: f64 = 0.75;
-/// What is made level about a place, in sides of its box.
+/// Size of the rectified area around a place, in sides of its box.
 const MARGIN: f64 = 0.2;
 
-/// Whether what is found in the picture made level explains more than what is found in the picture itself. The scores do not tell:
-/// they are as high for a pose that is a little off.
+/// Whether the detections in the level picture explain more than those in the picture itself. Scores cannot decide:
+/// they are equally high for a pose with a small error.
 pub(crate) fn explains_more(slanted: &[Found], level: &[Found]) -> bool {
     fn accepted(found: &[Found]) -> impl Iterator<Item = &GraspDetection> {
         found.iter().map(|found| &found.detection).filter(|detection| detection.is_accepted())
@@ -50,8 +51,8 @@ pub(crate) fn explains_more(slanted: &[Found], level: &[Found]) -> bool {
     is_sure && worth(slanted) > worth(level) + SLANT_GAIN
 }
 
-/// A place that is shortened: where, from the picture's middle; how, as a vector that half a turn leaves as it is; and how much
-/// of it lies on edges.
+/// A shortened place: its position from the picture's centre; its shortening, as a vector that half a turn does not
+/// change; and its share of edge points on crests.
 struct Shortened {
     at: Vector2<f64>,
     shortening: Vector2<f64>,
@@ -63,8 +64,8 @@ fn shortening_vector(log_ratio: f64, direction: Angle) -> Vector2<f64> {
     log_ratio * Vector2::new(cos, sin)
 }
 
-/// The slant under which the best places would look as in the photo; `None` where the camera may as well be level. `shot` is that of a
-/// level camera.
+/// The slant under which the best places would look as in the photo; `None` if the camera may be level. `shot` is that
+/// of a level camera.
 pub(crate) fn suggested_slant(
     picture: &RgbImage,
     shot: &Shot,
@@ -95,7 +96,7 @@ pub(crate) fn suggested_slant(
     let is_opposite =
         |slant: &Slant| slant.tilt_rad >= MIN_TILT && slant.away.distance(likeliest.away).to_degrees() > 90.0;
     let other = least(&mut costs.iter().filter(|(_, slant)| is_opposite(slant))).map(|(_, slant)| slant);
-    // A few places made level are quick, the whole picture is not.
+    // Rectifying a few places is fast, rectifying the whole picture is not.
     let gain = |slant: &Slant| {
         let gains = best.iter().filter_map(|sighting| {
             let placed = &sighting.placed;
@@ -112,7 +113,7 @@ pub(crate) fn suggested_slant(
     (gain >= SLANT_GAIN).then_some(slant)
 }
 
-/// All that are tried: to 50°, every 2° of tilt and 10° of direction.
+/// All tried slants: to 50°, every 2° of tilt and 10° of direction.
 fn slants(focal_px: f64) -> impl Iterator<Item = Slant> {
     (0..=25).flat_map(move |tilt| {
         (0..if tilt == 0 { 1 } else { 36 }).map(move |direction| Slant {
@@ -123,7 +124,7 @@ fn slants(focal_px: f64) -> impl Iterator<Item = Slant> {
     })
 }
 
-/// How badly a slant explains the shortened places; one that it cannot explain counts no more than a bound.
+/// The residual of a slant for the shortened places; the residual of a place is bounded.
 fn cost(slant: &Slant, shortened: &[Shortened]) -> Option<f64> {
     let terms = shortened.iter().map(|place| {
         let (log_ratio, direction) = slant.shortening_at(place.at)?;
@@ -133,20 +134,20 @@ fn cost(slant: &Slant, shortened: &[Shortened]) -> Option<f64> {
     terms.sum()
 }
 
-/// The picture as a camera straight above the table would have taken it.
+/// The picture as a camera vertically above the table would have taken it.
 pub(crate) struct LevelImage {
     pub(crate) image: RgbImage,
     slant: Slant,
     /// Width and height of the picture, which may be a part of a larger one.
     size: [u32; 2],
-    /// How the picture was taken, were the camera level.
+    /// The shot of the picture if the camera were level.
     taken: Shot,
-    /// Where the middle of what the camera took is, in pixels of the level one.
+    /// The position of the centre of the camera's picture, in pixels of the level one.
     middle: Vector2<f64>,
 }
 
 impl LevelImage {
-    /// `None` where the picture shows the horizon.
+    /// `None` if the picture shows the horizon.
     pub(crate) fn new(picture: &RgbImage, taken: &Shot, slant: &Slant) -> Option<Self> {
         let (width, height) = picture.dimensions();
         let (width, height) = (f64::from(width), f64::from(height));
@@ -171,7 +172,7 @@ impl LevelImage {
         Self { image, ..made }
     }
 
-    /// Where the level image shows a point of the picture.
+    /// The position of a point of the picture in the level image.
     pub(crate) fn level_point(&self, seen: &Point2<f64>) -> Option<Point2<f64>> {
         let level = self.slant.level_from_picture(seen - self.taken.below_camera)?;
         Some(Point2::from(level + self.middle))
@@ -213,7 +214,7 @@ impl LevelImage {
         };
         let keypoints: Option<Vec<_>> =
             detection.keypoints.iter().map(|(point, score)| Some((self.point(point)?, *score))).collect();
-        // What tracking goes on from is the nearest pose that is not shortened.
+        // Tracking continues from the nearest pose without shortening.
         let picture_from_level = PlanarSimilarity::fit(&level_outline.vertices, &outline.vertices)?;
         let placement = placement.map(|mut placement| {
             placement.image_from_cutout = picture_from_level.compose(&placement.image_from_cutout);
@@ -225,7 +226,7 @@ impl LevelImage {
     }
 }
 
-/// Least and largest coordinates of the level points that are seen at some points of the picture, from its middle.
+/// Smallest and largest coordinates of the level points seen at some points of the picture, from its centre.
 fn level_bounds(taken: &Shot, slant: &Slant, points: &[Point2<f64>]) -> Option<[Vector2<f64>; 2]> {
     let mut bounds = [Vector2::repeat(f64::INFINITY), Vector2::repeat(f64::NEG_INFINITY)];
     for point in points {
@@ -249,8 +250,8 @@ mod tests {
         Vector2::from(size.map(|side| 0.5 * f64::from(side)))
     }
 
-    /// A dark plate of 110 × 60 pixels with two holes and a printed stripe, in the middle of the table and turned, at a point of the
-    /// table from its middle.
+    /// A dark plate of 110 × 60 pixels with two holes and a printed stripe, turned, at a point of the table relative to
+    /// its centre.
     fn color(level: Vector2<f64>) -> f64 {
         let (sin, cos) = 0.6f64.sin_cos();
         let [u, v] = [cos * level.x + sin * level.y, cos * level.y - sin * level.x];
@@ -283,7 +284,8 @@ mod tests {
         let seen = picture(|seen| slant.level_from_picture(seen));
         let made = LevelImage::new(&seen, &Shot::level(&seen), &slant).unwrap();
         let level = picture(Some);
-        // The plate and what lies about it; the level picture's middle lies elsewhere in the one made of the slanted.
+        // The plate and its surroundings; the level picture's centre is elsewhere in the one made from the slanted
+        // picture.
         let mut sum = 0.0;
         for (y, x) in (100..260).flat_map(|y| (160..320).map(move |x| (y, x))) {
             let at = Vector2::new(f64::from(x), f64::from(y)) - half(SIZE) + made.middle;

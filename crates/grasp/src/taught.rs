@@ -1,4 +1,4 @@
-//! A demonstration as a model keeps it: cut to the part, with everything that later images are compared with.
+//! A demonstration as a model keeps it: cropped to the part, with everything that is compared with later images.
 
 use image::RgbImage;
 use nalgebra::{Point2, Vector2};
@@ -15,18 +15,18 @@ use crate::sizes::SizeRange;
 use crate::taught_marks::TaughtMarks;
 use crate::{GraspError, NUM_KEYPOINTS};
 
-/// Pixels kept around the part, so that gradients at the outline have both their sides. Chosen by hand, not measured.
+/// Margin in pixels around the part, so that gradients at the outline have both sides. Chosen by hand, not measured.
 const MARGIN_PX: f64 = 16.0;
 
-/// The cut-out, its marks, and what is laid over images.
+/// The cut-out, its marks, and the data that are laid over images.
 #[derive(Debug, Clone)]
 pub struct TaughtDemonstration {
-    /// The photo, cut to the part and a margin.
+    /// The photo, cropped to the part and a margin.
     pub cutout: RgbImage,
     /// The marks on it.
     pub marks: TaughtMarks,
     prepared: PreparedSizes,
-    /// The cut-out without colours, for pictures that have none.
+    /// The cut-out without colours, for pictures without colours.
     gray: OnceLock<RgbImage>,
     prepared_gray: PreparedSizes,
     reference: OnceLock<Reference>,
@@ -35,10 +35,10 @@ pub struct TaughtDemonstration {
 }
 
 impl TaughtDemonstration {
-    /// Cuts a demonstration to its part.
+    /// Crops a demonstration to its part.
     ///
     /// # Errors
-    /// No grasp marked, or nothing in the outline to compare.
+    /// No grasp marked, or nothing to compare in the outline.
     pub fn new(demonstration: &Demonstration) -> Result<Self, GraspError> {
         let Annotation { label, bbox, jaw_width, outline, .. } = &demonstration.annotation;
         let grasp = *demonstration.annotation.require_grasp()?;
@@ -70,7 +70,8 @@ impl TaughtDemonstration {
         let outline = outline.as_ref().map(|o| Polygon { vertices: o.vertices.iter().map(moved).collect() });
         let grasp = GraspLine::new(moved(&grasp.start), moved(&grasp.end));
         let width_px = decimal(jaw_width.unwrap_or_else(|| {
-            // Without an outline, across the box, which overestimates: the gripper then opens wider than it must.
+            // Without an outline, the width is measured across the box, which overestimates it: the gripper then opens
+            // wider than necessary.
             grasp.opening_across(&outline.clone().unwrap_or_else(|| Polygon::from_box(&bbox)))
         }));
         Self::from_parts(
@@ -87,7 +88,7 @@ impl TaughtDemonstration {
         )
     }
 
-    /// Puts a kept demonstration together again.
+    /// Restores a stored demonstration.
     ///
     /// # Errors
     /// Nothing in the outline to compare.
@@ -107,13 +108,14 @@ impl TaughtDemonstration {
             finer_reference: OnceLock::new(),
             check,
         };
-        // What is wrong with a demonstration should come out here, not at the first picture.
+        // Errors of a demonstration are to appear here, not at the first picture.
         let own_size = &SizeRange::all(None, [1, 1], &made.check.search.scales)[0];
         made.prepared(own_size, Colors::There)?;
         Ok(made)
     }
 
-    /// Ready for pictures in which the part is as large as `range` says, with colours or without, and how those are to be resized.
+    /// Prepared for pictures in which the part has a size in `range`, with colours or without; also the resizing of
+    /// those pictures.
     ///
     /// # Errors
     /// A part with nothing to compare at that size.
@@ -131,25 +133,25 @@ impl TaughtDemonstration {
         Ok((working, prepared))
     }
 
-    /// How pictures are resized in which the part is as large as `range` says.
+    /// The resizing of pictures in which the part has a size in `range`.
     pub(crate) fn working(&self, range: &SizeRange) -> WorkingSize {
         let bounds = self.marks.region().bounds();
         WorkingSize::new(bounds.width().max(bounds.height()), range.middle())
     }
 
-    /// What the model's comparison network compares pictures with.
+    /// The data that the model's comparison network compares with pictures.
     pub(crate) fn reference(&self, config: &ComparisonConfig) -> &Reference {
         self.reference.get_or_init(|| Reference::new(&self.cutout, &self.marks.region(), config))
     }
 
-    /// The same in views of twice the pixels.
+    /// The same in views of twice the resolution.
     pub(crate) fn finer_reference(&self, config: &ComparisonConfig) -> &Reference {
         let made = || Reference::new(&self.cutout, &self.marks.region(), &config.finer());
         self.finer_reference.get_or_init(made)
     }
 
-    /// The same demonstration, compared and searched for otherwise. Files do not keep how: read from one, a demonstration
-    /// has the default.
+    /// The same demonstration with other settings of comparison and search. Files do not store them: a demonstration
+    /// read from a file has the defaults.
     ///
     /// # Errors
     /// A value out of range.
@@ -157,7 +159,7 @@ impl TaughtDemonstration {
         Self::with_config(self.cutout, self.marks, check)
     }
 
-    /// How it is compared and searched for.
+    /// The settings of its comparison and search.
     pub fn check(&self) -> &CheckConfig {
         &self.check
     }
@@ -167,13 +169,13 @@ impl TaughtDemonstration {
         self.marks.grasp.keypoints(NUM_KEYPOINTS)
     }
 
-    /// The grasp, where the cut-out lies in an image.
+    /// The grasp for a pose of the cut-out in an image.
     pub fn grasp(&self, image_from_cutout: &PlanarSimilarity) -> PlanarGrasp {
         let line = self.marks.grasp.transformed(image_from_cutout);
         PlanarGrasp::from_line(&line, self.marks.width_px * image_from_cutout.scale)
     }
 
-    /// The outline, where the cut-out lies in an image; the box's corners when no outline was drawn.
+    /// The outline for a pose of the cut-out in an image; the box's corners when no outline was drawn.
     pub fn outline(&self, image_from_cutout: &PlanarSimilarity) -> Polygon {
         self.marks.region().transformed(image_from_cutout)
     }

@@ -18,21 +18,21 @@ pub struct TaughtMarks {
     pub outline: Option<Polygon>,
     /// The part's width between the jaws: as marked, or measured across the outline.
     pub width_px: f64,
-    /// Width and height of the photo that the cut-out is from; `None` where it was resized since.
+    /// Width and height of the photo from which the cut-out comes; `None` if it was resized since.
     #[serde(default)]
     pub photo_size: Option<[u32; 2]>,
-    /// The middle of that photo, in pixels of the cut-out; `None` in files that do not have it.
+    /// The centre of that photo, in pixels of the cut-out; `None` in files without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub photo_middle: Option<[f64; 2]>,
 }
 
 impl TaughtMarks {
-    /// The outline; the box where none was drawn.
+    /// The outline; the box if none was drawn.
     pub fn region(&self) -> Polygon {
         self.outline.clone().unwrap_or_else(|| Polygon::from_box(&self.bbox))
     }
 
-    /// The marks on the cut-out made `factor` times as large.
+    /// The marks on the cut-out enlarged by `factor`.
     pub(crate) fn resized(&self, factor: f64) -> Self {
         let resize = scaling(factor);
         let BoundingBox { x1, y1, x2, y2 } = self.bbox;

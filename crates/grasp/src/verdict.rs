@@ -8,10 +8,11 @@
 //! resemblance ──────────────────┤  how much other things look like this part: known from teaching
 //! table, rim, added, mirror ────┘  what contradicts the part, without bounds
 //! ```
-//! Each kind of evidence is wrong in its own pictures: gloss spoils edges and surface, a covering hand hides half of the
-//! part, the network detects other parts as well. So each adds log-odds within bounds, and none of them alone takes a pose that all
-//! others support below 0.5. What contradicts the part does: bare table where it should be, no edge along its outline, more edges than it
-//! has, its mirror image fitting better. The weights are those of a logistic regression on generated parts ([`crate::fitting`]).
+//! Each kind of evidence is wrong in its own pictures: gloss spoils edges and surface, a covering hand hides half of
+//! the part, the network detects other parts as well. So each adds log-odds within bounds, and none of them alone moves
+//! a pose that all others support below 0.5. Contradictions of the part do: bare table where it should be, no edge
+//! along its outline, more edges than it has, a better fit of its mirror image. The weights are those of a logistic
+//! regression on generated parts ([`crate::fitting`]).
 
 use sdg_shape::{CloseLook, Evidence, RivalFit};
 use serde::Serialize;
@@ -19,38 +20,40 @@ use serde::Serialize;
 use crate::check_config::{ScoreConfig, Term};
 use crate::evidence_kind::{Advice, EvidenceKind};
 
-/// What each kind of evidence adds to a detection's log-odds: above 0 it speaks for the part, below 0 against it.
+/// The log-odds that each kind of evidence adds to a detection: above 0 it supports the part, below 0 it speaks against
+/// it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Contributions {
-    /// What the network proposes there, or that it proposes nothing; absent where no network was asked.
+    /// The network's proposal there, or its absence; absent without a network.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub network: Option<f64>,
-    /// How well the demonstration's edges agree with the image.
+    /// Agreement of the demonstration's edges with the image.
     pub edges: f64,
-    /// How well the colours inside the outline correlate; 0 where the demonstration's surface is plain.
+    /// Correlation of the colours inside the outline; 0 if the demonstration's surface is plain.
     pub surface: f64,
-    /// How near the hue is to the demonstration's.
+    /// Closeness of the hue to the demonstration's.
     pub hue: f64,
     /// The share of the part in regions that agree.
     pub visible: f64,
-    /// How far its size is from that of the surest detection in the picture, or from the part's where that is known.
+    /// Difference of its size from that of the best detection in the picture, or from the part's if that is known.
     pub size: f64,
     /// The share of the part outside the picture.
     pub outside: f64,
-    /// How much other things resemble this part.
+    /// Resemblance of other objects with this part.
     pub resemblance: f64,
-    /// The log-odds of the small network whose input is photo and picture laid over each other; its least where edges and surface agree
-    /// too little for it to be asked.
+    /// The log-odds of the small network whose input is photo and picture laid over each other; its minimum if edges
+    /// and surface agree too little for its evaluation.
     pub likeness: f64,
-    /// What the network that knows parts from their look-alikes says, where it is sure; 0 where it is not, or was not asked.
+    /// The output of the network that distinguishes parts from their look-alikes, if it is sure; otherwise, or if it
+    /// was not evaluated, 0.
     pub details: f64,
     /// Table where the part should be.
     pub table: f64,
-    /// The share of the outline with no edge.
+    /// The share of the outline without an edge.
     pub rim: f64,
-    /// Edges inside the outline that the photo does not have.
+    /// Edges inside the outline that are absent from the photo.
     pub added: f64,
-    /// How much better the mirror image fits where it differs from the photo.
+    /// The difference by which the mirror image fits better where it differs from the photo.
     pub mirror: f64,
 }
 
@@ -75,21 +78,21 @@ impl Contributions {
         ])
     }
 
-    /// The evidence that speaks most against the part, or least for it.
+    /// The strongest evidence against the part, or the weakest for it.
     fn weakest(&self) -> Option<(EvidenceKind, f64)> {
         self.by_kind().min_by(|a, b| a.1.total_cmp(&b.1))
     }
 
-    /// The evidence that speaks most against the part; `None` where none does.
+    /// The strongest evidence against the part; `None` if there is none.
     pub fn strongest_objection(&self) -> Option<EvidenceKind> {
         let (kind, log_odds) = self.weakest()?;
         (log_odds < 0.0).then_some(kind)
     }
 
-    /// The evidence that speaks against the part: first the strongest objection, then each that says clearly less for the part
-    /// than it could by `config`, the greatest loss first.
+    /// The evidence against the part: first the strongest objection, then each that supports the part clearly less than
+    /// it could by `config`, the greatest loss first.
     pub fn objections(&self, config: &ScoreConfig) -> Vec<EvidenceKind> {
-        /// Less than this is lost in clear views, too. Chosen by hand.
+        /// Smaller losses also occur in clear views. Chosen by hand.
         const MIN_LOSS: f64 = 0.5;
         let strongest = self.strongest_objection();
         let mut lost: Vec<(EvidenceKind, f64)> = self
@@ -102,10 +105,10 @@ impl Contributions {
         strongest.into_iter().chain(lost.into_iter().map(|(kind, _)| kind)).collect()
     }
 
-    /// The further demonstration, or the setting, that would help where this is the part after all; `light` is its
-    /// brightness over that of the demonstration. `None` where no photo would.
+    /// The further demonstration, or the setting, that would help if this is the part after all; `light` is its
+    /// brightness over that of the demonstration. `None` if no photo would help.
     pub(crate) fn advice(&self, light: f64) -> Option<Advice> {
-        // Beyond these the light is another one. Chosen by hand, not measured.
+        // Outside this range the light differs. Chosen by hand, not measured.
         const DARKER: f64 = 0.6;
         const BRIGHTER: f64 = 1.6;
         match self.strongest_objection()? {
@@ -119,26 +122,27 @@ impl Contributions {
     }
 }
 
-/// What is known of a detection before it is scored.
+/// The known facts of a detection before it is scored.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Clues {
     pub(crate) evidence: Evidence,
     /// ln of its size over the nearest nominal size.
     pub(crate) log_size: f64,
-    /// ln of how much likelier the network's score there is on the part than elsewhere; `None` where it was not asked.
+    /// ln of the likelihood ratio of the network's score there, on the part over elsewhere; `None` if it was not
+    /// evaluated.
     pub(crate) network: Option<f64>,
-    /// Mean agreement of other things with the part.
+    /// Mean agreement of other objects with the part.
     pub(crate) resemblance: f64,
 }
 
-/// Photo and rival must differ in this share of the photo's edges.
+/// Minimum share of the photo's edges in which photo and rival must differ.
 const MIN_RIVALS_SHARE: f64 = 0.03;
 
-/// Who is less sure than this is no reference for the size of others. Chosen by hand, not measured.
+/// Minimum score of the size reference. Chosen by hand, not measured.
 const MIN_REFERENCE_SCORE: f64 = 0.3;
 
-/// The scores of all detections in one picture and where they come from: first each is judged alone, then by the size of
-/// the surest among them, since the parts of one picture are equally far from the camera.
+/// The scores of all detections in one picture and their contributions. Each is first judged alone, then by the size of
+/// the best among them, since the parts of one picture are equally far from the camera.
 pub(crate) fn judge_picture(clues: &[Clues], config: &ScoreConfig) -> Vec<(f64, Contributions)> {
     let surest = || {
         clues
@@ -167,7 +171,7 @@ pub(crate) fn judge_picture_of_sequence(
 fn judge(clues: &Clues, reference_log_size: Option<f64>, config: &ScoreConfig) -> (f64, Contributions) {
     let seen = &clues.evidence;
     let off_size = reference_log_size.map_or(0.0, |reference| (clues.log_size - reference).powi(2));
-    // What was not looked at closely has no such evidence.
+    // Without a close look there is no such evidence.
     let closely =
         |term: &Term, value: &dyn Fn(&CloseLook) -> f64| seen.close.map_or(0.0, |close| term.log_odds(value(&close)));
     let contributions = Contributions {
@@ -193,10 +197,11 @@ fn judge(clues: &Clues, reference_log_size: Option<f64>, config: &ScoreConfig) -
     (1.0 / (1.0 + (-log_odds).exp()), contributions)
 }
 
-/// By how much the rival fits better, as far as it fits at all: in another light, or rolled, a part fits neither; 0 where the two differ too
-/// little to tell.
+/// The difference by which the rival fits better, as far as it fits at all (in another light, or rolled, a part fits
+/// neither); 0 if the two differ too little.
 pub(crate) fn rivals_gain(rival: RivalFit) -> f64 {
-    /// A rival that fits no better than this explains nothing, one that fits by the second all. Chosen on the tuned sets and parts.
+    /// Up to the first value of its fit a rival explains nothing, from the second on everything. Chosen on the tuned
+    /// sets and parts.
     const FITS: [f64; 2] = [0.5, 0.7];
     let explains = ((rival.fit - FITS[0]) / (FITS[1] - FITS[0])).clamp(0.0, 1.0);
     if rival.share < MIN_RIVALS_SHARE { 0.0 } else { -rival.margin * explains }
@@ -211,7 +216,7 @@ pub(crate) mod tests {
         CloseLook { likeness, details: Some(1.5), bare: 0.0, fit: 0.75, no_rim: 0.02, added: 0.0, mirrored: None }
     }
 
-    /// A clear view of the part: what right poses have in the median on generated parts.
+    /// A clear view of the part: the medians of right poses on generated parts.
     fn clear() -> Clues {
         let evidence = Evidence {
             edges: 0.79,
@@ -247,7 +252,7 @@ pub(crate) mod tests {
         let best = |term: &Term| term.range.map(|value| term.log_odds(value)).into_iter().fold(f64::MIN, f64::max);
         let worst = |term: &Term| term.range.map(|value| term.log_odds(value)).into_iter().fold(f64::MAX, f64::min);
         let config = ScoreConfig::DEFAULT;
-        // The network is not always asked: without it the others must carry.
+        // The network is not always evaluated: without it the others must suffice.
         for asked in [true, false] {
             let terms: Vec<_> = config.terms().into_iter().filter(|(name, _)| asked || *name != "network").collect();
             for (name, term) in &terms {
@@ -284,7 +289,7 @@ pub(crate) mod tests {
         let judged = judge_picture(&[far, sure, near], &ScoreConfig::DEFAULT);
         assert_eq!(judged[1].1.size, 0.0);
         assert!(judged[0].0 < judged[2].0 - 0.2, "{judged:?}");
-        // Alone, either has the size that it has.
+        // Alone, each determines its own reference size.
         assert_eq!(judge_picture(&[far], &ScoreConfig::DEFAULT)[0].1.size, 0.0);
     }
 
@@ -310,7 +315,7 @@ pub(crate) mod tests {
         let config = ScoreConfig::DEFAULT;
         let objections = |clues: &Clues| judge(clues, None, &config).1.objections(&config);
         assert_eq!(objections(&hidden)[0], EvidenceKind::Visible);
-        // The strongest objection first; what only says less for the part than it could comes after it.
+        // The strongest objection first; then the evidence that only supports the part less than it could.
         let of_covered = objections(&covered);
         assert!(
             of_covered.contains(&EvidenceKind::Visible) && of_covered.contains(&EvidenceKind::Edges),

@@ -1,10 +1,11 @@
-//! The check by the demonstration: laid over the image where a model proposes or where the search leads, and refined.
+//! Verification by the demonstration: it is laid over the image at a model's proposals and at the search's matches, and
+//! refined.
 //!
 //! ```text
 //! picture ─ halved for each size that is looked for ─ SearchedImage ─┬─ search: the whole picture ──┬─ PlacedDemonstration
 //! network ─ PoseCandidate ───────────────────────────────────────────┴─ verify: about the candidate ┘  {pose, Evidence}
 //! ```
-//! [`crate::verdict`] makes a score of the evidence.
+//! [`crate::verdict`] computes a score from the evidence.
 
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -22,22 +23,23 @@ use crate::prepared::{Prepared, WorkingSize};
 use crate::sizes::{SizeRange, scaling};
 use crate::taught::TaughtDemonstration;
 
-/// An image and the demonstrations that are looked for in it, at every size that they may have.
+/// An image and the demonstrations that are searched in it, at every possible size.
 pub(crate) struct SearchedImage<'a> {
     views: Vec<View<'a>>,
     sized: Vec<SizedDemonstration<'a>>,
 }
 
-/// How an image was taken, as far as that is known without a calibration.
+/// The imaging conditions, as far as they are known without a calibration.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Shot {
-    /// Width and height of the picture that it was taken as, by which nominal sizes go.
+    /// Width and height of the original picture, which determine nominal sizes.
     pub(crate) size: [u32; 2],
-    /// The point of the table straight below the camera, in pixels of the image.
+    /// The point of the table vertically below the camera, in pixels of the image.
     pub(crate) below_camera: Point2<f64>,
 }
 
-/// Focal length of a camera in widths of the picture, where nothing tells it: 49° across, as a telephone's. Chosen by hand.
+/// Default focal length of a camera in widths of the picture, if nothing gives it: 49° across, as in a telephone.
+/// Chosen by hand.
 const FOCAL_WIDTHS: f64 = 1.1;
 
 /// Focal length of the camera that took a picture of this width and height, in pixels.
@@ -46,7 +48,7 @@ pub(crate) fn usual_focal_px(size: [u32; 2]) -> f64 {
 }
 
 impl Shot {
-    /// Of a camera that looks straight down.
+    /// Of a camera that looks vertically down.
     #[cfg(any(feature = "teach", test))]
     pub(crate) fn level(image: &RgbImage) -> Self {
         let (width, height) = image.dimensions();
@@ -54,7 +56,7 @@ impl Shot {
     }
 }
 
-/// The image, halved some times, with its gradients, which every comparison reads.
+/// The image, halved several times, with its gradients, which every comparison reads.
 struct View<'a> {
     halvings: u32,
     below_camera: Point2<f64>,
@@ -82,14 +84,14 @@ struct SizedDemonstration<'a> {
 }
 
 impl<'a> SearchedImage<'a> {
-    /// Makes every demonstration ready for the image's size. One that shows nothing to compare at some size is not looked
-    /// for at that size.
+    /// Prepares every demonstration for the image's size. A demonstration that shows nothing to compare at some size is
+    /// not searched at that size.
     #[cfg(feature = "teach")]
     pub(crate) fn new(image: &'a RgbImage, demonstrations: &'a [TaughtDemonstration]) -> Self {
         Self::of(image, &Shot::level(image), demonstrations)
     }
 
-    /// The same of an image that was not taken from straight above.
+    /// The same for an image that was not taken vertically from above.
     pub(crate) fn of(image: &'a RgbImage, shot: &Shot, demonstrations: &'a [TaughtDemonstration]) -> Self {
         let mut searched = Self { views: Vec::new(), sized: Vec::new() };
         let colors = Colors::of(image);
@@ -114,13 +116,13 @@ impl<'a> SearchedImage<'a> {
         searched
     }
 
-    /// A demonstration within the sizes that are nearest to one.
+    /// A demonstration in the range of sizes nearest to one.
     fn sized_for(&self, demonstration_idx: usize, scale: f64) -> Option<&SizedDemonstration<'a>> {
         let of_it = self.sized.iter().filter(|sized| sized.demonstration_idx == demonstration_idx);
         of_it.min_by(|a, b| a.range.distance(scale).total_cmp(&b.range.distance(scale)))
     }
 
-    /// The index of the image halved so often.
+    /// The index of the image halved this many times.
     fn view(&mut self, image: &'a RgbImage, shot: &Shot, halvings: u32, demonstration: &TaughtDemonstration) -> usize {
         if let Some(idx) = self.views.iter().position(|view| view.halvings == halvings) {
             return idx;
@@ -144,7 +146,7 @@ pub(crate) struct PlacedDemonstration<'a> {
     pub(crate) demonstration: &'a TaughtDemonstration,
     pub(crate) demonstration_idx: usize,
     pub(crate) image_from_cutout: PlanarSimilarity,
-    /// The same for the marks and what surrounds them, which may be shifted against the outline.
+    /// The same for the marks and their surroundings, which may be shifted relative to the outline.
     pub(crate) image_from_marks: PlanarSimilarity,
     /// Whether the image has colours.
     pub(crate) colors: Colors,
@@ -153,7 +155,7 @@ pub(crate) struct PlacedDemonstration<'a> {
     pub(crate) evidence: Evidence,
     /// ln of its size over the nearest nominal size.
     pub(crate) log_size: f64,
-    /// Mean brightness there over that of the demonstration.
+    /// Mean brightness there divided by that of the demonstration.
     pub(crate) light: f64,
 }
 
@@ -164,15 +166,15 @@ impl PlacedDemonstration<'_> {
     }
 }
 
-/// How near to an end of the sizes, in ln, a pose may have been kept from going on, and by how much it must then agree better beyond.
-/// Chosen by hand.
+/// Distance from an end of the size range, in ln, within which a pose may have been stopped by it, and the gain of
+/// agreement beyond it that shows this. Chosen by hand.
 const AT_END: f64 = 0.02;
 const BETTER_BEYOND: f64 = 0.05;
-/// Of a pose that agrees less, which is refused, the marks are not looked for. Chosen by hand, for time.
+/// Minimum agreement for searching the marks; poses below it are refused. Chosen by hand, for time.
 const MIN_MARKED: f64 = 0.3;
 
 impl<'a> SizedDemonstration<'a> {
-    /// The pose in which the halved picture shows the resized cut-out, and back.
+    /// The pose of the resized cut-out in the halved picture, and back.
     fn view_from_working(&self, image_from_cutout: &PlanarSimilarity) -> PlanarSimilarity {
         let view_from_image = scaling(1.0 / self.working.shrink());
         view_from_image.compose(image_from_cutout).compose(&scaling(1.0 / self.working.cutout_scale))
@@ -182,7 +184,7 @@ impl<'a> SizedDemonstration<'a> {
         scaling(self.working.shrink()).compose(view_from_working).compose(&scaling(self.working.cutout_scale))
     }
 
-    /// Whether what was found at an end of the sizes that are looked for agrees better beyond it: then it is another part.
+    /// Whether a match at an end of the size range agrees better beyond it: then it is another part.
     fn is_of_other_size(&self, view: &View<'_>, view_from_working: &PlanarSimilarity, agreement: f64) -> bool {
         let scales = self.prepared.search.scales();
         let from_end =
@@ -203,8 +205,8 @@ impl<'a> SizedDemonstration<'a> {
         evidence: Evidence,
     ) -> PlacedDemonstration<'a> {
         let image_from_cutout = self.image_from_cutout(view_from_working);
-        // In the plane of the marks nothing is displaced, and a shift along a rod is held by nothing: of 40 pictures by another
-        // camera three were off by 7 to 8 mm with it, and 2 to 4 mm without (pendulum, rod end).
+        // In the plane of the marks nothing is displaced, and nothing limits a shift along a rod: of 40 pictures by
+        // another camera three had errors of 7 to 8 mm with it, and 2 to 4 mm without (pendulum, rod end).
         let is_flat = self.demonstration.check().score.is_size_known || agreement < MIN_MARKED;
         let marks_shift = self.prepared.marks_shift.as_ref().filter(|_| !is_flat);
         let round_top = self.prepared.round_top.as_ref().filter(|_| !is_flat);
@@ -231,8 +233,9 @@ impl<'a> SizedDemonstration<'a> {
 }
 
 impl SizedDemonstration<'_> {
-    /// The pose of marks that stand higher or lower than the outline, and the agreement and evidence of the part as if they did not;
-    /// `None` where they stand in its plane, or the part would then agree less: something else drew them away.
+    /// The pose of marks above or below the outline, and the agreement and evidence of the part without their
+    /// displacement; `None` if they are in its plane, or if the part would then agree less, because something else
+    /// attracted them.
     fn raised(
         &self,
         view: &View<'_>,
@@ -258,7 +261,7 @@ impl SizedDemonstration<'_> {
     }
 }
 
-/// Every place in the image where a demonstration agrees well enough to be mentioned.
+/// Every place in the image where a demonstration agrees well enough to be listed.
 pub(crate) fn search<'a>(searched: &SearchedImage<'a>) -> Vec<PlacedDemonstration<'a>> {
     let mut found = Vec::new();
     for sized in &searched.sized {
@@ -274,12 +277,12 @@ pub(crate) fn search<'a>(searched: &SearchedImage<'a>) -> Vec<PlacedDemonstratio
     found
 }
 
-/// Lays the demonstration over the image where the candidate is, both ways round, and returns the better one; `None` where
-/// its size there is not looked for.
+/// Lays the demonstration over the image at the candidate, in both directions, and returns the better one; `None` if
+/// its size there is outside the search range.
 ///
-/// Keypoints give place and turn well, but a short grasp line gives the scale badly, so the box decides that: the
-/// start takes the scale at which the outline is as large as the detected box. A network that mistakes one end of a
-/// part for the other is half a turn off; the demonstration sees which end it is.
+/// Keypoints give position and turn well, but a short grasp line gives the scale badly, so that the box determines
+/// it: the start takes the scale at which the outline is as large as the detected box. A network that confuses the
+/// part's ends is wrong by half a turn; the demonstration distinguishes the ends.
 pub(crate) fn verify<'a>(candidate: &PoseCandidate, searched: &SearchedImage<'a>) -> Option<PlacedDemonstration<'a>> {
     let of_it = searched.sized.iter().filter(|sized| sized.demonstration_idx == candidate.demonstration_idx);
     let demonstration = of_it.clone().next()?.demonstration;
@@ -291,8 +294,8 @@ pub(crate) fn verify<'a>(candidate: &PoseCandidate, searched: &SearchedImage<'a>
     better_way_round(sized, &start, searched)
 }
 
-/// Refined from `start` and from half a turn further; the one that agrees better, refined by edges and surface. `None` where it has a size that is
-/// not looked for: that is another part.
+/// Refined from `start` and from half a turn further; returns the one of better agreement, refined by edges and
+/// surface. `None` if its size is outside the search range: that is another part.
 fn better_way_round<'a>(
     sized: &SizedDemonstration<'a>,
     start: &PlanarSimilarity,
@@ -313,7 +316,8 @@ fn better_way_round<'a>(
     scales.contains(&refined.scale).then(|| sized.placed(view, &refined, agreement, comparison.evidence(&refined)))
 }
 
-/// How much a placed demonstration is shortened, its direction in the image; `None` where its size there is not looked for.
+/// The shortening of a placed demonstration, and its direction in the image; `None` if its size there is outside the
+/// search range.
 pub(crate) fn foreshortening(searched: &SearchedImage<'_>, placed: &PlacedDemonstration<'_>) -> Option<Foreshortening> {
     let sized = searched.sized_for(placed.demonstration_idx, placed.image_from_cutout.scale)?;
     let view = &searched.views[sized.view_idx];
@@ -321,8 +325,8 @@ pub(crate) fn foreshortening(searched: &SearchedImage<'_>, placed: &PlacedDemons
     sized.prepared.search.template().foreshortening(&view.field, &pose)
 }
 
-/// How well edges and surface agree where a placed demonstration lies in a window that was made level, refined there; `None` where
-/// its size is not looked for.
+/// The agreement of edges and surface of a placed demonstration in a rectified window, refined there; `None` if its
+/// size is outside the search range.
 pub(crate) fn agreement_in(
     searched: &SearchedImage<'_>,
     placed: &PlacedDemonstration<'_>,
@@ -343,7 +347,8 @@ pub(crate) fn agreement_in(
     Some(comparison.agreement(&comparison.refined_by_edges(&pose)).both())
 }
 
-/// Where picture and demonstration differ at a pose, in pixels of the picture; `None` where its size is not looked for.
+/// Where picture and demonstration differ at a pose, in pixels of the picture; `None` if its size is outside the search
+/// range.
 pub(crate) fn differences(
     searched: &SearchedImage<'_>,
     demonstration_idx: usize,
@@ -360,7 +365,7 @@ pub(crate) fn differences(
     Some(differences)
 }
 
-/// `pose` turned and scaled about the middle of the outline in the image.
+/// `pose` turned and scaled about the centre of the outline in the image.
 fn about_middle(
     demonstration: &TaughtDemonstration,
     pose: &PlanarSimilarity,

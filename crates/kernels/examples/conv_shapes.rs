@@ -1,4 +1,4 @@
-//! Where the time of an R50-FPN backbone at 480×640 goes: each of its convolutions alone, forwards, weights packed.
+//! Times of an R50-FPN backbone at 480×640: each of its convolutions alone, forwards, with packed weights.
 //!
 //! `cargo run --release -p sdg-kernels --example conv_shapes`
 
@@ -7,7 +7,7 @@ use std::time::Instant;
 use burn::tensor::{Device, Distribution, Tensor};
 use sdg_kernels::{Conv2dParams, conv2d};
 
-/// Name, how often, channels in and out, map in, kernel, stride.
+/// Name, count, channels in and out, input map, kernel, stride.
 type Case = (&'static str, usize, [usize; 2], [usize; 2], usize, usize);
 
 fn main() {
@@ -45,7 +45,7 @@ fn main() {
     let (mut all_ms, mut all_gflop) = (0.0, 0.0);
     for (name, count, [channels_in, channels_out], [height, width], kernel, stride) in cases {
         let x = Tensor::<4>::random([1, channels_in, height, width], Distribution::Default, &device);
-        // Through a convolution, so that it stands as the backbone's own maps do.
+        // From a convolution, so that its memory layout is that of the backbone's own maps.
         let eye = Tensor::<2>::eye(channels_in, &device).reshape([channels_in, channels_in, 1, 1]);
         let x = conv2d(x, eye, None, Conv2dParams::square(1, 0));
         let shape = [channels_out, channels_in, kernel, kernel];

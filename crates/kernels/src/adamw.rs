@@ -1,7 +1,7 @@
 //! AdamW's update of one parameter, its gradient clipped by its norm.
 //!
-//! Composed of tensor operations an update reads and writes its moments a dozen times, on one thread: a fifth of the
-//! `edge` preset's training step. Here three passes do it on all cores: norm, moments, value.
+//! Composed of tensor operations, an update reads and writes its moments a dozen times, on one thread: a fifth of
+//! the `edge` preset's training step. Here three passes do it on all cores: norm, moments, value.
 //!
 //! Source: Loshchilov and Hutter, Decoupled Weight Decay Regularization (2019).
 
@@ -15,17 +15,17 @@ use crate::parallel::{Output, for_each_unit};
 use crate::params::AdamWParams;
 use crate::simd::{Isa, widest};
 
-/// Values a unit of work has: what it reads and writes of them is some 300 KB.
+/// Values per unit of work: its reads and writes are about 300 KB.
 const UNIT: usize = 16 * 1024;
 
 /// The parameter and its moments after a step.
 ///
 /// # Shapes
-/// `param` and `grad` are alike; `moments` is `[2, number of values]`: the running means of the gradient and of its
-/// squares, zeros (or `None`) before the first step. No gradient is tracked.
+/// `param` and `grad` have the same shape; `moments` is `[2, number of values]`: the running means of the gradient
+/// and of its squares, zeros (or `None`) before the first step. No gradient is tracked.
 ///
 /// # Panics
-/// Where the shapes are others.
+/// For other shapes.
 pub fn adamw<const D: usize>(
     param: Tensor<D>,
     grad: Tensor<D>,
@@ -48,7 +48,7 @@ pub fn adamw<const D: usize>(
     (value.reshape(shape), moments)
 }
 
-/// Both moments after a step, one behind the other, as `moments` are.
+/// Both moments after a step, one after the other, in the layout of `moments`.
 pub(crate) fn moments_after(isa: Isa, grad: &[f32], moments: &[f32], params: AdamWParams) -> Vec<f32> {
     let count = grad.len();
     let factor = clip_factor(isa, grad, params.max_norm);
@@ -64,7 +64,7 @@ pub(crate) fn moments_after(isa: Isa, grad: &[f32], moments: &[f32], params: Ada
     unsafe { output.into_vec() }
 }
 
-/// The values after a step whose moments are known.
+/// The values after a step with known moments.
 pub(crate) fn value_after(isa: Isa, values: &[f32], moments: &[f32], params: AdamWParams) -> Vec<f32> {
     let count = values.len();
     let (firsts, seconds) = moments.split_at(count);
@@ -79,7 +79,7 @@ pub(crate) fn value_after(isa: Isa, values: &[f32], moments: &[f32], params: Ada
     unsafe { output.into_vec() }
 }
 
-/// What the gradient is multiplied by.
+/// The factor of the gradient.
 fn clip_factor(isa: Isa, grad: &[f32], max_norm: Option<f32>) -> f32 {
     let Some(max_norm) = max_norm else { return 1.0 };
     let units = grad.len().div_ceil(UNIT);
@@ -132,7 +132,7 @@ widest! {
 
 widest! {
     fn sum_of_squares(values: &[f32]) -> f32 {
-        // Sixteen sums side by side: a vector of them, in an order that no instruction set changes.
+        // Sixteen parallel sums: a vector of them, in an order that no instruction set changes.
         let mut sums = [0.0_f32; 16];
         let chunks = values.chunks_exact(sums.len());
         let rest: f32 = chunks.remainder().iter().map(|value| value * value).sum();
@@ -225,7 +225,7 @@ mod tests {
         let grad = Tensor::<2>::ones([3, 40], &device);
         let (value, moments) =
             adamw(Tensor::zeros([3, 40], &device), grad.clone(), None, AdamWParams { step: 1, ..PARAMS });
-        // All gradients alike: every value goes the whole step.
+        // All gradients equal: every value moves by the whole step.
         let first: Vec<f32> = value.clone().into_data().try_to_vec().unwrap();
         assert!(first.iter().all(|value| (value + 0.01).abs() < 1e-6), "{first:?}");
         let (value, _) = adamw(value, grad, Some(moments), AdamWParams { step: 2, ..PARAMS });

@@ -1,4 +1,4 @@
-//! The extension on `Autodiff<Flex>`: what is kept for the backward pass, and which gradients are computed.
+//! The extension on `Autodiff<Flex>`: the state kept for the backward pass, and the computed gradients.
 
 use std::cell::RefCell;
 use std::collections::HashSet;
@@ -68,7 +68,7 @@ impl<C: CheckpointStrategy> KernelBackend for Autodiff<Flex, C> {
         let output = convolved(Direction::Forward, &x, weight.clone(), epilogue, &shape, keep);
         match prepared {
             OpsKind::Tracked(prep) => {
-                // Each operand is kept only where the other's gradient is wanted.
+                // Each operand is kept only if the other's gradient is required.
                 let kept = Conv2dKept {
                     x: weight_tracked.then_some(x),
                     weight: x_tracked.then_some(weight),
@@ -125,7 +125,7 @@ impl<C: CheckpointStrategy> KernelBackend for Autodiff<Flex, C> {
         if !all_f32([features.primitive(), rois.primitive()]) {
             return composed::roi_align::<Self>(features, rois, params);
         }
-        // ROIs are constants: they are no parent of the crops.
+        // ROIs are constants: they are not parents of the crops.
         let rois = rois.into_primitive().to_contiguous();
         let shape = shape4(features.primitive());
         let prepared = RoiAlignBackward.prepare::<C>([features.node()]).compute_bound().stateful();
@@ -246,11 +246,11 @@ impl<C: CheckpointStrategy> KernelBackend for Autodiff<Flex, C> {
 }
 
 thread_local! {
-    /// Nodes that operations of this crate gave a gradient, and that none of them has taken it from.
+    /// Nodes that got a gradient from an operation of this crate that has not been taken yet.
     static GIVEN: RefCell<HashSet<u64>> = RefCell::default();
 }
 
-/// The gradient of a node's output, to be gone on with.
+/// The gradient of a node's output, for the rest of the backward pass.
 macro_rules! consumed {
     ($grads:ident, $node:expr) => {{
         GIVEN.with_borrow_mut(|given| given.remove(&$node.id.value));
@@ -258,12 +258,12 @@ macro_rules! consumed {
     }};
 }
 
-/// What a map was given before, if it was given by this crate: taken away, to be given back with more.
+/// The earlier gradient of a map, if it came from this crate: it is taken out, to be stored again with more added.
 ///
-/// burn adds a second gradient to the first by itself, but reads both in the order of their shape, which for maps that
-/// stand channels last is the slowest: a tenth of a training step of the `edge` preset. A macro, since a node's type has
-/// no name outside burn. Of a leaf, whose gradient is asked for after the pass, nothing can be taken away; its
-/// requirement is not that of an operation's node.
+/// burn itself adds a second gradient to the first, but reads both in the order of their shape, which is the slowest
+/// for channels-last maps: a tenth of a training step of the `edge` preset. This is a macro because a node's type has
+/// no name outside burn. The gradient of a leaf, which is read after the pass, cannot be taken out; its requirement
+/// differs from that of an operation's node.
 macro_rules! given_before {
     ($grads:ident, $ops_node:expr, $parent:expr) => {{
         let first = GIVEN.with_borrow_mut(|given| given.insert($parent.id.value));
@@ -272,7 +272,7 @@ macro_rules! given_before {
     }};
 }
 
-/// Gives a map its gradient, `[N, C, H, W]` that stands channels last.
+/// Gives a map its gradient, `[N, C, H, W]` in channels-last layout.
 macro_rules! give {
     ($grads:ident, $ops_node:expr, $parent:expr, $gradient:expr) => {{
         let gradient = $gradient;
@@ -284,20 +284,20 @@ macro_rules! give {
     }};
 }
 
-/// The sum of two maps that stand channels last.
+/// The sum of two channels-last maps.
 fn sum(a: &FlexTensor, b: &FlexTensor) -> FlexTensor {
     tensor_channels_last(elementwise::sum(Isa::detect(), last_values(a), last_values(b)), shape4(a))
 }
 
 const KEPT: &str = "an operand is kept where the other is tracked";
 
-/// What a convolution's gradients need.
+/// The data for a convolution's gradients.
 #[derive(Clone, Debug)]
 struct Conv2dKept {
     x: Option<FlexTensor>,
     weight: Option<FlexTensor>,
     scale: Option<FlexTensor>,
-    /// Where a ReLU follows.
+    /// If a ReLU follows.
     output: Option<FlexTensor>,
     shape: ConvShape,
     keep: Keep,
@@ -350,8 +350,8 @@ impl Backward<Flex, 4> for Conv2dBackward {
     }
 }
 
-/// A transposed convolution's output has the place of the convolution's input, so the gradients change
-/// places too.
+/// A transposed convolution's output corresponds to the convolution's input, so that the gradients are
+/// exchanged, too.
 #[derive(Debug)]
 struct ConvTranspose2dBackward;
 
@@ -443,7 +443,7 @@ impl Backward<Flex, 1> for RoiAlignBackward {
     }
 }
 
-/// What the gradients of a group normalisation need.
+/// The data for the gradients of a group normalisation.
 #[derive(Clone, Debug)]
 struct GroupNormKept {
     x: FlexTensor,
@@ -527,7 +527,7 @@ impl Backward<Flex, 1> for UpsampleBackward {
 struct PermuteBackward;
 
 impl Backward<Flex, 1> for PermuteBackward {
-    /// The order that leads back.
+    /// The inverse order.
     type State = Arc<[usize]>;
 
     fn backward(self, ops: Ops<Self::State, 1>, grads: &mut Gradients, _: &mut Checkpointer) {

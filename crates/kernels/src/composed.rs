@@ -1,7 +1,7 @@
 //! The operations as compositions of burn's own tensor operations, on any backend.
 //!
 //! They are the default bodies of [`KernelBackend`](crate::KernelBackend), and the reference of the
-//! kernels' tests. They are right, differentiable, and make no attempt at speed.
+//! kernels' tests. They are correct and differentiable, but not optimised for speed.
 
 use burn::backend::ops::{ConvOptions, ConvTransposeOptions};
 use burn::backend::tensor::FloatTensor;
@@ -109,9 +109,9 @@ pub fn permute_maps<B: Backend>(x: FloatTensor<B>, order: &[usize]) -> FloatTens
     B::float_select(x, 0, B::int_from_data(TensorData::new(indices, [count]), &device))
 }
 
-/// [`roi_align`](crate::roi_align()) by two matrix products an image, one per axis.
+/// [`roi_align`](crate::roi_align()) by two matrix products per image, one per axis.
 ///
-/// Holds `R·C·Ph·W` floats at a time, R the most ROIs of one image.
+/// Needs `R·C·Ph·W` floats at a time, with R the maximum number of ROIs of one image.
 pub fn roi_align<B: Backend>(features: FloatTensor<B>, rois: FloatTensor<B>, params: RoiAlignParams) -> FloatTensor<B> {
     let shape = features.shape();
     let [num_images, channels, height, width] = [shape[0], shape[1], shape[2], shape[3]];
@@ -167,7 +167,7 @@ pub fn roi_align<B: Backend>(features: FloatTensor<B>, rois: FloatTensor<B>, par
         crops.push(B::float_permute(crop, &[0, 2, 1, 3]));
     }
     let crops = B::float_cat(crops, 0);
-    // Back from the order of images to that of the ROIs; in 32 bits, since graphics cards may have no wider integers.
+    // From the order of images back to that of the ROIs; in 32 bits, because graphics cards may have no wider integers.
     let order: Vec<i32> = row_of_roi.iter().map(|&row| row as i32).collect();
     let order = TensorData::new(order, [bins.len()]);
     B::float_select(crops, 0, B::int_from_data(order, &device))
@@ -207,7 +207,7 @@ pub fn upsample_nearest_2x<B: Backend>(x: FloatTensor<B>) -> FloatTensor<B> {
     B::float_reshape(x, Shape::from(vec![n, c, 2 * h, 2 * w]))
 }
 
-/// [`cosines`](crate::cosines()) by a product of the two maps for every shift of one against the other.
+/// [`cosines`](crate::cosines()) by a product of the two maps for every relative shift.
 pub fn cosines<B: Backend>(one: FloatTensor<B>, other: FloatTensor<B>, params: CosineParams) -> FloatTensor<B> {
     let CosineParams { reach, epsilon } = params;
     let shape = one.shape();

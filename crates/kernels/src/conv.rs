@@ -1,7 +1,7 @@
 //! Two-dimensional convolution and its transpose.
 //!
-//! Results stand channels last in memory, whatever their shape says: what is convolved again, normalised, pooled or
-//! cropped by this crate is then read where it stands. Operations of burn take them as they take any permuted tensor.
+//! Results have the channels-last layout in memory, for any shape: further convolutions, normalisations, poolings and
+//! crops of this crate then read them in place. Operations of burn accept them like any permuted tensor.
 //!
 //! Shapes: N images, Ci channels in, Co channels out, a kernel of Kh × Kw, maps of Hi × Wi and Ho × Wo.
 
@@ -31,16 +31,16 @@ mod tests;
 /// `Ho = (Hi + 2·padding − Kh) / stride + 1`, rounded down.
 ///
 /// # Panics
-/// Where the shapes do not fit each other, a dimension or stride is 0, or the kernel is larger than the
-/// padded input.
+/// If the shapes do not match, a dimension or stride is 0, or the kernel is larger than the padded
+/// input.
 pub fn conv2d(x: Tensor<4>, weight: Tensor<4>, bias: Option<Tensor<1>>, params: Conv2dParams) -> Tensor<4> {
     conv2d_fused(x, weight, bias, params, Conv2dEpilogue::default())
 }
 
-/// What else is done to a convolution's result before it is written: `activation(scale · conv + bias + residual)`.
+/// Further operations on a convolution's result before it is written: `activation(scale · conv + bias + residual)`.
 #[derive(Clone, Debug, Default)]
 pub struct Conv2dEpilogue {
-    /// A factor for each channel, `[Co]`, such as that of a frozen batch norm. A constant: no gradient reaches it.
+    /// A factor for each channel, `[Co]`, such as that of a frozen batch norm. It is a constant without a gradient.
     pub scale: Option<Tensor<1>>,
     /// A summand of the result's shape.
     pub residual: Option<Tensor<4>>,
@@ -48,13 +48,13 @@ pub struct Conv2dEpilogue {
     pub activation: Activation,
 }
 
-/// [`conv2d`] with what follows it, in one pass over the result.
+/// [`conv2d`] with an epilogue, in one pass over the result.
 ///
 /// # Shapes
 /// As for [`conv2d`].
 ///
 /// # Panics
-/// As [`conv2d`], and where the epilogue's shapes are others.
+/// As for [`conv2d`], and if the epilogue's shapes do not match.
 pub fn conv2d_fused(
     x: Tensor<4>,
     weight: Tensor<4>,
@@ -105,7 +105,7 @@ pub fn conv2d_fused(
     ))
 }
 
-/// Stands where the extension's methods want a tensor that there is not.
+/// Placeholder for an absent tensor in the extension's methods.
 fn absent<const D: usize>(x: &Tensor<4>) -> Tensor<D> {
     Tensor::zeros([1; D], (&x.device(), x.dtype()))
 }
@@ -117,7 +117,7 @@ fn absent<const D: usize>(x: &Tensor<4>) -> Tensor<D> {
 /// the result is `[N, Co, Ho, Wo]` with `Ho = (Hi − 1)·stride + Kh − 2·padding`.
 ///
 /// # Panics
-/// Where the shapes do not fit each other, a dimension or stride is 0, or the padding leaves no output.
+/// If the shapes do not match, a dimension or stride is 0, or the padding leaves no output.
 pub fn conv_transpose2d(x: Tensor<4>, weight: Tensor<4>, bias: Option<Tensor<1>>, params: Conv2dParams) -> Tensor<4> {
     let [_, in_channels, in_height, in_width] = x.dims();
     let [weight_channels, out_channels, kernel_height, kernel_width] = weight.dims();
@@ -156,8 +156,8 @@ fn check_parameters(name: &str, x: [usize; 4], weight: [usize; 4], params: Conv2
     );
 }
 
-/// The extension's methods take tensors, not options of tensors, so an absent bias is zeros, which no
-/// gradient reaches.
+/// The extension's methods take tensors, not options of tensors, so that an absent bias is a tensor
+/// of zeros without a gradient.
 fn bias_or_zeros(name: &str, bias: Option<Tensor<1>>, out_channels: usize, x: &Tensor<4>) -> Tensor<1> {
     match bias {
         Some(bias) => {

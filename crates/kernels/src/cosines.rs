@@ -1,7 +1,8 @@
-//! Cosines between each cell of a map and the cells about it in another: the correlation by which two views are compared.
+//! Cosines between each cell of a map and the neighbouring cells of another: the correlation by which two views are
+//! compared.
 //!
-//! Composed of tensor operations, every shift of the two maps against each other writes all their products and reads them
-//! again to add them up. Here a row of sums stays in registers.
+//! Composed of tensor operations, every relative shift of the two maps writes all their products and reads them again
+//! for summation. Here a row of sums stays in registers.
 //!
 //! Legend: C channels of a map of H × W cells, reach r; a shift is (dy, dx) from (−r, −r) to (r, r), row by row.
 
@@ -16,16 +17,21 @@ use crate::parallel::{Output, SharedSlice, for_each_unit};
 use crate::params::CosineParams;
 use crate::simd::{Isa, widest};
 
-/// The cosine between each cell of `one` and the cells up to `reach` cells away in `other`; 0 beyond the border. `epsilon`
-/// is added to the square of a cell's length, so that a cell without features has a direction of zero.
+/// The cosine between each cell of `one` and the cells up to `reach` cells away in `other`; 0 beyond the border.
+/// `epsilon` is added to the square of a cell's length, so that a cell without features has the direction zero.
 ///
 /// # Shapes
 /// `one` and `other` are `[N, C, H, W]`; the result is `[N, (2 reach + 1)², H, W]`.
 ///
 /// # Panics
-/// Where the shapes differ.
+/// If the shapes differ.
 pub fn cosines(one: Tensor<4>, other: Tensor<4>, reach: usize, epsilon: f32) -> Tensor<4> {
-    assert!(one.dims() == other.dims(), "cosines: expected maps alike, found {:?} and {:?}", one.dims(), other.dims());
+    assert!(
+        one.dims() == other.dims(),
+        "cosines: expected maps of the same shape, found {:?} and {:?}",
+        one.dims(),
+        other.dims()
+    );
     let params = CosineParams { reach, epsilon };
     Tensor::from_dispatch(Dispatch::kernel_cosines(one.into_dispatch(), other.into_dispatch(), params))
 }
@@ -44,12 +50,12 @@ pub(crate) struct Kept {
 struct UnitMaps {
     /// `[N, C, H, W]`; of the other maps with `reach` cells of zeros on each side.
     values: Vec<f32>,
-    /// Lengths of the cells before they were divided by them, `[N, H, W]`.
+    /// Lengths of the cells before normalisation, `[N, H, W]`.
     lengths: Vec<f32>,
 }
 
 impl UnitMaps {
-    /// Of maps whose values stand channels last, `[N, H, W, C]`.
+    /// From channels-last maps, `[N, H, W, C]`.
     fn new(isa: Isa, values: &[f32], [num_images, channels, height, width]: [usize; 4], epsilon: f32) -> Self {
         let pixels = height * width;
         let mut values = channels_last(isa, values, num_images, pixels, channels);
@@ -62,7 +68,7 @@ impl UnitMaps {
     }
 }
 
-/// The cosines of maps whose values stand channels last, `[N, H, W, C]`; the result is `[N, (2 reach + 1)², H, W]`.
+/// The cosines of channels-last maps, `[N, H, W, C]`; the result is `[N, (2 reach + 1)², H, W]`.
 pub(crate) fn forward(
     isa: Isa,
     one: &[f32],
@@ -93,7 +99,7 @@ pub(crate) fn forward(
     (unsafe { output.into_vec() }, Kept { one, other, shape, reach })
 }
 
-/// The gradients of both maps, `[N, C, H, W]`, out of that of the cosines, `[N, (2 reach + 1)², H, W]`.
+/// The gradients of both maps, `[N, C, H, W]`, from that of the cosines, `[N, (2 reach + 1)², H, W]`.
 pub(crate) fn backward(isa: Isa, grad: &[f32], kept: &Kept) -> [Vec<f32>; 2] {
     let Kept { one, other, shape: [num_images, channels, height, width], reach } = kept;
     let (channels, height, width, reach) = (*channels, *height, *width, *reach);
@@ -133,7 +139,7 @@ pub(crate) fn backward(isa: Isa, grad: &[f32], kept: &Kept) -> [Vec<f32>; 2] {
     grads
 }
 
-/// Row `at` of all rows of maps, `[M, H, W]`, that have `reach` further cells on each side.
+/// Row `at` of all rows of maps, `[M, H, W]`, that have `reach` additional cells on each side.
 fn inner_row(padded: &[f32], at: usize, [height, width]: [usize; 2], reach: usize) -> &[f32] {
     let (map, row) = (at / height, at % height);
     let start = (map * (height + 2 * reach) + row + reach) * (width + 2 * reach) + reach;
@@ -173,7 +179,8 @@ widest! {
 }
 
 widest! {
-    // Makes of the gradient of a map's cells of length 1 that of the map: with u the cell and l its length, (g − u (u · g)) / l.
+    // Converts the gradient with respect to a map's cells of length 1 to that with respect to the map: with u the cell
+    // and l its length, (g − u (u · g)) / l.
     fn through_lengths(grad: &mut [f32], unit: &[f32], lengths: &[f32]) -> () {
         let pixels = lengths.len();
         let mut dots = vec![0.0f32; pixels];
@@ -199,7 +206,7 @@ widest! {
 }
 
 widest! {
-    // A row of sums over channels, which stand `steps` apart in the two maps.
+    // A row of sums over channels, which are `steps` apart in the two maps.
     fn products(target: &mut [MaybeUninit<f32>], maps: [&[f32]; 2], steps: [usize; 2], channels: usize) -> () {
         /// Sums that stay in registers.
         const BLOCK: usize = 16;

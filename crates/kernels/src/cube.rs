@@ -1,9 +1,8 @@
-//! The extension on burn's `Cube`, which is every device that CubeCL compiles for: wgpu's and CUDA's.
+//! The extension on burn's `Cube`, which covers every device that CubeCL compiles for: wgpu's and CUDA's.
 //!
-//! burn's own operations are fast there, so the composed defaults serve, but for ROIAlign: its default asks the device
-//! for the ROIs and so waits, once for every level of the pyramid and every head, until all that was ordered before is
-//! done. A kernel of ours reads them where they are. Gradients go through the default, whose matrix products burn knows
-//! how to differentiate.
+//! burn's own operations are fast there, so that the composed defaults suffice, except for ROIAlign: its default reads
+//! the ROIs from the device and so waits, once for every level of the pyramid and every head, until all earlier work is
+//! done. Our kernel reads them on the device. Gradients use the default, whose matrix products burn can differentiate.
 
 use burn::backend::Cube;
 use burn::backend::tensor::FloatTensor;

@@ -1,4 +1,4 @@
-//! Passes over maps that stand channels last, `[P, C]` for P positions of all images.
+//! Passes over channels-last maps, `[P, C]` for P positions of all images.
 
 use std::mem::MaybeUninit;
 
@@ -6,7 +6,7 @@ use crate::parallel::{Output, SharedSlice, for_each_unit};
 use crate::scratch::Scratch;
 use crate::simd::{Isa, transpose, widest};
 
-/// Positions that are summed in `f32` before they go into an `f64`.
+/// Number of positions that are summed in `f32` before they are added to an `f64`.
 const CHUNK: usize = 512;
 
 /// Sums over positions, the gradient with respect to a bias.
@@ -18,7 +18,7 @@ pub(crate) fn channel_sums(isa: Isa, values: &[f32], channels: usize) -> Vec<f32
     })
 }
 
-/// The gradient where a ReLU let its value through, and its sums over positions.
+/// The gradient where a ReLU passed its value, and its sums over positions.
 pub(crate) fn relu_gradient(isa: Isa, grad: &[f32], output: &[f32], channels: usize) -> (Vec<f32>, Vec<f32>) {
     let masked = Output::new(grad.len());
     let sums = sum_chunks(grad.len() / channels, channels, |positions, sums| {
@@ -102,7 +102,7 @@ pub(crate) fn channels_last(isa: Isa, values: &[f32], num_images: usize, channel
         let start = image * channels * pixels;
         // SAFETY: every unit has its own pixels.
         let target = unsafe { output.range(start + range.start * channels, range.len() * channels) };
-        // SAFETY: floats that are written by the transposition, all of them, and read by nobody before.
+        // SAFETY: floats that are all written by the transposition, and not read before.
         let target = unsafe { std::slice::from_raw_parts_mut(target.as_mut_ptr().cast::<f32>(), target.len()) };
         let source = &values[start + range.start..start + channels * pixels];
         transpose(isa, source, pixels, target, channels, channels, range.len());
@@ -138,7 +138,7 @@ widest! {
 widest! {
     fn mask(target: &mut [MaybeUninit<f32>], grad: &[f32], output: &[f32]) -> () {
         for ((target, grad), output) in target.iter_mut().zip(grad).zip(output) {
-            // Written so that a NaN output lets the gradient through.
+            // Written so that a NaN output passes the gradient.
             target.write(if *output <= 0.0 { 0.0 } else { *grad });
         }
     }

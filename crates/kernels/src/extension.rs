@@ -15,9 +15,9 @@ use crate::params::{Conv2dParams, FusedConv2dParams};
 
 /// Backends that run this crate's operations.
 ///
-/// The default bodies are differentiable compositions, so that implementing the trait for another backend
-/// takes no more than `impl KernelBackend for That {}`. Shapes were checked by the functions on
-/// [`Tensor`](burn::tensor::Tensor) that call these methods.
+/// The default bodies are differentiable compositions, so that another backend needs only `impl
+/// KernelBackend for That {}`. Shapes were checked by the functions on [`Tensor`](burn::tensor::Tensor)
+/// that call these methods.
 #[backend_extension(
     Flex,
     NdArray: cfg(feature = "ndarray"),
@@ -25,7 +25,7 @@ use crate::params::{Conv2dParams, FusedConv2dParams};
     Autodiff: cfg(feature = "autodiff")
 )]
 pub trait KernelBackend: Backend {
-    /// See [`conv2d_fused`](crate::conv2d_fused). Where `params` say that there is no scale or residual, those are
+    /// See [`conv2d_fused`](crate::conv2d_fused). If `params` say that there is no scale or residual, those are
     /// tensors of one zero.
     fn kernel_conv2d(
         x: FloatTensor<Self>,
@@ -57,7 +57,7 @@ pub trait KernelBackend: Backend {
         composed::roi_align::<Self>(features, rois, params)
     }
 
-    /// See [`group_norm_residual`](crate::group_norm_residual). Where `params` say that there is no residual, it is a
+    /// See [`group_norm_residual`](crate::group_norm_residual). If `params` say that there is no residual, it is a
     /// tensor of one zero.
     fn kernel_group_norm(
         x: FloatTensor<Self>,

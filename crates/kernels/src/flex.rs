@@ -1,4 +1,4 @@
-//! The extension on `Flex`: tensors to slices and back, and which kernel runs.
+//! The extension on `Flex`: conversion between tensors and slices, and the choice of the kernel.
 
 use std::sync::Arc;
 
@@ -64,7 +64,7 @@ impl KernelBackend for Flex {
         if !all_f32([&x, &weight, &bias]) {
             return composed::conv_transpose2d::<Self>(x, weight, bias, params);
         }
-        // A transposed convolution is what carries a convolution's gradient back to its input.
+        // A transposed convolution carries a convolution's gradient back to its input.
         let shape = ConvShape::transposed(shape4(&x), shape4(&weight), params);
         let (x, bias) = (channels_last(x), bias.to_contiguous());
         let epilogue = Epilogue { bias: Some(values(&bias)), ..Epilogue::default() };
@@ -181,7 +181,7 @@ impl KernelBackend for Flex {
     }
 }
 
-/// Convolves a tensor that stands channels last, in either direction.
+/// Convolves a channels-last tensor, in either direction.
 pub(crate) fn convolved(
     direction: Direction,
     source: &FlexTensor,
@@ -191,7 +191,7 @@ pub(crate) fn convolved(
     keep: Keep,
 ) -> FlexTensor {
     let isa = Isa::detect();
-    // A copy would be another tensor each time, not worth remembering.
+    // A copy would be another tensor each time, not worth caching.
     let keep = if weight.is_contiguous() { keep } else { Keep::No };
     let weight = weight.to_contiguous();
     let filters = |winograd| packed::filters(isa, &weight, shape, direction, winograd, keep);

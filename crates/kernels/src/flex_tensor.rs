@@ -1,4 +1,4 @@
-//! Values of flex's tensors, and maps that stand channels last in them.
+//! Values of flex's tensors, and channels-last maps in them.
 
 use burn::backend::TensorMetadata;
 use burn::backend::flex::{FlexTensor, Layout};
@@ -17,7 +17,7 @@ pub(crate) fn values(tensor: &FlexTensor) -> &[f32] {
     tensor.as_slice().expect("made contiguous and known to be f32 by the caller")
 }
 
-/// A tensor that takes the values over.
+/// A tensor that takes ownership of the values.
 pub(crate) fn tensor<const D: usize>(values: Vec<f32>, shape: [usize; D]) -> FlexTensor {
     let layout = Layout::contiguous(Shape::from(shape));
     FlexTensor::new(Bytes::from_elems(values), layout, DType::F32)
@@ -29,7 +29,7 @@ pub(crate) fn shape4(tensor: &FlexTensor) -> [usize; 4] {
     [shape[0], shape[1], shape[2], shape[3]]
 }
 
-/// Steps between the elements of a `[N, C, H, W]` tensor that stands channels last.
+/// Strides of a channels-last `[N, C, H, W]` tensor.
 fn channels_last_strides([_, channels, height, width]: [usize; 4]) -> [usize; 4] {
     [height * width * channels, 1, width * channels, channels]
 }
@@ -37,12 +37,12 @@ fn channels_last_strides([_, channels, height, width]: [usize; 4]) -> [usize; 4]
 fn is_channels_last(tensor: &FlexTensor) -> bool {
     let shape = shape4(tensor);
     let strides = tensor.layout().strides();
-    // Along an axis of one element no step is taken.
+    // The stride of an axis of one element is not used.
     let fits = |axis: usize| shape[axis] == 1 || strides[axis] == channels_last_strides(shape)[axis] as isize;
     (0..4).all(fits)
 }
 
-/// The same tensor, standing channels last.
+/// The same tensor in channels-last layout.
 pub(crate) fn channels_last(tensor: FlexTensor) -> FlexTensor {
     if is_channels_last(&tensor) {
         return tensor;
@@ -54,7 +54,8 @@ pub(crate) fn channels_last(tensor: FlexTensor) -> FlexTensor {
     tensor_channels_last(moved, shape)
 }
 
-/// The same tensor, contiguous. A transposed matrix, as the gradient of a fully connected layer is, is turned by our own kernel.
+/// The same tensor, contiguous. A transposed matrix, such as the gradient of a fully connected layer, is transposed by
+/// our own kernel.
 pub(crate) fn contiguous(tensor: FlexTensor) -> FlexTensor {
     let shape = tensor.shape();
     let strides = tensor.layout().strides();
@@ -67,14 +68,14 @@ pub(crate) fn contiguous(tensor: FlexTensor) -> FlexTensor {
     self::tensor(elementwise::channels_last(Isa::detect(), stored, 1, columns, rows), [rows, columns])
 }
 
-/// The values of an `f32` tensor that stands channels last, `[N, H, W, C]`.
+/// The values of a channels-last `f32` tensor, `[N, H, W, C]`.
 pub(crate) fn last_values(tensor: &FlexTensor) -> &[f32] {
     let start = tensor.layout().start_offset();
     let len: usize = shape4(tensor).iter().product();
     &tensor.storage::<f32>()[start..start + len]
 }
 
-/// A tensor of shape `[N, C, H, W]` that takes over values that stand channels last.
+/// A tensor of shape `[N, C, H, W]` that takes ownership of channels-last values.
 pub(crate) fn tensor_channels_last(values: Vec<f32>, shape: [usize; 4]) -> FlexTensor {
     let strides = channels_last_strides(shape).map(|stride| stride as isize);
     let layout = Layout::new(Shape::from(shape), strides.to_vec(), 0);

@@ -1,4 +1,4 @@
-//! Group normalisation in one pass forwards and one backwards, with the ReLU that follows it if wanted.
+//! Group normalisation in one pass forwards and one backwards, optionally with the ReLU that follows it.
 //!
 //! Shapes: N images, C channels in G groups, P pixels; a group of an image has m = C/G · P values.
 //!
@@ -22,7 +22,7 @@ mod tests;
 /// `x` `[N, C, H, W]`, `gamma` and `beta` `[C]`; the result has the shape of `x`.
 ///
 /// # Panics
-/// Where the shapes do not fit each other, a dimension is 0, or the groups do not divide the channels.
+/// If the shapes do not match, a dimension is 0, or the groups do not divide the channels.
 pub fn group_norm(x: Tensor<4>, gamma: Tensor<1>, beta: Tensor<1>, params: GroupNormParams) -> Tensor<4> {
     group_norm_residual(x, gamma, beta, None, params)
 }
@@ -33,7 +33,7 @@ pub fn group_norm(x: Tensor<4>, gamma: Tensor<1>, beta: Tensor<1>, params: Group
 /// As for [`group_norm`].
 ///
 /// # Panics
-/// As [`group_norm`], and where the residual has another shape.
+/// As for [`group_norm`], and if the residual has another shape.
 pub fn group_norm_residual(
     x: Tensor<4>,
     gamma: Tensor<1>,

@@ -1,9 +1,9 @@
-//! CPU kernels for the operations on which a detector spends its time, behind burn's backend extension.
+//! CPU kernels for the most expensive operations of a detector, behind burn's backend extension.
 //!
-//! burn's CPU backend `Flex` runs a convolution forwards at a fair speed and backwards through a generic
-//! fallback, and it has no ROIAlign. This crate adds both, and the other operations that took most of the time of training:
-//! 3×3 convolutions of stride 1 by Winograd's transforms, all others as matrix products that read the maps where
-//! they stand, group norm, max pooling, doubling, and non-maximum suppression.
+//! burn's CPU backend `Flex` runs a convolution forwards at a moderate speed and backwards through a generic fallback,
+//! and it has no ROIAlign. This crate adds both, and the other operations that took most of the training time: 3×3
+//! convolutions of stride 1 by Winograd's transforms, all others as matrix products that read the maps in place, group
+//! norm, max pooling, doubling, and non-maximum suppression.
 //!
 //! ```text
 //! conv2d(x, w, b)                         the function a model calls, on `burn::tensor::Tensor`
@@ -13,12 +13,12 @@
 //!        └─ any other backend             the default body: burn's own tensor operations
 //! ```
 //!
-//! Tensors are `[N, C, H, W]`, contiguous or not; results stand channels last in memory (`[N, H, W, C]`, told by their
-//! strides), in which form the next operation here reads them where they stand. The kernels are for `f32`; any other
-//! float type takes the composed default. Results do not depend on the number of threads, to the last bit.
+//! Tensors are `[N, C, H, W]`, contiguous or not; results are channels last in memory (`[N, H, W, C]`, visible from
+//! their strides), so that the next operation of this crate reads them in place. The kernels are for `f32`; any other
+//! float type takes the composed default. Results are bit-identical for any number of threads.
 //!
-//! Left out on purpose: groups and dilation (no detector here has them), gradients with respect to ROI
-//! coordinates (the R-CNN family treats proposals as constants), and non-CPU kernels.
+//! Deliberately not included: groups and dilation (no detector here has them), gradients with respect
+//! to ROI coordinates (the R-CNN family treats proposals as constants), and non-CPU kernels.
 //!
 //! ```
 //! use burn::tensor::{Device, Tensor};
@@ -38,9 +38,9 @@
 //! assert_eq!(nms(&boxes, &[0.9, 0.8, 0.7], 0.5), [0, 2]);
 //! ```
 #![cfg_attr(test, allow(clippy::unwrap_used))]
-// Backward passes are compiled without `autodiff` too, and then nothing calls them.
+// Backward passes are also compiled without `autodiff`, and then never called.
 #![cfg_attr(not(feature = "autodiff"), allow(dead_code, unused_imports))]
-// burn has deprecated its backend on ndarray; the feature is there for those who ask for it.
+// burn has deprecated its backend on ndarray; the feature remains available.
 #![cfg_attr(feature = "ndarray", allow(deprecated))]
 
 mod adamw;

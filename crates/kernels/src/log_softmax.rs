@@ -1,7 +1,7 @@
 //! The logarithm of the softmax of each row.
 //!
-//! burn composes it of six operations over the whole tensor, and its gradient of as many; a keypoint head has rows of 3136
-//! cells. Here a row stays in the cache: one pass for each direction.
+//! burn composes it from six operations over the whole tensor, and its gradient from as many; a keypoint head has rows
+//! of 3136 cells. Here a row stays in the cache: one pass for each direction.
 //!
 //! Legend: `z = x − max x`, `s = Σ exp z`, the result `z − ln s`, and with `g` the gradient of the result
 //! `∂x = g − exp z · Σ g / s`.
@@ -77,7 +77,7 @@ pub(crate) fn backward(isa: Isa, grad: &[f32], kept: &Kept) -> Vec<f32> {
     unsafe { output.into_vec() }
 }
 
-/// The sum in the order in which burn's CPU backend adds on this machine, so that results stay what they were.
+/// The sum in the order in which burn's CPU backend adds on this machine, so that results stay the same.
 fn sum(isa: Isa, values: &[f32]) -> f32 {
     match isa {
         #[cfg(target_arch = "x86_64")]
@@ -158,7 +158,7 @@ mod tests {
     use super::*;
     use crate::reference::{assert_close, random_values};
 
-    /// Rows of one value, of less than a vector, of all parts of a sum at once, and of a keypoint's heatmap.
+    /// Rows of one value, of less than a vector, of all parts of a sum together, and of a keypoint's heatmap.
     const ROW_LENS: [usize; 4] = [1, 7, 128 + 40, 3136];
 
     #[test]

@@ -1,14 +1,14 @@
-//! How the process keeps the memory that operations give back.
+//! How the process keeps freed memory.
 
-/// Has the C library keep what is freed, for the whole process. To be called once, first thing in `main`.
+/// Makes the C library keep freed memory, for the whole process. To be called once, at the start of `main`.
 ///
-/// A network's maps are megabytes each. GNU's allocator takes such blocks from the system and gives them back, so that
-/// every operation finds its result's pages missing: a sixth of a backbone's time on one core. Kept in one heap they are
-/// used again. Elsewhere this does nothing.
+/// A network's maps are megabytes each. GNU's allocator takes such blocks from the system and returns them, so that the
+/// pages of every operation's result must be mapped again: a sixth of a backbone's time on one core. In one heap they
+/// are reused. On other systems this does nothing.
 pub fn keep_freed_memory() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     for (parameter, value) in [
-        // One heap for all threads: a map is seldom freed by the thread that made it.
+        // One heap for all threads, because a map is seldom freed by the thread that made it.
         (libc::M_ARENA_MAX, 1),
         (libc::M_MMAP_MAX, 0),
         (libc::M_TRIM_THRESHOLD, libc::c_int::MAX),

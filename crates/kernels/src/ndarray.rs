@@ -1,6 +1,6 @@
 //! The extension on burn's `NdArray`: the composed defaults throughout. A reference, not fast.
 
-// burn deprecates the backend in favour of `Flex`; it stays for who compares.
+// burn deprecates the backend in favour of `Flex`; it remains for comparisons.
 #![allow(deprecated)]
 
 use burn::backend::NdArray;

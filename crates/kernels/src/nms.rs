@@ -2,14 +2,14 @@
 
 /// Indices of the boxes to keep, best score first.
 ///
-/// A box falls if its intersection over union with a kept, better one is above `iou_threshold`. Equal
-/// scores keep their order. Boxes whose score is NaN, or with a NaN or infinite corner, are dropped. Boxes
-/// without area overlap nothing.
+/// A box is suppressed if its intersection over union with a kept, better one is above `iou_threshold`.
+/// Equal scores keep their order. Boxes whose score is NaN, or with a NaN or infinite corner, are dropped.
+/// Boxes without area overlap nothing.
 ///
 /// Boxes are `[x1, y1, x2, y2]` in any one unit, areas `(x2 − x1)·(y2 − y1)` as in torchvision's `nms`.
 ///
 /// # Panics
-/// Where the numbers of boxes and scores differ or the threshold is NaN.
+/// If the numbers of boxes and scores differ or the threshold is NaN.
 pub fn nms(boxes: &[[f32; 4]], scores: &[f32], iou_threshold: f32) -> Vec<usize> {
     suppress(boxes, scores, None, iou_threshold)
 }
@@ -20,7 +20,7 @@ pub fn nms(boxes: &[[f32; 4]], scores: &[f32], iou_threshold: f32) -> Vec<usize>
 /// best score first over all classes.
 ///
 /// # Panics
-/// Where the numbers of boxes, scores and classes differ or the threshold is NaN.
+/// If the numbers of boxes, scores and classes differ or the threshold is NaN.
 pub fn batched_nms(boxes: &[[f32; 4]], scores: &[f32], classes: &[usize], iou_threshold: f32) -> Vec<usize> {
     assert!(
         classes.len() == boxes.len(),
@@ -44,7 +44,7 @@ fn suppress(boxes: &[[f32; 4]], scores: &[f32], classes: Option<&[usize]>, iou_t
     // Stable, and -0 equals 0.
     order.sort_by(|&a, &b| scores[b].partial_cmp(&scores[a]).unwrap_or(std::cmp::Ordering::Equal));
 
-    // In the order in which they are compared, so that the inner loop reads memory as it stands.
+    // In the order of comparison, so that the inner loop reads memory sequentially.
     let sorted: Vec<[f32; 4]> = order.iter().map(|&idx| boxes[idx]).collect();
     let areas: Vec<f32> = sorted.iter().copied().map(area).collect();
     let mut kept = Vec::new();
@@ -153,7 +153,7 @@ mod tests {
             let boxes = all.iter().map(|&(x, y, w, h, _, _)| [x, y, x + w, y + h].map(f32::from));
             (
                 boxes.collect(),
-                // Few values, so that ties happen.
+                // Few values, so that ties occur.
                 all.iter().map(|all| f32::from(all.4) / 8.0).collect(),
                 all.iter().map(|all| all.5).collect(),
             )
@@ -169,7 +169,7 @@ mod tests {
 
         #[test]
         fn agrees_with_the_definition((boxes, scores, classes) in boxes_scores_classes()) {
-            // 0.47 is no ratio of the small whole areas here, so rounding decides nothing.
+            // 0.47 is not a ratio of the small whole areas here, so that rounding decides nothing.
             let kept = batched_nms(&boxes, &scores, &classes, 0.47);
             let before = |a: usize, b: usize| scores[a] > scores[b] || (scores[a] == scores[b] && a < b);
             prop_assert!(kept.windows(2).all(|pair| before(pair[0], pair[1])));

@@ -1,8 +1,8 @@
-//! Packed weights, kept for as long as the weights they were packed from.
+//! Packed weights, kept as long as the weights from which they were packed.
 //!
 //! In inference a network's weights never change, so they are packed on first use. An entry is found by the address of
 //! the weight's storage and holds a weak reference to it: the address cannot be given to another tensor while the
-//! entry stands, and who wants to change the values in place must first move them (`Arc::make_mut`), which kills the
+//! entry exists, and changing the values in place requires moving them first (`Arc::make_mut`), which invalidates the
 //! weak reference.
 
 use std::collections::HashMap;
@@ -17,7 +17,7 @@ use crate::conv::shape::ConvShape;
 use crate::flex_tensor::values;
 use crate::simd::Isa;
 
-/// What a packing depends on.
+/// The parameters of a packing.
 #[derive(Clone, PartialEq, Eq, Hash)]
 struct Key {
     address: usize,
@@ -25,7 +25,7 @@ struct Key {
     weight: [usize; 4],
     direction: Direction,
     winograd: bool,
-    /// Phases of the stride, which going back has a product each.
+    /// Phases of the stride, each with its own product in the backward direction.
     phases: [[usize; 2]; 3],
 }
 
@@ -36,12 +36,12 @@ struct Entry {
 
 static CACHE: Mutex<Option<HashMap<Key, Entry>>> = Mutex::new(None);
 
-/// Whether weights are packed anew or looked up.
+/// Whether weights are packed again or looked up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Keep {
     /// The weights change with the next step.
     No,
-    /// The weights may well be used again.
+    /// The weights may be used again.
     Yes,
 }
 
@@ -81,7 +81,7 @@ pub(crate) fn filters(
     {
         return entry.filters.clone();
     }
-    // Packed without the lock: two threads may both do it, and then have the same.
+    // Packed without the lock: two threads may both do it, with the same result.
     let filters = pack();
     let mut cache = cache();
     let entries = cache.get_or_insert_default();

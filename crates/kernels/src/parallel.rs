@@ -1,12 +1,12 @@
-//! Loops over independent units of work, on rayon's threads where there are any.
+//! Loops over independent units of work, on rayon's threads if there are any.
 //!
-//! Every unit writes what no other unit writes, and how work is cut into units depends on shapes alone, so
-//! that results are the same bits for any number of threads.
+//! Every unit writes data that no other unit writes, and the division into units depends on shapes alone,
+//! so that results are bit-identical for any number of threads.
 
 use std::marker::PhantomData;
 use std::mem::MaybeUninit;
 
-/// Calls `unit` with every index below `num_units`, in any order, perhaps at the same time.
+/// Calls `unit` with every index below `num_units`, in any order, possibly at the same time.
 pub(crate) fn for_each_unit(num_units: usize, unit: impl Fn(usize) + Sync + Send) {
     #[cfg(all(feature = "parallel", not(target_arch = "wasm32")))]
     {
@@ -19,7 +19,7 @@ pub(crate) fn for_each_unit(num_units: usize, unit: impl Fn(usize) + Sync + Send
     (0..num_units).for_each(unit);
 }
 
-/// [`for_each_unit`] where `parallel`, else one after the other.
+/// [`for_each_unit`] if `parallel`, otherwise sequentially.
 pub(crate) fn for_each_unit_if(parallel: bool, num_units: usize, unit: impl Fn(usize) + Sync + Send) {
     if parallel {
         for_each_unit(num_units, unit);
@@ -46,7 +46,7 @@ impl<'a> SharedSlice<'a> {
         Self { start: slice.as_mut_ptr(), len: slice.len(), slice: PhantomData }
     }
 
-    /// The whole of it, for kernels that write in place.
+    /// The whole slice, for kernels that write in place.
     pub(crate) fn raw(&self) -> Raw {
         Raw { start: self.start, len: self.len }
     }
@@ -63,7 +63,7 @@ impl<'a> SharedSlice<'a> {
     }
 }
 
-/// Where kernels write that share an output: a place and its length, without a lifetime.
+/// The target of kernels that share an output: a pointer and its length, without a lifetime.
 #[derive(Clone, Copy)]
 pub(crate) struct Raw {
     start: *mut f32,
@@ -71,7 +71,7 @@ pub(crate) struct Raw {
 }
 
 impl Raw {
-    /// The place of an element.
+    /// Pointer to an element.
     pub(crate) fn at(&self, element: usize) -> *mut f32 {
         assert!(element <= self.len, "element {element} of {}", self.len);
         // SAFETY: inside, or one past the end, by the assertion.
@@ -84,7 +84,7 @@ unsafe impl Sync for Raw {}
 // SAFETY: a pointer may be sent; the floats that it points to may be written on any thread.
 unsafe impl Send for Raw {}
 
-/// A vector being filled by several units at once, without being zeroed first.
+/// A vector that several units fill at once, without initial zeroing.
 pub(crate) struct Output {
     values: Vec<f32>,
     start: *mut f32,
@@ -101,7 +101,7 @@ impl Output {
         Self { start: values.as_mut_ptr(), values, len }
     }
 
-    /// The whole of it, for kernels that write in place.
+    /// The whole vector, for kernels that write in place.
     pub(crate) fn raw(&self) -> Raw {
         Raw { start: self.start, len: self.len }
     }

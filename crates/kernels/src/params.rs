@@ -1,6 +1,6 @@
-//! What the operations do besides their tensors, and the sizes that follow.
+//! The parameters of the operations besides their tensors, and the resulting sizes.
 
-/// How a convolution's kernel moves over its input. Every pair is `[vertical, horizontal]`.
+/// The movement of a convolution's kernel over its input. Every pair is `[vertical, horizontal]`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Conv2dParams {
     /// Step of the kernel from one output pixel to the next, at least 1.
@@ -18,7 +18,7 @@ impl Conv2dParams {
         Self { stride: [stride, stride], padding: [padding, padding] }
     }
 
-    /// Size of the convolution's output map, or `None` where the padded input is smaller than the kernel.
+    /// Size of the convolution's output map, or `None` if the padded input is smaller than the kernel.
     ///
     /// # Shapes
     /// `input` is `[Hi, Wi]`, `kernel` is `[Kh, Kw]`; the result is `[Ho, Wo]`.
@@ -31,7 +31,7 @@ impl Conv2dParams {
         Some(output)
     }
 
-    /// Size of the transposed convolution's output map, or `None` where the padding leaves nothing of it.
+    /// Size of the transposed convolution's output map, or `None` if the padding leaves nothing of it.
     ///
     /// # Shapes
     /// `input` is `[Hi, Wi]`, `kernel` is `[Kh, Kw]`; the result is `[Ho, Wo]`.
@@ -51,10 +51,10 @@ impl Default for Conv2dParams {
     }
 }
 
-/// A convolution and which parts of its [epilogue](crate::Conv2dEpilogue) there are.
+/// A convolution and the present parts of its [epilogue](crate::Conv2dEpilogue).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FusedConv2dParams {
-    /// How the kernel moves.
+    /// The movement of the kernel.
     pub conv: Conv2dParams,
     /// Whether there is a scale.
     pub scaled: bool,
@@ -64,7 +64,7 @@ pub struct FusedConv2dParams {
     pub activation: Activation,
 }
 
-/// What follows a normalisation or a convolution.
+/// The function after a normalisation or a convolution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Activation {
     /// `x` itself.
@@ -77,11 +77,11 @@ pub enum Activation {
 /// Parameters of [`group_norm`](crate::group_norm).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GroupNormParams {
-    /// Groups the channels are cut into; divides the number of channels.
+    /// Number of groups of channels; divides the number of channels.
     pub num_groups: usize,
     /// Added to the variance, such as 1e-5.
     pub epsilon: f32,
-    /// What follows.
+    /// The activation.
     pub activation: Activation,
 }
 
@@ -94,35 +94,35 @@ pub struct FusedGroupNormParams {
     pub added: bool,
 }
 
-/// How a pooling's window moves. Every pair is `[vertical, horizontal]`.
+/// The movement of a pooling's window. Every pair is `[vertical, horizontal]`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MaxPool2dParams {
     /// Size of the window, at most 255 pixels in all.
     pub kernel: [usize; 2],
     /// Step of the window from one output pixel to the next, at least 1.
     pub stride: [usize; 2],
-    /// Pixels added before and after each axis, which are never the largest; at most half the window.
+    /// Padding before and after each axis, whose pixels are never the maximum; at most half the window.
     pub padding: [usize; 2],
 }
 
 impl MaxPool2dParams {
-    /// Size of the output map, or `None` where the padded input is smaller than the window.
+    /// Size of the output map, or `None` if the padded input is smaller than the window.
     pub(crate) fn output_size(&self, input: [usize; 2]) -> Option<[usize; 2]> {
         let conv = Conv2dParams { stride: self.stride, padding: self.padding };
         conv.output_size(input, self.kernel)
     }
 }
 
-/// How many bilinear samples a bin averages along each axis.
+/// Number of bilinear samples that a bin averages along each axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SamplingRatio {
-    /// As many as the bin is feature pixels long, rounded up (`sampling_ratio = 0` in Detectron2).
+    /// The length of the bin in feature pixels, rounded up (`sampling_ratio = 0` in Detectron2).
     Adaptive,
     /// Always this many, at least 1.
     Fixed(usize),
 }
 
-/// Where a feature pixel's value stands.
+/// Position of a feature pixel's value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RoiAlignment {
     /// At the pixel's centre: boxes are shifted by half a pixel (Detectron2's `aligned = True`).
@@ -140,7 +140,7 @@ pub struct RoiAlignParams {
     pub spatial_scale: f32,
     /// Samples per bin and axis.
     pub sampling_ratio: SamplingRatio,
-    /// Where feature values stand.
+    /// Position of feature values.
     pub alignment: RoiAlignment,
 }
 
@@ -155,16 +155,16 @@ pub struct AdamWParams {
     pub beta_2: f32,
     /// Added to the root of the mean square.
     pub epsilon: f32,
-    /// Share of the value that a step of length 1 takes away.
+    /// Share of the value that a step of length 1 removes.
     pub weight_decay: f32,
     /// Gradients whose Euclidean norm is larger are scaled down to it.
     pub max_norm: Option<f32>,
-    /// Which step it is, from 1.
+    /// Index of the step, from 1.
     pub step: i32,
 }
 
 impl AdamWParams {
-    /// What the moments are divided by, since they started at zero.
+    /// The divisors of the moments, because they started at zero.
     pub(crate) fn corrections(&self) -> [f32; 2] {
         [1.0 - self.beta_1.powi(self.step), 1.0 - self.beta_2.powi(self.step)]
     }
@@ -173,7 +173,7 @@ impl AdamWParams {
 /// Parameters of [`cosines`](crate::cosines()).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CosineParams {
-    /// Cells from a cell to the farthest that it is compared with, along each axis.
+    /// Largest distance of the compared cells, along each axis.
     pub reach: usize,
     /// Added to the square of a cell's length.
     pub epsilon: f32,

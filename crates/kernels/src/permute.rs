@@ -1,7 +1,7 @@
-//! Maps put into another order.
+//! Maps in another order.
 //!
-//! burn's own `select` adds its gradient element by element, on one thread, since an index might come twice. In a
-//! permutation none does: forwards and backwards whole maps are moved.
+//! burn's own `select` adds its gradient element by element, on one thread, because an index might occur twice.
+//! In a permutation none does, so that forwards and backwards whole maps are copied.
 
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ use crate::parallel::{Output, for_each_unit};
 /// `x` and the result are `[N, C, H, W]`.
 ///
 /// # Panics
-/// Where `order` is not a permutation of the N maps.
+/// If `order` is not a permutation of the N maps.
 pub fn permute_maps(x: Tensor<4>, order: &[usize]) -> Tensor<4> {
     let num_maps = x.dims()[0];
     let mut seen = vec![false; num_maps];
@@ -29,7 +29,7 @@ pub fn permute_maps(x: Tensor<4>, order: &[usize]) -> Tensor<4> {
     Tensor::from_dispatch(Dispatch::kernel_permute_maps(x.into_dispatch(), Arc::from(order)))
 }
 
-/// The order that undoes another.
+/// The inverse of an order.
 pub(crate) fn inverse(order: &[usize]) -> Arc<[usize]> {
     let mut back = vec![0; order.len()];
     for (idx, &map) in order.iter().enumerate() {

@@ -1,10 +1,10 @@
-//! The matrix product that every convolution ends in.
+//! The matrix product used by every convolution.
 //!
 //! `out[i, j] (+)= Σ_o Σ_k left[i·step + o·outer + k·inner] · right[j + o·outer + k·inner]`
 //!
 //! for up to 32 columns j, a *panel*. Rows i are taken twelve at a time, so that 24 AVX-512 registers hold the
-//! sums and nothing is written before it is whole. The depth runs in two loops (o, k), so that the left side
-//! may be a window of an image read where it stands: o runs over rows of the window, k along them.
+//! sums and only complete sums are written. The depth has two loops (o, k), so that the left side may be a
+//! window of an image read in place: o runs over rows of the window, k along them.
 
 #![allow(clippy::needless_range_loop)] // Rows and columns of a tile are numbers, here and in the sources.
 
@@ -17,17 +17,17 @@ pub(crate) const PANEL: usize = 32;
 /// Floats of a cache line.
 const LINE: usize = 16;
 
-/// Where the values of one side stand.
+/// Positions of the values of one side.
 #[derive(Clone, Copy)]
 pub(crate) struct Operand<'a> {
     pub(crate) values: &'a [f32],
-    /// From one row (left side) to the next; columns (right side) follow each other.
+    /// Step from one row (left side) to the next; columns (right side) are adjacent.
     pub(crate) step: usize,
     pub(crate) inner: usize,
     pub(crate) outer: usize,
 }
 
-/// What happens to a sum before it is written: `relu(sum · scale + bias + residual)`, as far as there.
+/// The operations on a sum before it is written: `relu(sum · scale + bias + residual)`; absent terms are left out.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Epilogue<'a> {
     /// A factor for each column.
@@ -51,39 +51,39 @@ pub(crate) struct PanelProduct<'a> {
     pub(crate) rows: usize,
     /// At most [`PANEL`].
     pub(crate) columns: usize,
-    /// How often the outer and the inner loop over the depth run.
+    /// Iterations of the outer and the inner loop over the depth.
     pub(crate) depth: [usize; 2],
     pub(crate) left: Operand<'a>,
-    /// Good for reading columns rounded up to 16.
+    /// Readable for columns rounded up to 16.
     pub(crate) right: Operand<'a>,
-    /// Where element (0, 0) is written.
+    /// Pointer to element (0, 0) of the output.
     pub(crate) at: usize,
-    /// From one row of the output to the next.
+    /// Step from one row of the output to the next.
     pub(crate) row_step: usize,
-    /// Which column of the epilogue's vectors the panel's first is.
+    /// Column of the epilogue's vectors that corresponds to the panel's first.
     pub(crate) first_column: usize,
     pub(crate) epilogue: Epilogue<'a>,
-    /// Whether to add to what stands in the output.
+    /// Whether to add to the present values of the output.
     pub(crate) accumulate: bool,
-    /// What is read next, to be fetched into the cache meanwhile.
+    /// The data read next, to be prefetched.
     pub(crate) prefetch: Prefetch<'a>,
 }
 
-/// Runs of memory that are fetched while a product computes, a cache line at each step of its depth.
+/// Memory runs that are prefetched while a product computes, a cache line at each step of its depth.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Prefetch<'a> {
     pub(crate) runs: [&'a [f32]; 2],
 }
 
 impl Prefetch<'_> {
-    /// The next lines, `steps` of them, or as many as there are: where they start, and from one to the next.
+    /// The next lines, `steps` of them, or as many as available: their start, and their stride.
     #[inline(always)]
     fn next(&mut self, steps: usize) -> (*const f32, usize) {
         for run in &mut self.runs {
             if !run.is_empty() {
                 let (now, later) = run.split_at(run.len().min(steps * LINE));
                 *run = later;
-                // The last lines of a run that is too short are not there; a hint may say anything.
+                // Lines beyond the end of a run may be prefetched, because a prefetch hint never faults.
                 return (now.as_ptr(), LINE);
             }
         }
@@ -95,7 +95,7 @@ impl PanelProduct<'_> {
     /// Computes the panel and writes it.
     ///
     /// # Safety
-    /// No other thread touches the panel's elements of `output`, and they are initialised where it accumulates.
+    /// No other thread accesses the panel's elements of `output`, and they are initialised if it accumulates.
     pub(crate) unsafe fn run(&self, isa: crate::simd::Isa, output: Raw) {
         let [outer, inner] = self.depth;
         if self.rows == 0 || self.columns == 0 {
@@ -128,7 +128,7 @@ unsafe fn panel_lanes<L: Lanes>(product: &PanelProduct<'_>, output: *mut f32) {
     let mut row = 0;
     let mut prefetch = product.prefetch;
     for tile in 0..tiles {
-        // As even as they come: short tiles wait for their sums.
+        // As equal as possible: short tiles wait for their sums.
         let rows = (product.rows - row).div_ceil(tiles - tile);
         let step = LANES * L::VECTORS;
         let mut column = 0;
@@ -232,7 +232,7 @@ unsafe fn finish<L: Lanes, const R: usize, const V: usize>(
     columns: usize,
 ) {
     let first = product.first_column + column;
-    // Floats of each lane; no closures: they have none of the instructions that their function has switched on.
+    // Floats of each lane; no closures, which would lack the instructions enabled for their function.
     let mut lens = [LANES; V];
     for idx in 0..V {
         lens[idx] = (columns - idx * LANES).min(LANES);
@@ -294,20 +294,20 @@ unsafe fn finish<L: Lanes, const R: usize, const V: usize>(
 }
 
 /// # Safety
-/// Sixteen floats, or the first `len` where not whole, can be read.
+/// Sixteen floats, or the first `len` of an incomplete group, are readable.
 #[inline(always)]
 unsafe fn load<L: Lanes>(from: *const f32, whole: bool, len: usize) -> L {
     // SAFETY: the caller promises that 16 floats, or `len`, can be read.
     unsafe { if whole { L::load(from) } else { L::load_first(from, len) } }
 }
 
-/// Width of the storage of panel `panel` of `columns` columns: 32, or 16 where no more is needed.
+/// Width of the storage of panel `panel` of `columns` columns: 32, or 16 if that is enough.
 pub(crate) fn panel_width(columns: usize, panel: usize) -> usize {
     let left = columns - panel * PANEL;
     if left > LANES { PANEL } else { LANES }
 }
 
-/// Floats that panels of `columns` columns and a depth take.
+/// Number of floats of panels with `columns` columns and a depth.
 pub(crate) fn packed_len(columns: usize, depth: usize) -> usize {
     columns.next_multiple_of(LANES) * depth
 }

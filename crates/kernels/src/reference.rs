@@ -1,4 +1,4 @@
-//! What the tests compare with: the same operations as plain loops, and values to run them on.
+//! References for the tests: the same operations as plain loops, and values to run them on.
 
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -20,7 +20,7 @@ pub(crate) fn to_last(values: &[f32], [num_images, channels, height, width]: [us
         .collect()
 }
 
-/// `[N, H, W, C]` to `[N, C, H, W]`, which is the shape given.
+/// `[N, H, W, C]` to `[N, C, H, W]`, which is the given shape.
 pub(crate) fn to_first(values: &[f32], [num_images, channels, height, width]: [usize; 4]) -> Vec<f32> {
     to_last(values, [num_images, height * width, channels, 1])
 }

@@ -1,6 +1,6 @@
-//! Max pooling, and doubling by repetition: the two changes of resolution besides strides.
+//! Max pooling, and doubling by repetition: the changes of resolution besides strides.
 //!
-//! Results stand channels last in memory, as those of [`conv2d`](crate::conv2d).
+//! Results are channels last in memory, like those of [`conv2d`](crate::conv2d).
 
 use burn::backend::Dispatch;
 use burn::tensor::Tensor;
@@ -12,13 +12,13 @@ pub(crate) mod kernel;
 #[cfg(test)]
 mod tests;
 
-/// The largest value in every window. A NaN is larger than any number; of equals the first gets the gradient.
+/// The largest value in every window. A NaN is larger than any number; of equal values the first gets the gradient.
 ///
 /// # Shapes
 /// `x` `[N, C, Hi, Wi]`; the result is `[N, C, Ho, Wo]` with `Ho = (Hi + 2·padding − Kh) / stride + 1`, rounded down.
 ///
 /// # Panics
-/// Where a dimension, stride or side of the window is 0, the window has more than 255 pixels, the padding is more than
+/// If a dimension, stride or side of the window is 0, the window has more than 255 pixels, the padding is more than
 /// half of it, or it is larger than the padded input.
 pub fn max_pool2d(x: Tensor<4>, params: MaxPool2dParams) -> Tensor<4> {
     let [_, _, height, width] = x.dims();

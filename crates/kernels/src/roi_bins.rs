@@ -13,7 +13,7 @@ impl RoiBins {
     /// Weights of one ROI.
     ///
     /// # Panics
-    /// Where the image index is no integer in `0..num_images`.
+    /// If the image index is not an integer in `0..num_images`.
     pub(crate) fn new(
         roi: &[f32],
         roi_idx: usize,
@@ -41,7 +41,7 @@ impl RoiBins {
 pub(crate) struct AxisBins {
     /// First feature pixel of each bin.
     first: Vec<usize>,
-    /// Where each bin's weights begin in `weights`, and the end of the last.
+    /// Start of each bin's weights in `weights`, and the end of the last.
     offsets: Vec<usize>,
     weights: Vec<f32>,
 }
@@ -77,13 +77,13 @@ impl AxisBins {
         axis
     }
 
-    /// Adds the weights of a bin that begins at `start` and is `bin` feature pixels long.
+    /// Adds the weights of a bin that starts at `start` and is `bin` feature pixels long.
     fn push_bin(&mut self, start: f32, bin: f32, grid: usize, map_size: usize) {
         let base = self.weights.len();
         let mut first = usize::MAX;
         for sample_idx in samples_on_map(start, bin, grid, map_size) {
             let at = start + (sample_idx as f32 + 0.5) * bin / grid as f32;
-            // Samples up to one pixel outside are pulled onto the border, those beyond count as zero.
+            // Samples up to one pixel outside are moved onto the border; those further away count as zero.
             if at < -1.0 || at > map_size as f32 {
                 continue;
             }
@@ -94,7 +94,7 @@ impl AxisBins {
             if first == usize::MAX {
                 first = low;
             }
-            // Bins of negative length, which only a fixed ratio samples, walk backwards.
+            // Bins of negative length, which only a fixed ratio samples, run backwards.
             if low < first {
                 let missing = first - low;
                 self.weights.splice(base..base, std::iter::repeat_n(0.0, missing));
@@ -110,7 +110,7 @@ impl AxisBins {
         self.first.push(if first == usize::MAX { 0 } else { first });
     }
 
-    /// First feature pixel and weights of a bin; no weights where every sample fell outside the map.
+    /// First feature pixel and weights of a bin; no weights if every sample is outside the map.
     pub(crate) fn bin(&self, bin_idx: usize) -> (usize, &[f32]) {
         let weights = &self.weights[self.offsets[bin_idx]..self.offsets[bin_idx + 1]];
         (self.first[bin_idx], weights)
@@ -125,13 +125,13 @@ impl AxisBins {
     }
 }
 
-/// Samples that may lie on the map, so that a huge ROI costs no more than the map is long.
+/// Samples that may lie on the map, so that a huge ROI costs no more than the map's length.
 fn samples_on_map(start: f32, bin: f32, grid: usize, map_size: usize) -> std::ops::Range<usize> {
     let step = f64::from(bin) / grid as f64;
     if grid < 1024 || step.is_nan() || step <= 0.0 {
         return 0..grid;
     }
-    // One sample of slack either side for rounding; the caller tests each sample again.
+    // One additional sample on both sides for rounding; the caller tests each sample again.
     let first = ((-1.0 - f64::from(start)) / step - 1.5).floor().max(0.0) as usize;
     let end = ((map_size as f64 - f64::from(start)) / step + 1.5).ceil().max(0.0) as usize;
     first.min(grid)..end.min(grid)

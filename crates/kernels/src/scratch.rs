@@ -1,4 +1,4 @@
-//! Buffers that outlive the operation that filled them, so that the next need not ask the system for memory.
+//! Reusable buffers, so that operations need not request memory from the system.
 
 use std::cell::RefCell;
 use std::ops::{Deref, DerefMut};
@@ -7,7 +7,7 @@ thread_local! {
     static FREE: RefCell<Vec<Vec<f32>>> = const { RefCell::new(Vec::new()) };
 }
 
-/// A borrowed buffer, given back to its thread when dropped. Its contents are whatever was left in it.
+/// A borrowed buffer, returned to its thread when dropped. Its contents are arbitrary.
 pub(crate) struct Scratch {
     buffer: Vec<f32>,
     len: usize,
@@ -17,7 +17,7 @@ impl Scratch {
     /// A buffer of `len` floats of any value.
     pub(crate) fn take(len: usize) -> Self {
         let mut buffer = FREE.with_borrow_mut(|free| {
-            // The smallest that is large enough, else the largest, which then grows.
+            // The smallest sufficient one, otherwise the largest, which then grows.
             let fitting = (0..free.len()).filter(|&idx| free[idx].len() >= len).min_by_key(|&idx| free[idx].len());
             let chosen = fitting.or_else(|| (0..free.len()).max_by_key(|&idx| free[idx].len()));
             chosen.map_or_else(Vec::new, |idx| free.swap_remove(idx))
@@ -46,7 +46,7 @@ impl DerefMut for Scratch {
 impl Drop for Scratch {
     fn drop(&mut self) {
         let buffer = std::mem::take(&mut self.buffer);
-        // The thread may be ending, with its free list gone; then the buffer goes too.
+        // The thread may be ending, with its free list gone; then the buffer is freed, too.
         let _ = FREE.try_with(|free| free.borrow_mut().push(buffer));
     }
 }

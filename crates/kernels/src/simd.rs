@@ -1,4 +1,4 @@
-//! Vector instructions: which there are, and how a kernel is compiled for each of them.
+//! Vector instructions: the available sets, and the compilation of a kernel for each of them.
 
 mod isa;
 pub(crate) mod lanes;
@@ -9,9 +9,9 @@ mod transpose;
 pub(crate) use isa::Isa;
 pub(crate) use transpose::transpose;
 
-/// Compiles a plain loop for every instruction set and picks one when called, with the set as first argument.
+/// Compiles a plain loop for every instruction set and selects one when called, with the set as first argument.
 ///
-/// Nothing is fused or reordered: the result is the same bits on all of them.
+/// Nothing is fused or reordered: the result is bit-identical on all of them.
 macro_rules! widest {
     (fn $name:ident($($arg:ident: $kind:ty),* $(,)?) -> $result:ty $body:block) => {
         #[allow(clippy::unused_unit)] // The macro names every result, also `()`.
@@ -47,10 +47,10 @@ macro_rules! widest {
 }
 pub(crate) use widest;
 
-/// Compiles a kernel over [`Lanes`](lanes::Lanes) for every instruction set and picks one when called, with the
-/// set as first argument.
+/// Compiles a kernel over [`Lanes`](lanes::Lanes) for every instruction set and selects one when called, with
+/// the set as first argument.
 ///
-/// Sums may be fused or not, so that last bits may differ between instruction sets.
+/// Sums may be fused or not, so that the last bits may differ between instruction sets.
 macro_rules! lanes_kernel {
     ($(#[$meta:meta])* $vis:vis unsafe fn $name:ident($($arg:ident: $kind:ty),* $(,)?) = $generic:ident) => {
         $(#[$meta])*

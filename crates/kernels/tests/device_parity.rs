@@ -1,4 +1,4 @@
-//! Every operation, forwards and backwards, on every device that the build has besides `Flex`, against `Flex`.
+//! Compares every operation, forwards and backwards, on every device of the build with `Flex`.
 //!
 //! Built with a feature of those devices: `make test-wgpu`, `make test-ndarray`.
 #![cfg(any(feature = "ndarray", feature = "wgpu", feature = "cuda"))]
@@ -13,8 +13,8 @@ use sdg_kernels::{
     roi_align, upsample_nearest_2x,
 };
 
-/// Largest difference over the largest magnitude: sums of up to a thousand products in another order. Winograd's
-/// transforms, which flex runs, cost the most of it.
+/// Largest difference over the largest magnitude: sums of up to a thousand products in another order. Most of it
+/// comes from Winograd's transforms, which flex uses.
 const RELATIVE: f32 = 2e-5;
 
 /// Devices to compare with `Flex`.
@@ -40,15 +40,15 @@ fn values<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
     tensor.into_data().try_into_vec().unwrap()
 }
 
-/// Runs `operation` on its inputs, which it may differentiate by, and gives its result and the gradients of a weighed
-/// sum of it, for `Flex` and for each device; asserts that they agree.
+/// Runs `operation` on its inputs, with respect to which it may be differentiated, and compares its result and the
+/// gradients of a weighted sum of it between `Flex` and each device; asserts that they agree.
 fn assert_agrees<const N: usize>(
     name: &str,
     inputs: [[usize; 4]; N],
     operation: impl Fn([Tensor<4>; N], &Device) -> Tensor<4>,
 ) {
     let run = |device: Device| -> Vec<Vec<f32>> {
-        // Without autodiff first: another implementation.
+        // First without autodiff, which is another implementation.
         let plain = std::array::from_fn(|i| random(inputs[i], i as u64, &device));
         let mut results = vec![values(operation(plain, &device))];
         let tracked = device.autodiff();
@@ -67,7 +67,7 @@ fn assert_agrees<const N: usize>(
             let scale = expected.iter().fold(0.0f32, |most, value| most.max(value.abs()));
             let difference = expected.iter().zip(&found).map(|(a, b)| (a - b).abs()).fold(0.0f32, f32::max);
             println!("{name} on {device_name}, part {part}: {:.1e}", difference / scale);
-            // The fold would pass over a NaN.
+            // The fold would ignore a NaN.
             assert!(found.iter().all(|value| value.is_finite()) && scale > 0.0);
             assert!(difference <= RELATIVE * scale, "{name} on {device_name}, part {part}: {difference} of {scale}");
         }
@@ -123,7 +123,7 @@ fn changes_of_resolution_and_order_agree() {
 
 #[test]
 fn roi_aligns_agree_in_every_mode() {
-    // Inside, over every border, outside, without area, turned round, far larger than the map.
+    // Inside, over every border, outside, without area, reversed, far larger than the map.
     let rois = [
         [0.0, 1.0, 2.0, 21.0, 17.0],
         [1.0, -9.0, -7.0, 8.5, 9.5],

@@ -1,4 +1,4 @@
-//! Prints what the crate does and how long it takes: `cargo run --release -p sdg-kinematics --example measure`.
+//! Prints results and computation times of this crate: `cargo run --release -p sdg-kinematics --example measure`.
 
 use std::f64::consts::PI;
 use std::time::Instant;

@@ -1,7 +1,8 @@
-//! The straight motion to a grasp from a pose before it, with a configuration for which all of it stays within the limits.
+//! The straight motion to a grasp from a pregrasp pose, with a configuration for which the whole motion satisfies the
+//! limits.
 //!
-//! The best configuration for the first pose may run into a joint limit on the way to the second. The arm has several ways to
-//! take and two fingers that may be exchanged, so the choice is made over whole approaches.
+//! The best configuration for the first pose may reach a joint limit before the second. The arm has several branches
+//! and two interchangeable fingers, so that the choice is made over whole approaches.
 
 use std::f64::consts::PI;
 
@@ -13,10 +14,10 @@ use crate::ik::{IkOptions, IkSolution};
 use crate::joints::JointVector;
 use crate::path::{JointPath, LineOptions};
 
-/// Whether a grasp stays the same when the hand is turned by half a turn about its own axis.
+/// Whether a half turn of the hand about its own axis gives the same grasp.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum GraspSymmetry {
-    /// The pose is meant as given.
+    /// Only the given pose is valid.
     Fixed,
     /// The two fingers may be exchanged.
     #[default]
@@ -34,7 +35,7 @@ pub struct Approach {
     pub half_turned: bool,
 }
 
-/// The same grasp with the fingers exchanged: half a turn about the hand's own z axis.
+/// The same grasp with exchanged fingers: half a turn about the hand's own z axis.
 pub fn with_fingers_exchanged(base_from_tcp: &Isometry3<f64>) -> Isometry3<f64> {
     base_from_tcp * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), PI)
 }
@@ -42,10 +43,10 @@ pub fn with_fingers_exchanged(base_from_tcp: &Isometry3<f64>) -> Isometry3<f64> 
 impl ArmGeometry {
     /// Finds the configuration of least cost at the pregrasp from which the straight line to the grasp can be followed.
     ///
-    /// Both poses in m in the base frame; turned together where `symmetry` allows it. `seed` as for [`ArmGeometry::inverse`].
+    /// Both poses in m in the base frame; both turned if `symmetry` allows it. `seed` as for [`ArmGeometry::inverse`].
     ///
     /// # Errors
-    /// Where no approach exists, the reason of the one that seemed best; see [`ArmGeometry::inverse`] and
+    /// If no approach exists, the reason of the best candidate; see [`ArmGeometry::inverse`] and
     /// [`ArmGeometry::straight_path`].
     pub fn approach(
         &self,
@@ -87,7 +88,7 @@ impl ArmGeometry {
                 }
             }
         }
-        // A pregrasp that can be reached says more about what is wrong than one that cannot.
+        // The error of a reachable pregrasp is more informative than that of an unreachable one.
         Err(path_error
             .or(first_error)
             .expect("without a start there was an error, and a start gives an approach or an error"))

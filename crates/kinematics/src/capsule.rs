@@ -43,7 +43,7 @@ impl Capsule {
     }
 }
 
-/// Where two segments come nearest to each other, as shares of their ways.
+/// The closest points of two segments, as shares of their lengths.
 ///
 /// `u` and `v` lead from the segments' starts to their ends, `w` from the second's start to the first's.
 ///
@@ -53,8 +53,8 @@ impl Capsule {
 pub(crate) fn nearest_shares(u: [f64; 3], v: [f64; 3], w: [f64; 3]) -> (f64, f64) {
     /// Squared lengths below this belong to points, m².
     const POINT: f64 = 1e-18;
-    /// Segments whose angle has a smaller squared sine are parallel: any share of the first will do, and the distance is at most a
-    /// millionth of the longer one's length too large.
+    /// Segments whose angle has a smaller squared sine are parallel: any share of the first is valid, and the distance
+    /// is too large by at most a millionth of the longer one's length.
     const PARALLEL: f64 = 1e-12;
     let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     let (uu, vv, uv, uw, vw) = (dot(u, u), dot(v, v), dot(u, v), dot(u, w), dot(v, w));
@@ -114,7 +114,7 @@ mod tests {
                 }
             }
             let found = one.distance_m(&other);
-            // Samples are at most 2 · √3 / 400 from the nearest point on each segment.
+            // The distance of samples from the closest point on each segment is at most 2 · √3 / 400.
             assert!(found <= sampled + 1e-12 && found > sampled - 0.018, "{found} {sampled}");
         }
     }

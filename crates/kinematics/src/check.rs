@@ -1,4 +1,4 @@
-//! Checks of what comes in.
+//! Checks of input values.
 
 use nalgebra::Isometry3;
 

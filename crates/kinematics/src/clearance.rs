@@ -1,4 +1,4 @@
-//! How far the hand stays above the table.
+//! Height of the hand above the table.
 
 use nalgebra::{Isometry3, Point3};
 
@@ -6,24 +6,25 @@ use crate::geometry::{ArmGeometry, ArmPart};
 use crate::joints::JointVector;
 use crate::trajectory::Trajectory;
 
-/// Where an arm comes nearest to a table.
+/// The closest point of an arm to a table.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Clearance {
     /// Height of the lowest point above the table, m; negative below.
     pub lowest_m: f64,
     /// The lowest part of the arm.
     pub part: ArmPart,
-    /// When, s; 0 for a single configuration.
+    /// Time, s; 0 for a single configuration.
     pub time_secs: f64,
 }
 
-/// Time between two looks, s: at most 5 mm of travel at 2 m/s.
+/// Time between two checks, s: at most 5 mm of travel at 2 m/s.
 const LOOK_SECS: f64 = 0.0025;
 
 impl ArmGeometry {
     /// The lowest point of hand, wrist and elbow above a level table at `table_height_m` in the base frame.
     ///
-    /// The hand is a box with open fingers, wrist and elbow are balls; the balls are somewhat larger than the links.
+    /// The hand is modelled as a box with open fingers, wrist and elbow as balls; the balls are slightly larger than
+    /// the links.
     pub fn clearance(&self, q: &JointVector, table_height_m: f64) -> Clearance {
         let frames = self.frames(q);
         let mut lowest = Clearance { lowest_m: f64::INFINITY, part: ArmPart::FingerTips, time_secs: 0.0 };
@@ -49,7 +50,8 @@ impl ArmGeometry {
 }
 
 impl Trajectory {
-    /// Where the motion comes nearest to a level table at `table_height_m` in the base frame; see [`ArmGeometry::clearance`].
+    /// The closest point of the motion to a level table at `table_height_m` in the base frame; see
+    /// [`ArmGeometry::clearance`].
     pub fn clearance(&self, arm: &ArmGeometry, table_height_m: f64) -> Clearance {
         let num_looks = (self.duration_secs() / LOOK_SECS).ceil().max(1.0) as usize;
         (0..=num_looks)
@@ -106,8 +108,9 @@ mod tests {
 
     #[test]
     fn a_motion_through_the_table_is_seen_in_the_middle() {
-        // Joint 6 swings the hand from back to front about the wrist centre at 0.6973 m. Lowest is an edge of the finger tips,
-        // 0.088 + 0.011 across and 0.107 + 0.1034 along from the wrist centre, when it is straight below.
+        // Joint 6 swings the hand from back to front about the wrist centre at 0.6973 m. The lowest point is an edge of
+        // the finger tips, 0.088 + 0.011 across and 0.107 + 0.1034 along from the wrist centre, when it is vertically
+        // below.
         let panda = ArmGeometry::panda();
         let (mut start, mut end) = (ready_pose(), ready_pose());
         start[5] = 0.3;

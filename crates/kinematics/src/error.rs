@@ -1,4 +1,4 @@
-//! What can go wrong, with what was expected and what was found.
+//! Errors, with the expected and the found value.
 
 use crate::ik::IkSolution;
 use crate::joints::LimitViolation;
@@ -23,7 +23,7 @@ pub enum KinematicsError {
         .violation.joint, .violation.min_rad.to_degrees(), .violation.max_rad.to_degrees(), .violation.found_rad.to_degrees()
     )]
     JointOutOfRange { what: &'static str, violation: LimitViolation },
-    /// No configuration reaches the pose, whatever the joint limits.
+    /// No configuration reaches the pose, even without joint limits.
     #[error(
         "the pose is out of reach: at ({:.3}, {:.3}, {:.3}) m the tcp misses it by {:.4} m and {:.2}° at best{}",
         .target_m[0], .target_m[1], .target_m[2],
@@ -31,14 +31,14 @@ pub enum KinematicsError {
         list_joints(.nearest_at_limit)
     )]
     OutOfReach {
-        /// The tcp position asked for, base frame, m.
+        /// The requested tcp position, base frame, m.
         target_m: [f64; 3],
-        /// The nearest pose that the arm reaches within its limits, and by how much it misses.
+        /// The nearest pose that the arm reaches within its limits, and its error.
         nearest: Box<IkSolution>,
-        /// Joints (1 to 7) that stand at a limit there.
+        /// Joints (1 to 7) at a limit there.
         nearest_at_limit: Vec<usize>,
     },
-    /// Configurations reach the pose, but each of them breaks a joint limit.
+    /// Configurations reach the pose, but each of them violates a joint limit.
     #[error(
         "a joint limit forbids the pose: joint {} would have to be at {:.2} degrees, outside [{:.2}, {:.2}]; \
          within the limits the tcp misses by {:.4} m and {:.2}°",
@@ -46,19 +46,19 @@ pub enum KinematicsError {
         .nearest.position_residual_m, .nearest.angle_residual_rad.to_degrees()
     )]
     JointLimit {
-        /// The limit that binds in the configuration that breaks limits least.
+        /// The violated limit of the configuration with the smallest violation.
         violation: LimitViolation,
-        /// The nearest pose that the arm reaches within its limits, and by how much it misses.
+        /// The nearest pose that the arm reaches within its limits, and its error.
         nearest: Box<IkSolution>,
     },
-    /// A straight path meets a joint limit on its way.
+    /// A straight path reaches a joint limit.
     #[error(
         "the straight path meets a joint limit {:.1} % along: joint {} would have to be at {:.2} degrees, outside [{:.2}, {:.2}]",
         .at_share * 100.0, .violation.joint, .violation.found_rad.to_degrees(), .violation.min_rad.to_degrees(),
         .violation.max_rad.to_degrees()
     )]
     PathJointLimit {
-        /// Share of the path done, 0 to 1.
+        /// Share of the path before it, 0 to 1.
         at_share: f64,
         violation: LimitViolation,
     },
@@ -67,9 +67,9 @@ pub enum KinematicsError {
         "the straight path cannot be followed beyond {:.1} %: {reason}", .at_share * 100.0
     )]
     PathBlocked {
-        /// Share of the path done, 0 to 1.
+        /// Share of the path before it, 0 to 1.
         at_share: f64,
-        /// Why there is no solution.
+        /// The reason why there is no solution.
         reason: &'static str,
     },
     /// The trajectory generator refused its input or failed.

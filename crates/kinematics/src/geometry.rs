@@ -6,7 +6,7 @@
 //! Frames: `base` (z up, x forward), `link 1..7` (on the joint axes), `flange` (along z of link 7), `hand` (the flange turned about z),
 //! `tcp` (along z of the hand, between the finger tips). The fingers open along y of `hand` and `tcp`; z points out of the hand.
 //!
-//! Bodies of the arm are numbered: 0 the base, 1 to 7 the links, 8 the hand with its fingers, 9 what the hand holds.
+//! Bodies of the arm are numbered: 0 the base, 1 to 7 the links, 8 the hand with its fingers, 9 the held part.
 
 use nalgebra::{Isometry3, SMatrix, Translation3, UnitQuaternion, Vector3};
 
@@ -25,12 +25,12 @@ pub struct DhJoint {
     pub a_m: f64,
     /// `d`, m.
     pub d_m: f64,
-    /// `alpha`, rad: 0 or a quarter turn either way.
+    /// `alpha`, rad: 0 or a quarter turn in either direction.
     pub alpha_rad: f64,
 }
 
-/// All that kinematics, collisions and dynamics know of an arm with its hand: a third arm is another value, see [`ArmGeometry::arm`] and
-/// [`ArmGeometry::fr3`].
+/// The data of an arm with its hand for kinematics, collisions and dynamics. Another arm is another value, see
+/// [`ArmGeometry::arm`] and [`ArmGeometry::fr3`].
 ///
 /// An arm of fewer joints has the range from 0 to 0 for the last ones, whose columns of the Jacobian are zero.
 #[derive(Debug, Clone, PartialEq)]
@@ -49,13 +49,13 @@ pub struct ArmGeometry {
     pub closed_form: Option<ClosedForm>,
     /// The hand on the flange.
     pub hand: HandGeometry,
-    /// Capsules that hold base and links 1 to 7, each in the base's or the link's frame.
+    /// Capsules that contain base and links 1 to 7, each in the base's or the link's frame.
     pub capsules: [Vec<Capsule>; NUM_JOINTS + 1],
     /// The same, fewer and wider: for a check in every cycle of a motion.
     pub wide_capsules: [Vec<Capsule>; NUM_JOINTS + 1],
-    /// Pairs of bodies that can meet, the one nearer to the base first. Neighbours touch by construction.
+    /// Pairs of bodies that can collide, the one closer to the base first. Neighbours touch by construction.
     pub self_pairs: Vec<(usize, usize)>,
-    /// Balls around links' origins that hold wrist and elbow: part, number of the link, radius in m.
+    /// Balls around links' origins that contain wrist and elbow: part, number of the link, radius in m.
     pub balls: Vec<(ArmPart, usize, f64)>,
     /// Links 1 to 7 without the hand, in their frames.
     pub links: [LinkInertia; NUM_JOINTS],
@@ -65,17 +65,17 @@ pub struct ArmGeometry {
     pub damping: JointVector,
 }
 
-/// A way to compute all configurations of a pose for a given angle of joint 7.
+/// A method to compute all configurations of a pose for a given angle of joint 7.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ClosedForm {
-    /// Franka's arms: three axes meet in the shoulder, two in the wrist, and joint 7 is beside them.
+    /// Franka's arms: three axes meet in the shoulder, two in the wrist, and joint 7 is offset from them.
     Franka,
 }
 
 /// A hand with two parallel fingers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HandGeometry {
-    /// Turn of the hand against the flange, about z.
+    /// Turn of the hand relative to the flange, about z.
     pub flange_from_hand: UnitQuaternion<f64>,
     /// Flange to tcp along z, m.
     pub tcp_offset_m: f64,
@@ -87,7 +87,7 @@ pub struct HandGeometry {
     pub half_depth_m: f64,
     /// Length of the hand's body from the flange, m.
     pub length_m: f64,
-    /// Capsules that hold the hand's body and a small camera on it, in the hand's frame.
+    /// Capsules that contain the hand's body and a small camera on it, in the hand's frame.
     pub capsules: Vec<Capsule>,
     /// The same with fingers at any opening, fewer and wider, see [`ArmGeometry::wide_capsules`].
     pub wide_capsules: Vec<Capsule>,
@@ -106,7 +106,7 @@ pub struct FingerGeometry {
     pub thickness_m: f64,
     /// Half of its thickness along its motion at the root: its middle's distance from the pad's face, m.
     pub middle_m: f64,
-    /// Capsules along z that hold it, from root to tip.
+    /// Capsules along z that contain it, from root to tip.
     pub capsules: Vec<FingerCapsule>,
     /// Mass, kg.
     pub mass_kg: f64,
@@ -119,7 +119,7 @@ pub struct FingerGeometry {
 /// A capsule of a finger, parallel to z.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FingerCapsule {
-    /// How much nearer to the pad it is than the finger's middle, m.
+    /// Distance by which it is closer to the pad than the finger's centre, m.
     pub inward_m: f64,
     /// The ends of its axis along z, m.
     pub z_m: [f64; 2],
@@ -130,7 +130,7 @@ pub struct FingerCapsule {
 /// A part of the robot that could touch the table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ArmPart {
-    /// The ends of the fingers, opened wide, and the tcp between them.
+    /// The ends of the fully opened fingers, and the tcp between them.
     FingerTips,
     /// The hand's body.
     Hand,
@@ -154,12 +154,12 @@ pub struct Frames {
 }
 
 impl ArmGeometry {
-    /// The tcp as seen from the flange: constant.
+    /// The tcp relative to the flange: constant.
     pub fn flange_from_tcp(&self) -> Isometry3<f64> {
         self.hand.flange_from_hand * Translation3::new(0.0, 0.0, self.hand.tcp_offset_m)
     }
 
-    /// The hand as seen from the last link: constant.
+    /// The hand relative to the last link: constant.
     pub(crate) fn link7_from_hand(&self) -> Isometry3<f64> {
         Isometry3::from_parts(Translation3::new(0.0, 0.0, self.flange_offset_m), self.hand.flange_from_hand)
     }
@@ -206,7 +206,7 @@ impl ArmGeometry {
         self.forward_and_jacobian(q).1
     }
 
-    /// `base_from_tcp` and the Jacobian together, at the cost of one pass over the chain.
+    /// `base_from_tcp` and the Jacobian together, from one pass over the chain.
     pub fn forward_and_jacobian(&self, q: &JointVector) -> (Isometry3<f64>, Jacobian) {
         let frames = self.frames(q);
         let tcp = frames.base_from_tcp.translation.vector;
@@ -247,7 +247,7 @@ impl DhJoint {
     }
 }
 
-/// The twist in the base frame that takes `from` to `to` in unit time: rows 0–2 metres, rows 3–5 radians.
+/// The twist in the base frame that moves `from` to `to` in unit time: rows 0–2 metres, rows 3–5 radians.
 pub(crate) fn pose_error(from: &Isometry3<f64>, to: &Isometry3<f64>) -> nalgebra::Vector6<f64> {
     let linear = to.translation.vector - from.translation.vector;
     let angular = (to.rotation * from.rotation.inverse()).scaled_axis();
@@ -308,7 +308,7 @@ mod tests {
 
     #[test]
     fn the_jacobian_agrees_with_finite_differences() {
-        // Central differences at 1e-6 rad of lengths below 1 m are good to about 1e-9.
+        // Central differences at 1e-6 rad of lengths below 1 m have an error of about 1e-9.
         const STEP_RAD: f64 = 1e-6;
         const TOLERANCE: f64 = 2e-8;
         let panda = ArmGeometry::panda();

@@ -1,10 +1,10 @@
-//! What inverse kinematics prefers, and what it finds.
+//! Preferences and results of inverse kinematics.
 
 use nalgebra::Isometry3;
 
 use crate::joints::JointVector;
 
-/// What [`ArmGeometry::inverse`](crate::ArmGeometry::inverse) prefers among the configurations that reach a pose.
+/// Preferences of [`ArmGeometry::inverse`](crate::ArmGeometry::inverse) among the configurations that reach a pose.
 ///
 /// The cost to be minimised is `seed_weight · |q - seed|² + posture_weight · |q - posture|² +
 /// limit_weight · Σ max(0, 1 - margin / comfortable_margin_rad)²`, angles in rad.
@@ -13,23 +13,23 @@ use crate::joints::JointVector;
 pub struct IkOptions {
     /// Weight of the distance to the seed configuration: short motions.
     pub seed_weight: f64,
-    /// The preferred posture, rad; the arm's own where `None`.
+    /// The preferred posture, rad; `None` for the arm's own.
     pub posture: Option<JointVector>,
     /// Weight of the distance to the preferred posture.
     pub posture_weight: f64,
     /// Weight of closeness to joint limits.
     pub limit_weight: f64,
-    /// A joint nearer than this to one of its limits costs, rad.
+    /// Joints closer than this to one of their limits add to the cost, rad.
     pub comfortable_margin_rad: f64,
     /// Joint positions must keep this distance from the limits, rad.
     pub required_margin_rad: f64,
-    /// Number of angles of joint 7 tried, at least 2.
+    /// Number of tried angles of joint 7, at least 2.
     pub num_redundancy_samples: usize,
-    /// A solution may miss the position by this much, m.
+    /// Tolerance of the position, m.
     pub position_tolerance_m: f64,
-    /// A solution may miss the orientation by this much, rad.
+    /// Tolerance of the orientation, rad.
     pub angle_tolerance_rad: f64,
-    /// What a radian is worth in metres when a nearest pose must be found for one out of reach.
+    /// Length in metres that counts as much as a radian when the nearest pose of an unreachable one is searched.
     pub metres_per_rad: f64,
 }
 
@@ -50,18 +50,18 @@ impl Default for IkOptions {
     }
 }
 
-/// A configuration and how well it reaches the pose asked for.
+/// A configuration and its deviation from the requested pose.
 #[derive(Debug, Clone, PartialEq)]
 pub struct IkSolution {
     /// Joint positions within the limits, rad.
     pub q: JointVector,
     /// The tcp pose that `q` reaches.
     pub base_from_tcp: Isometry3<f64>,
-    /// Distance between the positions reached and asked for, m.
+    /// Distance between the reached and the requested position, m.
     pub position_residual_m: f64,
-    /// Angle between the orientations reached and asked for, rad.
+    /// Angle between the reached and the requested orientation, rad.
     pub angle_residual_rad: f64,
-    /// Distance of the joint nearest to one of its limits, rad.
+    /// Distance of the joint closest to one of its limits, rad.
     pub limit_margin_rad: f64,
     /// The cost of [`IkOptions`]; lower is better.
     pub cost: f64,

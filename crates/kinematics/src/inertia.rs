@@ -36,8 +36,8 @@ impl LinkInertia {
         (self.mass_kg, self.center_m) = (mass_kg, middle);
     }
 
-    /// Force (N) and torque about the link's origin (N·m) that give the body its motion: the origin's acceleration, the turn and its rate, all
-    /// in the link's axes.
+    /// Force (N) and torque about the link's origin (N·m) for a motion of the body: the origin's acceleration, the
+    /// angular velocity and its rate, all in the link's axes.
     pub(crate) fn force_and_torque(
         &self,
         acceleration: &Vector3<f64>,
@@ -51,7 +51,7 @@ impl LinkInertia {
     }
 }
 
-/// Inertia of a point mass about an origin that it is away from.
+/// Inertia of a point mass about an origin at this distance.
 fn point_inertia(mass_kg: f64, away_m: &Vector3<f64>) -> Matrix3<f64> {
     (Matrix3::identity() * away_m.norm_squared() - away_m * away_m.transpose()) * mass_kg
 }

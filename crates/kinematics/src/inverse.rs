@@ -2,12 +2,13 @@
 //!
 //! A Franka has one joint more than a pose needs. For each angle of joint 7 on a grid, [`crate::analytic`] gives every
 //! configuration; those inside the limits are compared by [`IkOptions`]' cost, and the best is refined over q7. So the
-//! search covers all branches of solutions, needs no random restarts and is the same on every call. Where the grid finds nothing, the
-//! branches that break limits least are refined over q7, which finds poses that only a sliver of angles reaches; if that
-//! fails as well, damped least squares within the limits gives the nearest pose and the error names the reason.
+//! search covers all branches of solutions, needs no random restarts and is deterministic. If the grid finds nothing,
+//! the branches with the smallest limit violations are refined over q7, which finds poses that only a narrow range of
+//! angles reaches; if that fails as well, damped least squares within the limits gives the nearest pose and the error
+//! names the reason.
 //!
-//! An arm without a closed form is solved by damped least squares from many starts, always the same ones: slower, and of the redundant
-//! joint's angles only those are compared that the starts lead to.
+//! An arm without a closed form is solved by damped least squares from a fixed set of many starts: this is slower, and
+//! only the redundant joint's angles to which the starts lead are compared.
 
 use nalgebra::Isometry3;
 use rand::{Rng, SeedableRng};
@@ -31,8 +32,8 @@ impl ArmGeometry {
     ///
     /// # Errors
     /// [`KinematicsError::OutOfReach`] and [`KinematicsError::JointLimit`] carry the nearest pose;
-    /// [`KinematicsError::NotFinite`], [`KinematicsError::NotARotation`] and [`KinematicsError::InvalidOption`] for input that
-    /// makes no sense.
+    /// [`KinematicsError::NotFinite`], [`KinematicsError::NotARotation`] and [`KinematicsError::InvalidOption`] for
+    /// invalid input.
     pub fn inverse(
         &self,
         base_from_tcp: &Isometry3<f64>,
@@ -52,9 +53,9 @@ impl ArmGeometry {
         best.map(|branch| search.refine(branch)).and_then(|q| search.accept(&q)).map_or_else(|| search.rescue(), Ok)
     }
 
-    /// Finds the best configuration of each way of the arm (elbow, shoulder, stretch of joint 7), best first.
+    /// Finds the best configuration of each branch of the arm (elbow, shoulder, interval of joint 7), best first.
     ///
-    /// For a caller with further conditions, such as a straight path that begins there.
+    /// For a caller with further conditions, such as a straight path that starts there.
     ///
     /// # Errors
     /// As [`ArmGeometry::inverse`]; the list is never empty.
@@ -78,7 +79,7 @@ impl ArmGeometry {
     }
 }
 
-/// The best grid point of one stretch of q7 over which one branch stays inside the limits.
+/// The best grid point of one interval of q7 in which one branch stays inside the limits.
 #[derive(Debug, Clone, Copy)]
 struct Branch {
     branch_idx: usize,
@@ -95,19 +96,21 @@ struct Search<'a> {
     posture: JointVector,
     limits: JointLimits,
     options: &'a IkOptions,
-    /// Angles of joint 7 that are tried, ascending.
+    /// Tried angles of joint 7, ascending.
     grid: Vec<f64>,
 }
 
-/// Violations this small are rounding, and are clamped away.
+/// Violations this small are rounding errors and are clamped.
 const LIMIT_ROUNDING_RAD: f64 = 1e-9;
-/// Weight of geometric infeasibility against radians beyond limits when the least bad solution is sought.
+/// Weight of geometric infeasibility relative to radians beyond limits in the search for the solution with the smallest
+/// violation.
 const INFEASIBILITY_RAD: f64 = 10.0;
 const NUM_REFINEMENTS: usize = 24;
 const NUM_BISECTIONS: usize = 12;
-/// Branches tried when nothing on the grid is feasible.
+/// Number of branches tried if nothing on the grid is feasible.
 const NUM_RESCUES: usize = 8;
-/// Random starts for an arm without a closed form; of configurations nearer to each other than this only the best is kept, rad.
+/// Number of random starts for an arm without a closed form; of configurations closer together than this (rad) only the
+/// best is kept.
 const NUM_STARTS: usize = 60;
 const MIN_APART_RAD: f64 = 0.1;
 
@@ -149,7 +152,7 @@ impl<'a> Search<'a> {
         analytic_solutions(self.arm, &self.base_from_flange, q7, self.seed[0])
     }
 
-    /// The best grid point of every feasible stretch of every branch.
+    /// The best grid point of every feasible interval of every branch.
     fn branches(&self) -> Vec<Branch> {
         let mut open: [Option<Branch>; NUM_BRANCHES] = [None; NUM_BRANCHES];
         let mut closed = Vec::new();
@@ -191,7 +194,7 @@ impl<'a> Search<'a> {
             + options.limit_weight * crowding
     }
 
-    /// Lowers a branch's cost over q7 between the neighbouring grid points, as far as the branch is feasible.
+    /// Minimises a branch's cost over q7 between the neighbouring grid points, as far as the branch is feasible.
     fn refine(&self, branch: Branch) -> JointVector {
         let cost_at = |q7: f64| {
             self.feasible_cost(&self.analytic_solutions(q7)[branch.branch_idx]).unwrap_or((branch.q, f64::INFINITY))
@@ -217,7 +220,7 @@ impl<'a> Search<'a> {
         if cost < branch.cost { q } else { branch.q }
     }
 
-    /// The grid points to either side of one, or itself at the ends of the grid.
+    /// The neighbouring grid points of one, or itself at the ends of the grid.
     fn neighbours(&self, grid_idx: usize) -> (f64, f64) {
         let last = self.grid.len() - 1;
         (self.grid[grid_idx.saturating_sub(1)], self.grid[(grid_idx + 1).min(last)])
@@ -237,7 +240,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// The solution at `q`, polished where the closed form lost digits, if it meets the tolerances.
+    /// The solution at `q`, refined where the closed form lost digits, if it meets the tolerances.
     fn accept(&self, q: &JointVector) -> Option<IkSolution> {
         let solution = self.solution(q);
         if self.meets(&solution) {
@@ -257,7 +260,7 @@ impl<'a> Search<'a> {
         descend(self.arm, &self.limits, self.base_from_tcp, start, metres_per_rad)
     }
 
-    /// Looks between the grid points, then for the nearest pose and the reason of the failure.
+    /// Searches between the grid points, then for the nearest pose and the reason of the failure.
     fn rescue(&self) -> Result<IkSolution, KinematicsError> {
         let mut least_infeasible = self.least_infeasible_solutions();
         least_infeasible.truncate(NUM_RESCUES);
@@ -284,7 +287,7 @@ impl<'a> Search<'a> {
         })
     }
 
-    /// Of solutions that miss the pose the one that misses it least.
+    /// Of solutions that miss the pose the one with the smallest error.
     fn nearest(&self, missed: impl Iterator<Item = IkSolution>) -> IkSolution {
         let miss = |s: &IkSolution| s.position_residual_m.hypot(self.options.metres_per_rad * s.angle_residual_rad);
         missed.min_by(|a, b| miss(a).total_cmp(&miss(b))).expect("the seed is always a start")
@@ -324,13 +327,13 @@ impl<'a> Search<'a> {
         Ok(apart)
     }
 
-    /// How much a solution breaks limits and geometry: 0 where it is a solution.
+    /// The violation of limits and geometry by a solution: 0 for a valid solution.
     fn violation(&self, solution: &AnalyticSolution) -> f64 {
         let beyond: f64 = self.limits.margins(&solution.q).iter().map(|m| (-m).max(0.0)).sum();
         beyond + INFEASIBILITY_RAD * solution.infeasibility
     }
 
-    /// The local minima over q7 of each branch's violation, refined, least bad first.
+    /// The local minima over q7 of each branch's violation, refined, smallest first.
     fn least_infeasible_solutions(&self) -> Vec<AnalyticSolution> {
         let on_grid: Vec<_> = self.grid.iter().map(|q7| self.analytic_solutions(*q7)).collect();
         let mut minima = Vec::new();
@@ -366,7 +369,7 @@ impl<'a> Search<'a> {
     }
 }
 
-/// The lowest value seen of `f` on [low, high] and what came with it, by golden-section search.
+/// The lowest value found of `f` on [low, high] and the result with it, by golden-section search.
 fn golden_section<T>(mut low: f64, mut high: f64, f: impl Fn(f64) -> (T, f64)) -> (T, f64) {
     const SHARE: f64 = 0.618_033_988_749_894_9;
     let mut left = high - SHARE * (high - low);

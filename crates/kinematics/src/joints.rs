@@ -5,7 +5,7 @@ use nalgebra::SVector;
 /// Number of joints of the arm.
 pub const NUM_JOINTS: usize = 7;
 
-/// One number a joint, joint 1 (at the base) first; radians unless said otherwise.
+/// One number per joint, joint 1 (at the base) first; radians unless stated otherwise.
 pub type JointVector = SVector<f64, NUM_JOINTS>;
 
 /// Franka's ready pose, rad: elbow up, hand pointing down in front of the base.
@@ -19,21 +19,21 @@ pub fn ready_pose() -> JointVector {
     JointVector::from(READY_RAD)
 }
 
-/// Where a joint leaves its range.
+/// A joint position outside its range.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LimitViolation {
     /// Joint number as Franka counts, 1 to 7.
     pub joint: usize,
-    /// The position asked for, rad.
+    /// The requested position, rad.
     pub found_rad: f64,
-    /// Smallest position allowed, rad.
+    /// Smallest allowed position, rad.
     pub min_rad: f64,
-    /// Largest position allowed, rad.
+    /// Largest allowed position, rad.
     pub max_rad: f64,
 }
 
 impl LimitViolation {
-    /// How far outside its range the joint is, rad, positive.
+    /// Distance of the joint outside its range, rad, positive.
     pub fn excess_rad(&self) -> f64 {
         (self.min_rad - self.found_rad).max(self.found_rad - self.max_rad)
     }

@@ -1,5 +1,5 @@
-//! An arm: where its hand is, how to get it somewhere, and how fast it may go there. Its geometry is data: [`ArmGeometry::panda`],
-//! [`ArmGeometry::fr3`].
+//! An arm: the pose of its hand, configurations for a pose, and motions within its limits. Its geometry is data:
+//! [`ArmGeometry::panda`], [`ArmGeometry::fr3`].
 //!
 //! ```text
 //! base_from_tcp ──► inverse ──► q ──► point-to-point trajectory ─┐
@@ -7,9 +7,10 @@
 //! Plan ──► waypoints ──► rounded path ─────────────────► timed ───┘
 //! ```
 //!
-//! [`collision`] says what the arm would touch, [`planning`] finds motions around it, [`dynamics`] the torques of a motion.
+//! [`collision`] checks contacts of the arm, [`planning`] finds motions around obstacles, [`dynamics`] computes the
+//! torques of a motion.
 //!
-//! Left out: communication with a real robot.
+//! Communication with a real robot is elsewhere.
 //!
 //! ```
 //! use nalgebra::{Isometry3, UnitQuaternion, Vector3};

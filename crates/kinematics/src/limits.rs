@@ -1,4 +1,4 @@
-//! What the robot may do: positions, velocities, accelerations, jerks and torques, in joint and Cartesian space.
+//! Limits of the robot: positions, velocities, accelerations, jerks and torques, in joint and Cartesian space.
 
 use crate::error::KinematicsError;
 use crate::joints::{JointVector, LimitViolation};
@@ -17,7 +17,7 @@ pub struct JointLimits {
     pub acceleration_max: JointVector,
     /// Largest jerks, rad/s³.
     pub jerk_max: JointVector,
-    /// Largest torques, N·m; [`JointLimits::scaled`] leaves them.
+    /// Largest torques, N·m; [`JointLimits::scaled`] does not change them.
     pub torque_max: JointVector,
 }
 
@@ -41,23 +41,23 @@ impl JointLimits {
         (q - self.position_min).zip_map(&(self.position_max - q), f64::min)
     }
 
-    /// The joint that is furthest outside its range, if any is by more than `tolerance_rad`.
+    /// The joint that is furthest outside its range, if by more than `tolerance_rad`.
     pub fn worst_violation(&self, q: &JointVector, tolerance_rad: f64) -> Option<LimitViolation> {
         let (joint_idx, margin) = self.margins(q).argmin();
         (margin < -tolerance_rad).then(|| self.violation_at(q, joint_idx))
     }
 
-    /// The nearest joint positions inside the ranges.
+    /// The closest joint positions inside the ranges.
     pub fn clamp(&self, q: &JointVector) -> JointVector {
         q.sup(&self.position_min).inf(&self.position_max)
     }
 
-    /// Middle of each joint's range, rad.
+    /// Centre of each joint's range, rad.
     pub fn middle(&self) -> JointVector {
         (self.position_min + self.position_max) * 0.5
     }
 
-    /// Whether these angles, which were given in degrees, break the limits, and the same numbers in radians would not.
+    /// Whether these angles, given in degrees, violate the limits although the same numbers in radians would not.
     pub fn are_radians_given_as_degrees(&self, q: &JointVector) -> bool {
         self.worst_violation(q, 0.0).is_some() && self.worst_violation(&q.map(f64::to_degrees), 0.0).is_none()
     }
@@ -91,7 +91,7 @@ pub struct CartesianLimits {
 }
 
 impl CartesianLimits {
-    /// The same limits multiplied by the given factors, linear and angular alike.
+    /// The same limits multiplied by the given factors, both linear and angular.
     ///
     /// # Errors
     /// A factor outside (0, 1] is a [`KinematicsError::InvalidOption`].

@@ -1,4 +1,4 @@
-//! The configuration within the joint limits whose tcp comes nearest to a pose: damped least squares in a box.
+//! The configuration within the joint limits whose tcp is closest to a pose: damped least squares in a box.
 
 use nalgebra::{Isometry3, SMatrix, Vector6};
 
@@ -10,14 +10,14 @@ const MAX_ITERATIONS: usize = 300;
 const INITIAL_DAMPING: f64 = 1e-3;
 const MIN_DAMPING: f64 = 1e-12;
 const MAX_DAMPING: f64 = 1e6;
-/// Steps that gain less than this share of the cost end the descent.
+/// The descent ends when a step gains less than this share of the cost.
 const MIN_RELATIVE_GAIN: f64 = 1e-10;
 const NEGLIGIBLE_COST: f64 = 1e-26;
 
-/// Levenberg–Marquardt from `start`, joints held inside `limits` by projection.
+/// Levenberg–Marquardt from `start`; projection keeps the joints inside `limits`.
 ///
-/// Minimises |Δposition|² + (`metres_per_rad` · Δangle)². A joint at its limit whose step points outwards is left out of the
-/// step, so the others slide along the limit instead of stopping there.
+/// Minimises |Δposition|² + (`metres_per_rad` · Δangle)². A joint at its limit whose step points outwards is left out
+/// of the step, so that the others move along the limit instead of stopping there.
 pub(crate) fn descend(
     arm: &ArmGeometry,
     limits: &JointLimits,
@@ -111,14 +111,15 @@ mod tests {
 
     #[test]
     fn descent_stops_inside_the_limits_and_slides_along_them() {
-        // So close to the base joint 4 would have to fold beyond its limit.
+        // So close to the base, joint 4 would have to fold beyond its limit.
         let panda = ArmGeometry::panda();
         let mut target = panda.forward(&ready_pose());
         target.translation.vector = nalgebra::Vector3::new(0.1, 0.0, 0.1);
         let q = descend(&panda, &panda.limits, &target, &ready_pose().add_scalar(0.2), 0.3);
         assert_eq!(panda.limits.worst_violation(&q, 0.0), None);
         assert_eq!(q[3], panda.limits.position_min[3]);
-        // It rests where no joint can lower the cost by a small move inside the limits: the others did not stop with joint 4.
+        // It ends where no joint can lower the cost by a small move inside the limits: the others did not stop with
+        // joint 4.
         let cost = |q: &JointVector| {
             let error = pose_error(&panda.forward(q), &target);
             error.fixed_rows::<3>(0).norm_squared() + 0.09 * error.fixed_rows::<3>(3).norm_squared()

@@ -1,12 +1,12 @@
 //! Straight Cartesian paths as smooth joint paths.
 //!
 //! The tcp's position runs along a line and its orientation turns about one fixed axis (slerp), both linear in the path
-//! parameter `s`. Joints follow by integrating the differential equation
-//! `dq/ds = J⁺ dx/ds - gain · (I - J⁺J) ∇H(q)`, which has smooth solutions, unlike inverse kinematics at each waypoint; the
-//! second term slides the elbow away from joint limits without moving the tcp (H: sum of fourth powers of the joints'
-//! positions in their ranges). Each step is corrected by Newton iterations on the pose itself, so nothing drifts.
+//! parameter `s`. Joints follow by integrating the differential equation `dq/ds = J⁺ dx/ds - gain · (I - J⁺J) ∇H(q)`,
+//! which has smooth solutions, unlike inverse kinematics at each waypoint; the second term moves the elbow away from
+//! joint limits without moving the tcp (H: sum of fourth powers of the joints' positions in their ranges). Each step is
+//! corrected by Newton iterations on the pose itself, so that there is no drift.
 //!
-//! `s` is a length: metres of the line, or radians of the turn times [`LineOptions::metres_per_rad`] where that is more.
+//! `s` is a length: metres of the line, or radians of the turn times [`LineOptions::metres_per_rad`] if that is more.
 
 use nalgebra::{Isometry3, SMatrix, Translation3, UnitQuaternion, Vector3, Vector6};
 
@@ -15,17 +15,17 @@ use crate::error::KinematicsError;
 use crate::geometry::{ArmGeometry, Jacobian, pose_error};
 use crate::joints::{JointVector, NUM_JOINTS};
 
-/// How a straight path is followed.
+/// Settings for following a straight path.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct LineOptions {
     /// Distance between waypoints in `s`, m.
     pub step_m: f64,
-    /// How much length a radian of turning counts for in `s`, m.
+    /// Length in `s` that counts as much as a radian of turning, m.
     pub metres_per_rad: f64,
-    /// How strongly the elbow slides away from joint limits, rad² per m; 0 switches it off.
+    /// Strength of the elbow's motion away from joint limits, rad² per m; 0 disables it.
     pub limit_avoidance: f64,
-    /// Joints may turn by at most this much per metre of `s`; more means that a singularity is near, rad/m.
+    /// Largest turn of the joints per metre of `s`; more means that a singularity is close, rad/m.
     pub max_rate_rad_m: f64,
 }
 
@@ -93,7 +93,7 @@ impl Line {
         )
     }
 
-    /// Velocity of the tcp per metre of `s`, the same all along.
+    /// Velocity of the tcp per metre of `s`, constant along the line.
     fn twist(&self) -> Vector6<f64> {
         let mut twist = Vector6::zeros();
         twist.fixed_rows_mut::<3>(0).copy_from(&self.translation);
@@ -103,17 +103,17 @@ impl Line {
 }
 
 impl JointPath {
-    /// Length in `s`, m; 0 for a path that stands still.
+    /// Length in `s`, m; 0 for a path without motion.
     pub fn length_m(&self) -> f64 {
         self.line.length_m
     }
 
-    /// How far the tcp's position moves, m.
+    /// Distance of the tcp's motion, m.
     pub fn distance_m(&self) -> f64 {
         self.line.translation.norm()
     }
 
-    /// How far the tcp turns, rad.
+    /// Angle of the tcp's rotation, rad.
     pub fn angle_rad(&self) -> f64 {
         self.line.turn.norm()
     }
@@ -161,8 +161,8 @@ impl ArmGeometry {
     /// `start` in rad, inside the limits; the end pose in m in the base frame.
     ///
     /// # Errors
-    /// [`KinematicsError::PathJointLimit`] where a joint would leave its range on the way,
-    /// [`KinematicsError::PathBlocked`] at a singularity or where the arm is too short; both say how far along.
+    /// [`KinematicsError::PathJointLimit`] if a joint would leave its range, [`KinematicsError::PathBlocked`]
+    /// at a singularity or if the arm is too short; both give the position along the path.
     pub fn straight_path(
         &self,
         start: &JointVector,
@@ -211,9 +211,9 @@ impl ArmGeometry {
     }
 }
 
-/// Positions this far beyond a limit are rounding.
+/// Positions this far beyond a limit are rounding errors.
 const LIMIT_ROUNDING_RAD: f64 = 1e-9;
-/// Shorter lines stand still.
+/// Shorter lines count as no motion.
 const MIN_LENGTH_M: f64 = 1e-9;
 /// The five-point formula of the second derivative needs this many.
 const MIN_PIECES: usize = 8;
@@ -235,7 +235,7 @@ impl Follower<'_> {
         let away = self.away_from_limits(q);
         let rate = inverse * self.line.twist() + away - inverse * (jacobian * away);
         if rate.amax() > self.options.max_rate_rad_m {
-            return Err(self.blocked(s, "the arm is stretched to its end or at another singularity"));
+            return Err(self.blocked(s, "the arm is fully stretched or at another singularity"));
         }
         Ok(rate)
     }
@@ -244,7 +244,7 @@ impl Follower<'_> {
         (jacobian * jacobian.transpose())
             .cholesky()
             .map(|factor| jacobian.transpose() * factor.inverse())
-            .ok_or_else(|| self.blocked(s, "the arm is stretched to its end or at another singularity"))
+            .ok_or_else(|| self.blocked(s, "the arm is fully stretched or at another singularity"))
     }
 
     fn away_from_limits(&self, q: &JointVector) -> JointVector {
@@ -256,7 +256,7 @@ impl Follower<'_> {
         away.zip_map(&half_range, |rate, half| if half > 0.0 { rate } else { 0.0 })
     }
 
-    /// One step of Runge and Kutta's fourth order, then Newton's onto the exact pose.
+    /// One step of the fourth-order Runge–Kutta method, then Newton's onto the exact pose.
     fn step(&self, s: f64, q: &JointVector, rate: &JointVector, step_m: f64) -> Result<JointVector, KinematicsError> {
         let half = step_m * 0.5;
         let second = self.rate(s + half, &(q + rate * half))?;
@@ -292,7 +292,7 @@ impl Follower<'_> {
     }
 }
 
-/// Differences of the first derivatives, fourth order inside and at the ends.
+/// Differences of the first derivatives, of fourth order inside and at the ends.
 fn fill_second_derivatives(knots: &mut [Knot], step_m: f64) {
     let last = knots.len() - 1;
     let scale = 1.0 / (12.0 * step_m);
@@ -318,7 +318,7 @@ fn fill_second_derivatives(knots: &mut [Knot], step_m: f64) {
     }
 }
 
-/// The quintic that meets position, first and second derivative at both ends, at `share` of the piece.
+/// The quintic with the given position, first and second derivative at both ends, at `share` of the piece.
 fn hermite(from: &Knot, to: &Knot, step_m: f64, share: f64) -> PathPoint {
     let c1 = from.dq * step_m;
     let c2 = from.ddq * (0.5 * step_m * step_m);

@@ -1,15 +1,16 @@
-//! A way through waypoints with rounded corners, in joint space.
+//! A path through waypoints with rounded corners, in joint space.
 //!
 //! On a straight part q' = u is constant. Around a waypoint q' goes from the unit direction u₀ of the part before to u₁ of the part after:
 //! `q' = u₀ + (u₁ - u₀) (3x² - 2x³)`, x from 0 to 1 over a length 2d, d before the waypoint and d after it. So the path is twice continuously
 //! differentiable, its third derivative is bounded, and each joint's q' lies between those of the two parts.
 //!
-//! Lengths are the time, in seconds, that the slowest joint takes at the Panda's full speed, whichever arm it is: max |Δq| / velocity.
+//! Lengths are the time, in seconds, that the slowest joint takes at the Panda's full speed, for any arm: max |Δq| /
+//! velocity.
 
 use crate::joints::{JointVector, NUM_JOINTS};
 use crate::path::PathPoint;
 
-/// A way through waypoints that does not stop between its ends.
+/// A path through waypoints without stops between its ends.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RoundedPath {
     pieces: Vec<Piece>,
@@ -20,12 +21,12 @@ pub struct RoundedPath {
 /// A part of a path that is straight, or a corner.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Piece {
-    /// Where it begins on the path.
+    /// Its start on the path.
     pub(crate) from: f64,
     pub(crate) length: f64,
     start: JointVector,
     direction: JointVector,
-    /// What the direction changes by; zero on a straight part.
+    /// The change of the direction; zero on a straight part.
     change: JointVector,
 }
 
@@ -37,10 +38,10 @@ pub(crate) struct Corner {
     pub(crate) after: JointVector,
 }
 
-/// The speeds by which lengths are measured, rad/s.
+/// The speeds that define lengths, rad/s.
 const SPEEDS_RAD_S: [f64; NUM_JOINTS] = [2.1750, 2.1750, 2.1750, 2.1750, 2.6100, 2.6100, 2.6100];
 
-/// How long the slowest joint takes at those speeds, s.
+/// Time of the slowest joint at those speeds, s.
 pub(crate) fn length_secs(from: &JointVector, to: &JointVector) -> f64 {
     (to - from).abs().component_div(&JointVector::from(SPEEDS_RAD_S)).max()
 }
@@ -50,7 +51,7 @@ fn direction(from: &JointVector, to: &JointVector) -> JointVector {
 }
 
 impl Corner {
-    /// The corner that begins so far (s) before the waypoint and ends as far after it.
+    /// The corner that starts this far (s) before the waypoint and ends as far after it.
     pub(crate) fn rounded(&self, size_secs: f64, from: f64) -> Piece {
         let (one, other) = (direction(&self.before, &self.waypoint), direction(&self.waypoint, &self.after));
         Piece {
@@ -64,7 +65,7 @@ impl Corner {
 }
 
 impl Piece {
-    /// Configuration and derivatives so far from the piece's beginning.
+    /// Configuration and derivatives at this distance from the piece's start.
     pub(crate) fn at(&self, along: f64) -> PathPoint {
         let x = along / self.length;
         let turned = x * x * (3.0 - 2.0 * x);
@@ -77,7 +78,7 @@ impl Piece {
         }
     }
 
-    /// The most that each joint turns by on the piece as a whole, at its greatest rate all along.
+    /// Upper bound of each joint's turn over the piece, from its largest rate.
     pub(crate) fn max_turns(&self) -> JointVector {
         self.direction.abs().sup(&(self.direction + self.change).abs()) * self.length
     }
@@ -88,11 +89,11 @@ impl Piece {
 }
 
 impl RoundedPath {
-    /// Through waypoints (rad), no two in a row the same; each inner one has its corner's size: how far before the waypoint the corner begins and how
-    /// far after it it ends, s at full speed.
+    /// Through waypoints (rad), with no two equal in a row; each inner one has its corner's size: the distance of the
+    /// corner's start and end from the waypoint, s at full speed.
     ///
     /// # Panics
-    /// Where numbers do not match, a size is not positive, or corners overlap.
+    /// If the numbers do not match, a size is not positive, or corners overlap.
     pub fn new(waypoints: &[JointVector], corner_secs: &[f64]) -> Self {
         assert!(waypoints.len() >= 2 && corner_secs.len() == waypoints.len() - 2, "each inner waypoint has a corner");
         let mut pieces = Vec::with_capacity(2 * waypoints.len());
@@ -121,17 +122,17 @@ impl RoundedPath {
         Self { pieces, start: waypoints[0], end: waypoints[waypoints.len() - 1] }
     }
 
-    /// Length: how long the slowest joint takes at Franka's full speed, s.
+    /// Length: the time of the slowest joint at Franka's full speed, s.
     pub fn length_secs(&self) -> f64 {
         self.pieces.last().map_or(0.0, |last| last.from + last.length)
     }
 
-    /// Where it starts, rad.
+    /// The start, rad.
     pub fn start(&self) -> &JointVector {
         &self.start
     }
 
-    /// Where it ends, rad.
+    /// The end, rad.
     pub fn end(&self) -> &JointVector {
         &self.end
     }
@@ -149,7 +150,7 @@ impl RoundedPath {
     }
 }
 
-/// A straight part that is shorter than this share of what lies between two waypoints is rounding.
+/// A straight part shorter than this share of the distance between two waypoints is a rounding error.
 const ROUNDING: f64 = 1e-9;
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Poses and configurations that the tests of several files start from.
+//! Poses and configurations used by the tests of several files.
 
 use std::f64::consts::PI;
 
@@ -15,7 +15,7 @@ pub fn random_configuration(rng: &mut Pcg64Mcg) -> JointVector {
     JointVector::from_fn(|i, _| rng.random_range(limits.position_min[i]..limits.position_max[i]))
 }
 
-/// The hand straight down, turned by `yaw_rad` about the vertical.
+/// The hand vertically down, turned by `yaw_rad` about the vertical.
 pub fn top_grasp(x: f64, y: f64, z: f64, yaw_rad: f64) -> Isometry3<f64> {
     Isometry3::from_parts(
         Translation3::new(x, y, z),

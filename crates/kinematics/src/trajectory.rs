@@ -1,7 +1,7 @@
 //! Motions in time: joint positions, velocities and accelerations within the robot's limits.
 //!
-//! - Point to point from rest: all joints in proportion along a straight line in joint space, so the path does not depend on
-//!   the speed, and a clearance found for it holds at any.
+//! - Point to point from rest: all joints in proportion along a straight line in joint space, so that the path does not
+//!   depend on the speed, and a clearance found for it holds at any speed.
 //! - Point to point from a state in motion: each joint on its own profile, all ending at the same time (rsruckig).
 //! - Along a straight Cartesian path: `s(t)` is a jerk-limited profile (rsruckig, one degree of freedom) stretched in time
 //!   by the smallest factor that keeps every joint's and the tcp's velocity, acceleration and jerk inside their limits.
@@ -47,7 +47,7 @@ enum Motion {
 struct TimedPath {
     path: JointPath,
     profile: Profile,
-    /// Trajectory time over profile time.
+    /// Trajectory time divided by profile time.
     stretch: f64,
 }
 
@@ -80,7 +80,7 @@ impl Trajectory {
         if distance < MIN_DISTANCE_RAD {
             return Ok(Self { motion: Motion::Still, duration_secs: 0.0, start: at_rest(start), end: *end });
         }
-        // The joint that moves furthest has |direction| = 1; one that hardly moves bounds nothing.
+        // The joint that moves furthest has |direction| = 1; one that hardly moves sets no bound.
         let direction = (end - start) / distance;
         let steepness = direction.abs().add_scalar(f64::MIN_POSITIVE);
         let bound = |limit: &JointVector| limit.component_div(&steepness).min();
@@ -98,14 +98,15 @@ impl Trajectory {
         })
     }
 
-    /// The quickest motion from a state in motion to rest at `end`, each joint on its own profile, all ending together.
+    /// The quickest motion from a state in motion to rest at `end`, each joint with its own profile, all ending
+    /// together.
     ///
     /// # Units and frames
     /// rad, rad/s and rad/s². The path in joint space is curved and depends on the limits.
     ///
     /// # Errors
-    /// As [`Trajectory::point_to_point`], and [`KinematicsError::Trajectory`] where the arm cannot be stopped from the state inside
-    /// the position limits.
+    /// As for [`Trajectory::point_to_point`], and [`KinematicsError::Trajectory`] if the arm cannot be stopped from the
+    /// state inside the position limits.
     pub fn from_motion(
         start: &JointVector,
         start_velocity: &JointVector,
@@ -151,11 +152,11 @@ impl Trajectory {
 
     /// A quick motion from rest to rest along a straight Cartesian path.
     ///
-    /// Of a few cruising speeds the one with the shortest time is taken; it is not the time optimum, which would brake and
-    /// accelerate along the way.
+    /// Of a few cruising speeds the one with the shortest time is used; it is not the time optimum, which would brake
+    /// and accelerate along the path.
     ///
     /// # Errors
-    /// [`KinematicsError::Trajectory`] where the generator fails.
+    /// [`KinematicsError::Trajectory`] if the generator fails.
     pub fn along_path(
         path: JointPath,
         limits: &JointLimits,
@@ -186,12 +187,12 @@ impl Trajectory {
         })
     }
 
-    /// Nearly the quickest motion from rest to rest along a rounded path, within the limits of joints and tcp, the torques of an arm with
-    /// its load among them.
+    /// Nearly the quickest motion from rest to rest along a rounded path, within the limits of joints and tcp,
+    /// including the torques of an arm with its load.
     ///
     /// # Errors
-    /// [`KinematicsError::JointOutOfRange`] for an end outside the limits; [`KinematicsError::Trajectory`] where the joints cannot hold the weight of
-    /// arm and load somewhere on the path.
+    /// [`KinematicsError::JointOutOfRange`] for an end outside the limits; [`KinematicsError::Trajectory`] if the
+    /// joints cannot hold the weight of arm and load somewhere on the path.
     pub fn along_rounded_path(
         path: RoundedPath,
         limits: &JointLimits,
@@ -210,8 +211,8 @@ impl Trajectory {
         })
     }
 
-    /// For a motion along a rounded path: how long it would take, s, with no limit of the jerk. What is computed keeps to the other limits at the places
-    /// of its grid.
+    /// For a motion along a rounded path: its duration, s, without a jerk limit. The other limits are satisfied at the
+    /// points of its grid.
     pub fn without_jerk_limit_secs(&self) -> Option<f64> {
         match &self.motion {
             Motion::AlongRoundedPath(timed) => Some(timed.1.jerkless_secs),
@@ -219,24 +220,25 @@ impl Trajectory {
         }
     }
 
-    /// How long the motion takes, s.
+    /// The duration of the motion, s.
     pub fn duration_secs(&self) -> f64 {
         self.duration_secs
     }
 
-    /// Where the motion starts.
+    /// The start of the motion.
     pub fn start(&self) -> &JointVector {
         &self.start.0
     }
 
-    /// Where the motion ends.
+    /// The end of the motion.
     pub fn end(&self) -> &JointVector {
         &self.end
     }
 
     /// Joint positions (rad), velocities (rad/s) and accelerations (rad/s²) at `time_secs`.
     ///
-    /// Until the start the arm is in its start state, after the end it rests. A time that is not a number reads as the start.
+    /// Before the start the arm is in its start state, after the end it is at rest. A time that is not a number counts
+    /// as the start.
     pub fn sample(&self, time_secs: f64) -> (JointVector, JointVector, JointVector) {
         if time_secs.is_nan() || time_secs <= 0.0 {
             return self.start;
@@ -268,7 +270,8 @@ impl Trajectory {
     }
 }
 
-/// The state at a point of a path that is passed with `ds/dt` and `d²s/dt²`, these of a profile that is stretched in time.
+/// The state at a point of a path that is passed with `ds/dt` and `d²s/dt²`, which belong to a profile that is
+/// stretched in time.
 fn at_progress(point: &PathPoint, velocity: f64, acceleration: f64, stretch: f64) -> State {
     let (velocity, acceleration) = (velocity / stretch, acceleration / stretch.powi(2));
     (point.q, point.dq * velocity, point.dq * acceleration + point.ddq * velocity.powi(2))
@@ -286,13 +289,13 @@ fn check_in_range(what: &'static str, q: &JointVector, limits: &JointLimits) -> 
     }
 }
 
-/// Shorter motions stand still.
+/// Shorter motions count as no motion.
 const MIN_DISTANCE_RAD: f64 = 1e-12;
-/// Positions this far beyond a limit are rounding.
+/// Positions this far beyond a limit are rounding errors.
 const LIMIT_ROUNDING_RAD: f64 = 1e-9;
-/// Cruising speeds tried on a path, as shares of what its steepest joint allows.
+/// Cruising speeds tried on a path, as shares of the speed that its most limiting joint allows.
 const CRUISING_SPEED_SHARES: [f64; 4] = [1.0, 0.75, 0.55, 0.4];
-/// Room between the sampled maximum and the limit, for what lies between samples.
+/// Margin between the sampled maximum and the limit, for values between samples.
 const HEADROOM: f64 = 1.002;
 const SAMPLES_PER_PHASE: usize = 160;
 
@@ -345,8 +348,8 @@ impl Profile {
         progress
     }
 
-    /// Evenly spaced states in each phase of constant jerk, its two ends included: the short phases at the full jerk must
-    /// not fall between samples.
+    /// Evenly spaced states in each phase of constant jerk, its two ends included: the short phases at the full jerk
+    /// must not lie between samples.
     fn states(&self) -> impl Iterator<Item = Progress> + '_ {
         let phases = &self.0.profiles[0][0];
         (0..phases.t.len()).filter(|i| phases.t[*i] > 0.0).flat_map(move |i| {
@@ -374,7 +377,7 @@ impl<'a> Bounds<'a> {
     fn new(path: &JointPath, limits: &'a JointLimits, cartesian: &CartesianLimits) -> Self {
         let linear = path.length_m() / path.distance_m();
         let angular = path.length_m() / path.angle_rad();
-        // A line without translation or without turning divides by zero, and infinity is the right bound.
+        // A line without translation or without rotation divides by zero, and infinity is the right bound.
         Self {
             limits,
             velocity: (cartesian.velocity_m_s * linear).min(cartesian.angular_velocity_rad_s * angular),
@@ -383,7 +386,7 @@ impl<'a> Bounds<'a> {
         }
     }
 
-    /// What the path would allow if it were straight in joint space too.
+    /// The speed that the path would allow if it were also straight in joint space.
     fn fastest(&self, path: &JointPath) -> Progress {
         let mut steepest = JointVector::repeat(f64::MIN_POSITIVE);
         let num_samples = 2 * path.waypoints().len();
@@ -399,7 +402,7 @@ impl<'a> Bounds<'a> {
         }
     }
 
-    /// The factor by which the profile must be stretched in time so that every limit holds, and just holds.
+    /// The smallest factor by which the profile must be stretched in time so that every limit holds.
     ///
     /// Stretching by k divides velocities by k, accelerations by k², jerks by k³.
     fn stretch(&self, path: &JointPath, profile: &Profile) -> f64 {
@@ -423,7 +426,7 @@ impl<'a> Bounds<'a> {
     }
 }
 
-/// The largest share of its limit that a joint takes.
+/// The largest share of its limit used by a joint.
 fn share(values: &JointVector, limits: &JointVector) -> f64 {
     values.abs().component_div(limits).max()
 }

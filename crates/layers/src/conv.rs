@@ -1,4 +1,4 @@
-//! Convolutions with what follows them, and what doubles the size of a map.
+//! Convolutions with the operations that follow them, and layers that double the size of a map.
 //!
 //! Shapes: N images or ROIs, C channels, H×W cells.
 
@@ -80,7 +80,7 @@ impl Norm {
     }
 }
 
-/// A convolution, with a bias or a norm behind it.
+/// A convolution, followed by a bias or a norm.
 #[derive(Module, Debug)]
 pub struct Conv2d {
     /// Kernel, `[C_out, C_in, K, K]`.
@@ -127,7 +127,7 @@ impl Conv2dShape {
         self.out_channels * self.kernel * self.kernel
     }
 
-    /// Draws the parameters. A norm stands instead of the bias.
+    /// Draws the parameters. A norm replaces the bias.
     pub fn init(self, distribution: Distribution, norm: NormKind, init: &mut Initializer) -> Conv2d {
         let Self { in_channels, out_channels, kernel, stride } = self;
         let weight = init.param([out_channels, in_channels, kernel, kernel], distribution);
@@ -236,7 +236,7 @@ pub fn upsample_bilinear_2x(x: Tensor<4>) -> Tensor<4> {
         weights[second * 2 * s + output] += at - first as f32;
     }
     let stretch = Tensor::<1>::from_floats(weights.as_slice(), &x.device()).reshape([s, 2 * s]);
-    // Both axes by a matrix product over the last: [N·C·S, S] x [S, 2S], then the rows alike.
+    // Both axes by a matrix product over the last: [N·C·S, S] x [S, 2S], then the rows in the same way.
     let wide: Tensor<3> = x.reshape([n * c * s, s]).matmul(stretch.clone()).reshape([n * c, s, 2 * s]);
     wide.swap_dims(1, 2)
         .reshape([n * c * 2 * s, s])
@@ -275,7 +275,7 @@ mod tests {
         let expected = tensor(&[-1.0, 1.0, -1.0, 1.0], [1, 4, 1, 1]);
         let found = conv.forward(x.clone()).into_data();
         found.assert_approx_eq::<f32>(&expected.into_data(), Tolerance::absolute(1e-4));
-        // With half of itself added: -0.5, 2.5, 4, 16, and what is negative cut.
+        // With half of itself added: -0.5, 2.5, 4, 16, and negative values are cut.
         let expected = tensor(&[0.0, 2.5, 4.0, 16.0], [1, 4, 1, 1]);
         let found = conv.forward_then(x.clone(), Some(x / 2.0), Activation::Relu).into_data();
         found.assert_approx_eq::<f32>(&expected.into_data(), Tolerance::absolute(1e-4));

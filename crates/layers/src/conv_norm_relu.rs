@@ -1,6 +1,6 @@
-//! A convolution with group norm and ReLU, and several of them: what the small networks are built of.
+//! A convolution with group norm and ReLU, and sequences of them: the blocks of the small networks.
 //!
-//! [`Conv2d`](crate::Conv2d) is the same with any norm; its parameters have other names, which files of weights hold.
+//! [`Conv2d`](crate::Conv2d) is the same with any norm; its parameters have other names, which files of weights use.
 
 use burn::module::{Module, Param};
 use burn::tensor::Tensor;
@@ -55,6 +55,6 @@ impl ConvNormRelu {
 /// Convolutions at one size of map; the first halves it.
 #[derive(Module, Debug)]
 pub struct Stage {
-    /// In their order.
+    /// In order.
     pub convs: Vec<ConvNormRelu>,
 }

@@ -1,7 +1,7 @@
-//! First values of the parameters, from a seed.
+//! Initial values of the parameters, from a seed.
 //!
 //! Values are drawn on the host, one parameter after the other in the order of construction, so
-//! that a seed gives the same bits whatever the device and the number of threads.
+//! that a seed gives the same bits on any device with any number of threads.
 
 use burn::module::Param;
 use burn::tensor::{Device, Tensor, TensorData};
@@ -11,15 +11,15 @@ use rand_pcg::Pcg64Mcg;
 /// Draws the parameters of one model.
 #[derive(Debug)]
 pub struct Initializer {
-    /// `None` draws nothing: zeros stand where numbers would.
+    /// `None` draws nothing: all values are zero.
     rng: Option<Pcg64Mcg>,
     device: Device,
 }
 
-/// A distribution of first values.
+/// A distribution of initial values.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Distribution {
-    /// Every value the same.
+    /// Every value is the same.
     Constant(f64),
     /// Normal around zero.
     Normal {
@@ -51,8 +51,8 @@ impl Initializer {
         Self { rng: Some(Pcg64Mcg::seed_from_u64(seed)), device: device.clone() }
     }
 
-    /// An initialiser for a network that is given all its parameters next: drawing millions of numbers to throw them
-    /// away took a third of the time to open a grasp model.
+    /// An initialiser for a network whose parameters are all set next: drawing millions of unused numbers took a
+    /// third of the time to open a grasp model.
     pub fn blank(device: &Device) -> Self {
         Self { rng: None, device: device.clone() }
     }

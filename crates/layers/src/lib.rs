@@ -1,4 +1,4 @@
-//! What every network is built of: layers, the first values of their parameters, and parameters by name.
+//! The building blocks of every network: layers, the initial values of their parameters, and parameters by name.
 //!
 //! ```text
 //! seed ─ Initializer ─ layers of a network ─ state_dict::export ─ names and values ─ file
@@ -7,7 +7,7 @@
 //!
 //! Parameters are named as in PyTorch; a network's names are the paths of its fields, and files of weights hold them.
 //!
-//! Left out: networks (crates `detection`, `orientation`, `comparison`), optimisers (crate `training`), files.
+//! Elsewhere: networks (crates `detection`, `orientation`, `comparison`), optimisers (crate `training`), files.
 //!
 //! # Example
 //! ```

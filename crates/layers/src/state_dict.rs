@@ -1,4 +1,4 @@
-//! A module's parameters by name, on the host: what a file holds and what an import brings.
+//! A module's parameters by name, on the host: the content of a file or an import.
 //!
 //! Names are the module path joined with dots, as Detectron2 and torch write them, so a key map is a map of strings.
 
@@ -12,14 +12,14 @@ use burn::tensor::{Tensor, TensorData};
 pub struct WeightTensor {
     /// Sizes, outermost first.
     pub shape: Vec<usize>,
-    /// Values, as many as the shape says.
+    /// Values, as many as the shape requires.
     pub values: Vec<f32>,
 }
 
 /// Parameters by name, in the order of their names.
 pub type StateDict = BTreeMap<String, WeightTensor>;
 
-/// What an import did with every name.
+/// The result of an import for every name.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct ImportReport {
     /// Parameters that were set.

@@ -1,4 +1,4 @@
-//! Whether the library that is loaded matches the structs that were compiled in.
+//! Whether the loaded library matches the compiled-in structs.
 
 use std::mem::{MaybeUninit, size_of};
 use std::ptr;
@@ -7,7 +7,7 @@ use crate::bindings::mjVERSION_HEADER;
 use crate::error::LibraryError;
 use crate::library::{self, Functions};
 
-/// Loads libmujoco, once a process, and checks that it is the one of these bindings.
+/// Loads libmujoco, once per process, and checks that it matches these bindings.
 ///
 /// # Errors
 /// [`LibraryError`]: it could not be loaded, or is of another version; the same at every call.
@@ -17,7 +17,7 @@ pub fn load() -> Result<(), LibraryError> {
 
 /// Checks the library's version and the size of every struct that MuJoCo initialises for us.
 ///
-/// It costs microseconds.
+/// It takes microseconds.
 fn check(functions: &Functions) -> Result<(), LibraryError> {
     // SAFETY: `mj_version` takes nothing and returns a constant.
     let found = unsafe { (functions.mj_version)() };
@@ -37,7 +37,7 @@ fn check(functions: &Functions) -> Result<(), LibraryError> {
 }
 
 /// Lets `initialise` write into a buffer larger than `T`, twice and over two different fillings,
-/// and takes the last byte that came out equal both times for the end of the struct.
+/// and takes the last byte that is equal both times as the end of the struct.
 ///
 /// Trailing padding need not be written, hence the tolerance of one alignment.
 fn check_size<T>(name: &'static str, initialise: unsafe extern "C-unwind" fn(*mut T)) -> Result<(), LibraryError> {
@@ -73,7 +73,7 @@ mod tests {
 
     #[test]
     fn a_struct_of_another_size_is_noticed() {
-        /// Writes a struct of 24 bytes whatever `T` is.
+        /// Writes a struct of 24 bytes for any `T`.
         unsafe extern "C-unwind" fn writes_24_bytes<T>(out: *mut T) {
             // SAFETY: `check_size` hands over room for two `T`s of at least 16 bytes.
             unsafe { ptr::write_bytes(out.cast::<u8>(), 0, 24) };

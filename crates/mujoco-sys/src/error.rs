@@ -1,6 +1,6 @@
 //! Errors of loading libmujoco.
 
-/// There is no libmujoco, or it is not the one that these bindings describe.
+/// libmujoco is missing, or it is not the version of these bindings.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LibraryError {
@@ -10,7 +10,7 @@ pub enum LibraryError {
          LD_LIBRARY_PATH may name the folder of libmujoco.so.2.2.2"
     )]
     Missing {
-        /// What the system's loader says.
+        /// The message of the system's loader.
         reason: String,
     },
     /// The library reports another version.
@@ -21,10 +21,10 @@ pub enum LibraryError {
     Version {
         /// Version of the headers, as `mjVERSION_HEADER` (222 means 2.2.2).
         expected: i32,
-        /// Version that the library reports.
+        /// Version reported by the library.
         found: i32,
     },
-    /// The library initialises more or fewer bytes of a struct than the bindings hold.
+    /// The library initialises more or fewer bytes of a struct than the bindings have.
     #[error("libmujoco's {name} takes {found} bytes, expected {expected}: bindings and library differ")]
     StructSize {
         /// Name of the C struct.

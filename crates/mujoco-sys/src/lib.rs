@@ -2,20 +2,20 @@
 //!
 //! ```text
 //! /usr/include/mujoco/*.h ── bindgen (ahead of time) ──> src/bindings.rs ──┐
-//! libmujoco.so.2.2.2 ── loaded when first asked for (library.rs) ─────────┴─> sdg-simulation
+//! libmujoco.so.2.2.2 ── loaded on the first request (library.rs) ──────────┴─> sdg-simulation
 //! ```
 //!
 //! The bindings were generated from the Debian headers and are committed, so that a build needs no
-//! libclang. Feature `buildtime_bindgen` generates them afresh from the headers that are installed,
-//! for another version of MuJoCo. Since a library of another version would read our structs at the
-//! wrong places, [`load`] compares the version and the struct sizes; the tests compare every size and many
-//! offsets with what a C compiler says.
+//! libclang. Feature `buildtime_bindgen` generates them again from the installed headers, for another
+//! version of MuJoCo. Since a library of another version would read our structs at wrong offsets, [`load`]
+//! compares the version and the struct sizes; the tests compare every size and many offsets with the
+//! values of a C compiler.
 //!
-//! A build needs no libmujoco, and a program starts without it. The functions that `sdg-simulation` calls are in library.rs; those
-//! that the bindings declare besides are not linked.
+//! A build needs no libmujoco, and a program starts without it. The functions that `sdg-simulation` calls are in
+//! library.rs; the other functions declared by the bindings are not linked.
 //!
-//! Left out: everything safe (that is `sdg-simulation`), MuJoCo's small vector library, its user
-//! interface and its printing functions.
+//! Not included: everything safe (that is `sdg-simulation`), MuJoCo's small vector library, its
+//! user interface and its printing functions.
 //!
 //! ```
 //! sdg_mujoco_sys::load().expect("libmujoco is 2.2.2");
@@ -45,7 +45,7 @@ mod library;
 pub use bindings::*;
 pub use check::load;
 pub use error::LibraryError;
-// The functions by name: these come before the declarations of the same names in the bindings.
+// The functions by name, before the declarations of the same names in the bindings.
 pub use library::{
     Handler, mj_collision, mj_contactForce, mj_defaultOption, mj_defaultVFS, mj_defaultVisual, mj_deleteData,
     mj_deleteModel, mj_deleteVFS, mj_forward, mj_fullM, mj_id2name, mj_kinematics, mj_loadXML, mj_makeData,

@@ -1,6 +1,6 @@
-//! MuJoCo's functions, in the library that is loaded when they are first asked for.
+//! MuJoCo's functions, in a library that is loaded at first use.
 //!
-//! A program that links libmujoco does not start where it is missing, although most of what it does needs no simulator.
+//! A program linked to libmujoco does not start without it, although most of its commands need no simulator.
 
 use std::ffi::{c_char, c_int, c_uchar};
 use std::sync::OnceLock;
@@ -13,15 +13,15 @@ use crate::bindings::{
 };
 use crate::error::LibraryError;
 
-/// Where Debian and MuJoCo's own archives have the library, best first: the name of this version, then any.
+/// Paths of the library in Debian and in MuJoCo's own archives, best first: the name of this version, then any.
 const NAMES: [&str; 2] = ["libmujoco.so.2.2.2", "libmujoco.so"];
 
-/// Called with MuJoCo's words.
+/// Called with MuJoCo's message.
 pub type Handler = unsafe extern "C-unwind" fn(*const c_char);
 
 static LOADED: OnceLock<Result<Functions, LibraryError>> = OnceLock::new();
 
-/// Loads libmujoco, once a process, if `check` finds it to be the right one.
+/// Loads libmujoco, once per process, if `check` accepts it.
 pub(crate) fn load(check: impl FnOnce(&Functions) -> Result<(), LibraryError>) -> Result<(), LibraryError> {
     let loaded = LOADED.get_or_init(|| {
         let functions = Functions::load()?;
@@ -31,7 +31,7 @@ pub(crate) fn load(check: impl FnOnce(&Functions) -> Result<(), LibraryError>) -
     loaded.as_ref().map(|_| ()).map_err(Clone::clone)
 }
 
-/// The handlers of errors and of warnings. An error's handler may unwind through MuJoCo.
+/// The handlers of errors and of warnings. The error handler may unwind through MuJoCo.
 ///
 /// # Safety
 /// No other thread is inside a function of MuJoCo.
@@ -62,7 +62,7 @@ macro_rules! functions {
             $(pub(crate) $name: unsafe extern "C-unwind" fn($($type),*) $(-> $out)?,)*
             user_error: *mut Option<Handler>,
             user_warning: *mut Option<Handler>,
-            // Unloaded, the addresses would point at nothing.
+            // If it were unloaded, the addresses would be invalid.
             _library: Library,
         }
 
@@ -86,7 +86,7 @@ macro_rules! functions {
             /// MuJoCo's function of this name.
             ///
             /// # Safety
-            /// As MuJoCo's documentation says.
+            /// See MuJoCo's documentation.
             ///
             /// # Panics
             /// Unless [`crate::load`] has succeeded.
@@ -174,7 +174,7 @@ mod tests {
 
     #[test]
     fn a_library_without_the_functions_is_refused() {
-        // The C library is loaded, and no simulator.
+        // The C library is loaded, but not a simulator.
         let error = open(&["libc.so.6"]).map(|library| {
             // SAFETY: nothing is called.
             unsafe { symbol::<Handler>(&library, "mj_version") }.map(|_| ()).unwrap_err().to_string()

@@ -1,4 +1,4 @@
-//! Sizes and offsets of the committed bindings against what a C compiler reads from the headers.
+//! Compares sizes and offsets of the committed bindings with those that a C compiler reads from the headers.
 
 #![allow(clippy::unwrap_used)]
 
@@ -8,8 +8,8 @@ use std::process::Command;
 
 use sdg_mujoco_sys::*;
 
-/// `(C expression, value in the bindings)` of a struct's size and of the fields that the
-/// simulation reads, the last ones of each struct among them.
+/// `(C expression, value in the bindings)` of a struct's size and of the fields that the simulation
+/// reads, including the last ones of each struct.
 macro_rules! layout {
     ($($name:ident { $($field:ident),* $(,)? })*) => {
         vec![$(

@@ -1,11 +1,11 @@
 //! Angles as classes on a circle, and back with a fraction of a class.
 //!
-//! K classes, class k centred on k · 360° / K (divided by the symmetry, see below). A *position* is a place on the
+//! K classes, class k centred on k · 360° / K (divided by the symmetry, see below). A *position* is a point on the
 //! circle of classes in [0, K), with fractions.
 //!
-//! A part that looks the same after a turn by 360° / n cannot tell its angle within n equal choices, and a network
-//! asked to would learn their mean. So the angle is **folded**: n·θ takes θ's place, one turn of the classes is one
-//! n-th of a turn of the part, and the loss does not depend on what no picture shows.
+//! A part that looks the same after a turn by 360° / n has n equivalent angles, and a network trained on one of
+//! them would learn their mean. So the angle is **folded**: n·θ replaces θ, one turn of the classes is one n-th of
+//! a turn of the part, and the loss does not depend on turns that no picture shows.
 
 use std::f64::consts::TAU;
 
@@ -17,37 +17,37 @@ use serde::{Deserialize, Serialize};
 pub struct AngleClasses {
     /// Number of classes, K.
     pub num_classes: usize,
-    /// n: how many turns, the whole one included, leave the part looking the same; 1 for most parts.
+    /// n: the number of turns, the full one included, after which the part looks the same; 1 for most parts.
     pub symmetry: usize,
 }
 
-/// How the true angle becomes the distribution that the network is to give.
+/// The target distribution for a true angle.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Labels {
-    /// All in the nearest class, as in the paper: being off by one degree costs as much as by 180.
+    /// All in the nearest class, as in the paper: an error of one degree costs as much as one of 180.
     Hard,
-    /// A bell around the exact angle that wraps where the circle does.
+    /// A bell around the exact angle, cyclic like the classes.
     VonMises {
         /// Its standard deviation, in classes (degrees, for 360 classes and no symmetry).
         sigma_classes: f64,
     },
 }
 
-/// An angle as read off the network's output.
+/// An angle from the network's output.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AngleReading {
     /// In (-π, π] / n.
     pub angle: Angle,
-    /// Probability that the network gives to the angles near this one, in [0, 1].
+    /// Probability of the angles near this one, in [0, 1].
     pub confidence: f64,
 }
 
 impl AngleClasses {
-    /// Where an angle lies on the circle of classes, in [0, K).
+    /// The position of an angle on the circle of classes, in [0, K).
     pub fn position(&self, angle: Angle) -> f64 {
         let turns = angle.radians() * self.symmetry as f64 / TAU;
         let position = turns.rem_euclid(1.0) * self.num_classes as f64;
-        // A tiny negative angle rounds up to a whole turn.
+        // A very small negative angle rounds up to a full turn.
         if position < self.num_classes as f64 { position } else { 0.0 }
     }
 
@@ -62,7 +62,7 @@ impl AngleClasses {
         self.position(angle).round() as usize % self.num_classes
     }
 
-    /// The smallest turn between two angles of the part that can be seen, in radians, [0, π / n].
+    /// The smallest visible turn between two angles of the part, in radians, [0, π / n].
     pub fn distance(&self, one: Angle, other: Angle) -> f64 {
         let n = self.symmetry as f64;
         Angle::from_radians((one - other).radians() * n).radians().abs() / n
@@ -94,12 +94,12 @@ impl AngleClasses {
             .collect()
     }
 
-    /// Reads the angle off probabilities `[K]` to a fraction of a class: the circular mean within `window` classes on
-    /// either side of the peak.
+    /// Computes the angle from probabilities `[K]` to a fraction of a class: the circular mean within `window`
+    /// classes on both sides of the peak.
     ///
     /// The peak is that of the probabilities smoothed over half a window, so that one high class among empty ones does
-    /// not win over a hill. Beyond the window lies what the network confuses the part with, half a turn away as often
-    /// as not, and no mean should reach for it.
+    /// not win over a broad maximum. Classes beyond the window are confusions, often half a turn away, and must not
+    /// enter the mean.
     pub fn read(&self, probabilities: &[f64], window: usize) -> AngleReading {
         let k = self.num_classes;
         assert_eq!(probabilities.len(), k, "one probability a class");
@@ -132,7 +132,7 @@ mod tests {
     const DEGREES: AngleClasses = AngleClasses { num_classes: 360, symmetry: 1 };
     const SOFT: Labels = Labels::VonMises { sigma_classes: 4.0 };
 
-    /// Rounding of f32 targets and the window's cut-off tails.
+    /// Rounding of f32 targets, and the tails that the window cuts off.
     const READOUT_TOLERANCE_DEGREES: f64 = 1e-3;
 
     #[test]

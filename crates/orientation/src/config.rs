@@ -1,4 +1,4 @@
-//! The orientation CNN's shape and how its output is read, as plain data that a model file can carry.
+//! The orientation CNN's shape and the reading of its output, as plain data that a model file can contain.
 
 use serde::{Deserialize, Serialize};
 
@@ -26,17 +26,17 @@ pub struct OrientationConfig {
     pub norm_groups: usize,
     /// Width of the hidden fully connected layer.
     pub hidden: usize,
-    /// How the angle is read off the logits.
+    /// How the angle is read from the logits.
     pub readout: Readout,
 }
 
-/// How the angle is read off the logits.
+/// How the angle is read from the logits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Readout {
-    /// Classes on either side of the peak whose circular mean is taken; 0 for the peak's own class, as in the paper.
+    /// Classes on either side of the peak in the circular mean; 0 for the peak's own class, as in the paper.
     pub window_classes: usize,
-    /// Whether the crop is shown turned by 0°, 90°, 180° and 270° and the four answers, turned back, are combined: four
-    /// opinions for four times the work.
+    /// Whether the crop is evaluated at turns of 0°, 90°, 180° and 270° and the four results, turned back, are
+    /// combined, for four times the work.
     pub quarter_turns: bool,
 }
 
@@ -59,7 +59,7 @@ impl OrientationConfig {
     /// the class with the highest score is the angle.
     ///
     /// # Source
-    /// Paper, sections IV-A and V; it says nothing of the layers between, which are ours.
+    /// Paper, sections IV-A and V; it does not describe the layers between, which are our choice.
     pub fn paper() -> Self {
         Self {
             input_px: 224,

@@ -1,12 +1,12 @@
-//! The square around a detected box that the network looks at.
+//! The square around a detected box that is the network's input.
 //!
 //! **Square**, because a crop of the box's own shape, stretched to the network's square input, would shear the part:
-//! a bar at 30° in a wide box comes out at another angle, by an amount that depends on the angle itself.
+//! a bar at 30° in a wide box appears at another angle, with an error that depends on the angle itself.
 //!
 //! **Its side is the box's diagonal**, with a margin. A part turned in place changes its box; the longer side of a
 //! bar's box is the bar's length times cos θ, so a crop by the longer side would show the bar 1.4 times as large at 45°
-//! as at 0°. The diagonal of a bar's box is the bar's length at every angle, and the whole part is inside, whatever the
-//! box's error within the margin.
+//! as at 0°. The diagonal of a bar's box is the bar's length at every angle, and the whole part is inside for any error
+//! of the box within the margin.
 
 use image::RgbImage;
 use nalgebra::{Point2, Vector2};
@@ -14,23 +14,23 @@ use sdg_geometry::{Angle, BoundingBox};
 
 use crate::error::{OrientationError, Result};
 
-/// Side of the crop over the diagonal of the box: room for a box that is a little off.
+/// Side of the crop over the diagonal of the box: room for a small error of the box.
 const SIDE_PER_DIAGONAL: f64 = 1.1;
 
-/// What a crop shows where it reaches beyond the image: the mean colour of photos, which the network sees as zero.
+/// Colour of a crop beyond the image: the mean colour of photos, which is zero in the network's input.
 pub const OUTSIDE: [u8; 3] = [124, 116, 104];
 
-/// Most places that are averaged for one pixel of a crop, along each axis: a reduction of eight.
+/// Maximum number of samples averaged for one pixel of a crop, along each axis: a reduction of eight.
 const MAX_TAPS: usize = 8;
 
-/// A square of an image, at times turned: what a crop shows.
+/// A square of an image, possibly turned: the area of a crop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CropWindow {
     /// Centre, in pixels of the image.
     pub center: Point2<f64>,
     /// Side, in pixels of the image.
     pub side: f64,
-    /// Direction of the crop's x axis in the image; zero for detected boxes, anything in training.
+    /// Direction of the crop's x axis in the image; zero for detected boxes, arbitrary in training.
     pub turn: Angle,
 }
 
@@ -49,20 +49,20 @@ impl CropWindow {
         Ok(Self { center: bbox.center(), side, turn: Angle::ZERO })
     }
 
-    /// Where a direction of the image points in the crop.
+    /// The direction in the crop of a direction of the image.
     pub fn crop_angle(&self, image_angle: Angle) -> Angle {
         image_angle - self.turn
     }
 
-    /// Where a place of a crop of `size_px` pixels a side lies in the image, both in pixels.
+    /// The position in the image of a position of a crop of `size_px` pixels per side, both in pixels.
     pub fn image_point(&self, in_crop: &Point2<f64>, size_px: u32) -> Point2<f64> {
         let half = f64::from(size_px) / 2.0;
         let scale = self.side / f64::from(size_px);
         self.center + self.x_axis() * (scale * (in_crop.x - half)) + self.y_axis() * (scale * (in_crop.y - half))
     }
 
-    /// Reads the window into `size_px` × `size_px` pixels. Where it shrinks, it averages over each pixel's whole area,
-    /// so that a crop of a large image looks like one of a small image.
+    /// Reads the window into `size_px` × `size_px` pixels. When reducing, it averages over each pixel's whole area, so
+    /// that a crop of a large image looks like one of a small image.
     pub fn read(&self, image: &RgbImage, size_px: u32) -> RgbImage {
         let scale = self.side / f64::from(size_px);
         let taps = (scale.ceil() as usize).clamp(1, MAX_TAPS);
@@ -97,9 +97,9 @@ impl CropWindow {
     }
 }
 
-/// `f32::floor`, which is a call into the C library where the target has no instruction for it.
+/// `f32::floor`, which is a call into the C library if the target has no instruction for it.
 fn floor(value: f32) -> f32 {
-    // Whole numbers up to here are exact, and fit.
+    // Whole numbers up to this value are exact.
     if value.abs() > 8e6 {
         return value.floor();
     }
@@ -115,7 +115,8 @@ fn rounded(value: f32) -> u8 {
 
 /// The colour between four pixels, whose centres are at halves; [`OUTSIDE`] beyond the image.
 ///
-/// The pretrained weights belong to this order of the sum: `sdg-shape`'s sampling rounds other bits and ends at the border.
+/// The pretrained weights depend on this order of the sum: `sdg-shape`'s sampling rounds differently and ends at the
+/// border.
 fn bilinear(image: &RgbImage, x: f32, y: f32) -> [f32; 3] {
     let (width, height) = (image.width() as i32, image.height() as i32);
     let (left, top) = (floor(x - 0.5), floor(y - 0.5));
@@ -150,7 +151,7 @@ fn bilinear(image: &RgbImage, x: f32, y: f32) -> [f32; 3] {
 ///
 /// # Units and frames
 /// `bbox` in pixels of `image`, x right, y down, the centre of the first pixel at (0.5, 0.5); it may reach beyond the
-/// image, and what lies there is [`OUTSIDE`].
+/// image, where its colour is [`OUTSIDE`].
 ///
 /// # Errors
 /// An image without pixels, a box without area or not finite, a size of zero.
@@ -179,7 +180,7 @@ mod tests {
     fn the_square_has_the_boxs_centre_and_its_diagonal() {
         let window = CropWindow::around(&boxed(10.0, 20.0, 40.0, 60.0)).unwrap();
         assert_eq!(window.center, Point2::new(25.0, 40.0));
-        // A 3-4-5 triangle: 50 px, and a tenth more.
+        // A 3-4-5 triangle: 50 px, plus a tenth.
         assert!((window.side - 55.0).abs() < 1e-9);
         let corner = window.image_point(&Point2::new(0.0, 0.0), 64);
         assert!((corner - Point2::new(-2.5, 12.5)).norm() < 1e-9, "{corner}");

@@ -1,8 +1,8 @@
-//! What can be wrong with the inputs of this crate.
+//! Errors of the inputs of this crate.
 
 use thiserror::Error;
 
-/// An input that the orientation CNN cannot work with. Each message says what was expected and found.
+/// An input with which the orientation CNN cannot work. Each message gives the expected and the found value.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
@@ -11,10 +11,10 @@ pub enum OrientationError {
     #[error("orientation CNN: {field} must be {expected}, found {found}")]
     Config { field: &'static str, expected: String, found: String },
     /// An image has no pixels.
-    #[error("an image to crop needs at least 1x1 pixels, found {width}x{height}")]
+    #[error("an image for cropping needs at least 1x1 pixels, found {width}x{height}")]
     EmptyImage { width: u32, height: u32 },
-    /// A box that nothing can be cropped by.
-    #[error("a box to crop by needs finite corners and a positive area, found ({x1}, {y1}) to ({x2}, {y2})")]
+    /// A box that gives no crop.
+    #[error("a box for cropping needs finite corners and a positive area, found ({x1}, {y1}) to ({x2}, {y2})")]
     BadBox { x1: f64, y1: f64, x2: f64, y2: f64 },
     /// A crop of another size than the network's input.
     #[error("the orientation CNN reads crops of {expected}x{expected} pixels, found {width}x{height}")]
@@ -24,7 +24,7 @@ pub enum OrientationError {
 /// Result of the fallible functions of this crate.
 pub type Result<T> = std::result::Result<T, OrientationError>;
 
-/// Refuses a setting of the network, or of its teaching, that does not hold.
+/// Refuses a setting of the network, or of its teaching, that is out of range.
 ///
 /// # Errors
 /// [`OrientationError::Config`].

@@ -7,10 +7,10 @@
 //! ```
 //!
 //! The angle is the direction of the marked grasp line, `atan2(dy, dx)` in pixels with y down, so that several
-//! demonstrations of one part agree on it however the part lay in each photo.
+//! demonstrations of one part agree on it for any turn of the part in each photo.
 //!
-//! Left out: finding the box (crate `detection`), teaching (crate `training`), parts that look the same at every angle
-//! (there is nothing to learn), files and clocks.
+//! Elsewhere: finding the box (crate `detection`), teaching (crate `training`), files and clocks. Parts that look the
+//! same at every angle are excluded, because there is nothing to learn.
 //!
 //! # Example
 //! ```

@@ -1,8 +1,8 @@
-//! The network: a batch of crops in, logits of angle classes out, angles read off them.
+//! The network: a batch of crops in, logits of angle classes out, and the angles read from them.
 //!
 //! Shapes: N crops, C channels, S the input's side, M the last map's side, K angle classes.
 //!
-//! The last map is flattened, not averaged: where on the crop something is seen is what tells the angle.
+//! The last map is flattened, not averaged, because the position of a feature in the crop determines the angle.
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor, TensorData, activation, read_sync};
@@ -16,7 +16,7 @@ use crate::config::OrientationConfig;
 use crate::crop::OUTSIDE;
 use crate::error::{OrientationError, Result};
 
-/// Grey values that make one unit of the network's input: about the deviation of photos.
+/// Grey values per unit of the network's input: about the deviation of photos.
 const GREY_VALUES_PER_UNIT: f32 = 58.0;
 
 /// Convolutions of stride 2 and two fully connected layers: logits of the angle classes.
@@ -38,15 +38,15 @@ impl OrientationConfig {
     /// For training the device must carry autodiff (`device.autodiff()`; crate `training` has the feature).
     ///
     /// # Errors
-    /// Where [`OrientationConfig::validate`] finds one.
+    /// The errors of [`OrientationConfig::validate`].
     pub fn init(&self, device: &Device, seed: u64) -> Result<OrientationCnn> {
         self.build(Initializer::new(device, seed))
     }
 
-    /// Builds the network on `device` without drawing its parameters, for who sets all of them next.
+    /// Builds the network on `device` without initial values, for a caller that sets all parameters next.
     ///
     /// # Errors
-    /// As [`Self::init`].
+    /// As for [`Self::init`].
     pub fn init_blank(&self, device: &Device) -> Result<OrientationCnn> {
         self.build(Initializer::blank(device))
     }
@@ -69,7 +69,7 @@ impl OrientationConfig {
         }
         let flat = in_channels * self.last_map_px().pow(2);
         let hidden = Linear::init(flat, self.hidden, Distribution::he_normal(flat), &mut init);
-        // Small first logits: every angle is as likely as any other.
+        // Small first logits: all angles are equally likely.
         let classes =
             Linear::init(self.hidden, self.classes.num_classes, Distribution::Normal { std: 0.01 }, &mut init);
         Ok(OrientationCnn { stages, hidden, classes, config: self.clone() })
@@ -96,7 +96,7 @@ impl OrientationCnn {
         self.classes.forward(self.features(crops))
     }
 
-    /// Gives the features that the classes are computed from, `[N, H]` of the hidden layer.
+    /// Returns the features from which the classes are computed, `[N, H]` of the hidden layer.
     ///
     /// # Shapes
     /// - `crops`: `[N, 3, S, S]`
@@ -114,7 +114,7 @@ impl OrientationCnn {
     ///
     /// # Units and frames
     /// The direction of the marked grasp line in the crop, `atan2(dy, dx)` with y down; within the part's symmetry.
-    /// Crops of detected boxes are not turned, so it is the direction in the image, too.
+    /// Crops of detected boxes are not turned, so that it is also the direction in the image.
     ///
     /// # Errors
     /// [`OrientationError::CropSize`] for a crop of another size than [`OrientationConfig::input_px`].
@@ -122,7 +122,7 @@ impl OrientationCnn {
         read_sync(self.predict_async(crop))
     }
 
-    /// [`Self::predict`], awaited; for browsers, which hand over what a graphics card computed in no other way.
+    /// [`Self::predict`], asynchronous; for browsers, which give access to results of a graphics card only in this way.
     ///
     /// # Errors
     /// As there.
@@ -150,7 +150,7 @@ impl OrientationCnn {
         values.chunks_exact(self.config.classes.num_classes).map(<[f32]>::to_vec).collect()
     }
 
-    /// One distribution from those of a crop in equal turns (clockwise as seen, which adds to the angle): the
+    /// One distribution from those of a crop at equal turns (clockwise as seen, which adds to the angle): the
     /// normalised geometric mean, in which a class that is improbable at one turn stays improbable.
     fn combined(&self, log_probabilities: &[Vec<f32>]) -> Vec<f64> {
         let (k, turns) = (self.config.classes.num_classes, log_probabilities.len());
@@ -184,7 +184,7 @@ impl OrientationCnn {
 /// # Panics
 /// Without a crop, or with crops of several sizes.
 pub fn crop_batch(crops: &[RgbImage], device: &Device) -> Tensor<4> {
-    let (width, height) = crops.first().expect("a batch has a crop at least").dimensions();
+    let (width, height) = crops.first().expect("a batch has at least one crop").dimensions();
     let num_pixels = (width * height) as usize;
     let mut values = vec![0f32; crops.len() * 3 * num_pixels];
     for (crop, planes) in crops.iter().zip(values.chunks_exact_mut(3 * num_pixels)) {
@@ -206,7 +206,7 @@ mod tests {
     use image::Rgb;
     use sdg_geometry::Angle;
 
-    /// Bytes of the paper's orientation CNN, which ours may not exceed.
+    /// Size in bytes of the paper's orientation CNN, which ours must not exceed.
     const PAPER_BYTES: usize = 8_000_000;
 
     fn tiny(quarter_turns: bool) -> OrientationCnn {
@@ -247,7 +247,7 @@ mod tests {
 
     #[test]
     fn four_quarter_turns_make_the_reading_turn_with_the_crop() {
-        // An untrained network answers anything, but answers to all four turns of a crop are the same four answers.
+        // An untrained network gives arbitrary answers, but the answers to all four turns of a crop are the same four.
         let network = tiny(true);
         let straight = network.predict(&pattern()).unwrap().angle;
         let clockwise = network.predict(&rotate90(&pattern())).unwrap().angle;

@@ -10,7 +10,8 @@ use crate::watch::Watch;
 
 /// An arm with a hand, simulated or real.
 ///
-/// Calls block until what they ask for is done. An error leaves the arm at rest, or coming to rest by the robot's own means.
+/// Calls block until the requested action is done. After an error the arm is at rest, or the robot itself brings it to
+/// rest.
 pub trait Arm {
     /// Its links, limits and hand.
     fn geometry(&self) -> &ArmGeometry;
@@ -18,13 +19,13 @@ pub trait Arm {
     /// The present state of the arm.
     ///
     /// # Errors
-    /// [`RobotError::Lost`] where it does not answer.
+    /// [`RobotError::Lost`] if it does not answer.
     fn state(&mut self) -> Result<ArmState, RobotError>;
 
-    /// Follows a motion; `watch` sees every state on the way and says when to stop.
+    /// Follows a motion; `watch` sees every state on the way and decides when to stop.
     ///
     /// # Errors
-    /// [`RobotError::Stopped`] after a stop that `watch` asked for, and what the arm itself reports.
+    /// [`RobotError::Stopped`] after a stop requested by `watch`, and errors reported by the arm.
     fn follow(&mut self, motion: &CheckedMotion, watch: &mut Watch) -> Result<MotionEnd, RobotError>;
 
     /// Stands still for some seconds; `watch` sees the states.
@@ -36,49 +37,50 @@ pub trait Arm {
     /// The present state of the hand.
     ///
     /// # Errors
-    /// [`RobotError::Lost`] where it does not answer.
+    /// [`RobotError::Lost`] if it does not answer.
     fn hand(&mut self) -> Result<HandState, RobotError>;
 
-    /// Begins a motion of the hand, which goes on beside the arm's.
+    /// Starts a motion of the hand, which runs in parallel with the arm's.
     ///
     /// # Errors
-    /// [`RobotError::Hand`] where it refuses.
+    /// [`RobotError::Hand`] if it refuses.
     fn start_hand(&mut self, command: HandCommand) -> Result<(), RobotError>;
 
-    /// Waits until the hand has ended what it was asked.
+    /// Waits until the hand has finished its command.
     ///
     /// # Errors
-    /// [`RobotError::Hand`] where it failed or does not end, and as [`Arm::follow`].
+    /// [`RobotError::Hand`] if it failed or does not end, and as for [`Arm::follow`].
     fn finish_hand(&mut self, watch: &mut Watch) -> Result<HandState, RobotError>;
 
-    /// Sets at which contact the arm stops by itself.
+    /// Sets the contact threshold at which the arm stops by itself.
     ///
     /// # Errors
-    /// What the arm reports.
+    /// Errors reported by the arm.
     fn set_contact_sensitivity(&mut self, sensitivity: ContactSensitivity) -> Result<(), RobotError>;
 
-    /// Tells the controller what the hand carries.
+    /// Tells the controller the load of the hand.
     ///
     /// # Errors
-    /// What the arm reports.
+    /// Errors reported by the arm.
     fn set_load(&mut self, load: Load) -> Result<(), RobotError>;
 
     /// Stops arm and hand at once.
     ///
     /// # Errors
-    /// What the arm reports.
+    /// Errors reported by the arm.
     fn stop(&mut self) -> Result<(), RobotError>;
 
-    /// Recovers from a reflex or another error; the arm does not move by it.
+    /// Recovers from a reflex or another error, without moving the arm.
     ///
     /// # Errors
-    /// Where the error stays.
+    /// If the error persists.
     fn recover(&mut self) -> Result<(), RobotError>;
 }
 
-/// An arm that takes torques, and so can yield to what it touches.
+/// An arm that accepts torques and can therefore be compliant.
 pub trait CompliantArm: Arm {
-    /// Comes straight down from where the arm stands until something is felt, presses on it, and stands; `watch` sees every state.
+    /// Moves straight down from the arm's position until it measures a contact, presses on it, and stops; `watch` sees
+    /// every state.
     ///
     /// # Errors
     /// As [`Arm::follow`].

@@ -5,16 +5,16 @@ use sdg_kinematics::JointVector;
 /// Time between two commands of an arm that is driven cycle by cycle, in seconds: 1 kHz.
 pub const PERIOD_SECS: f64 = 1e-3;
 
-/// What the arm's controller does.
+/// Mode of the arm's controller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ArmMode {
-    /// It holds its place and takes commands.
+    /// It holds its position and accepts commands.
     Idle,
     /// It follows a motion.
     Moving,
     /// A person moves it by hand.
     Guiding,
-    /// It stopped by itself, after a contact or a command that it could not follow, and waits to be recovered.
+    /// It stopped by itself, after a contact or a command that it could not follow, and must be recovered.
     Reflex,
     /// The stop button is pressed, or the brakes are closed.
     UserStopped,
@@ -47,9 +47,9 @@ pub struct ArmState {
     pub dq: JointVector,
     /// Commanded joint positions, rad: the controller's reference.
     pub q_commanded: JointVector,
-    /// Estimated torques that come from outside, Nm; zeros where the arm does not estimate them.
+    /// Estimated external torques, Nm; zeros if the arm does not estimate them.
     pub tau_external_nm: JointVector,
-    /// What the controller does.
+    /// Mode of the controller.
     pub mode: ArmMode,
 }
 
@@ -60,11 +60,11 @@ pub struct HandState {
     pub opening_m: f64,
     /// Whether the hand presses on something with the commanded force, at a width near the commanded one.
     pub is_grasping: bool,
-    /// Force of each finger, N, where the hand measures it.
+    /// Force of each finger, N, if the hand measures it.
     pub force_n: Option<f64>,
 }
 
-/// What a hand is asked to do.
+/// A command for the hand.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum HandCommand {
     /// Move to an opening.
@@ -74,9 +74,9 @@ pub enum HandCommand {
         /// Speed at which that distance changes, m/s.
         speed_m_s: f64,
     },
-    /// Close until something resists.
+    /// Close until the fingers meet resistance.
     Grasp {
-        /// The part's width between the fingers, m. Wider or thinner than [`GRASP_TOLERANCE_M`] is no grasp.
+        /// The part's width between the fingers, m. A final width outside [`GRASP_TOLERANCE_M`] is not a grasp.
         width_m: f64,
         /// Speed at which the opening changes, m/s.
         speed_m_s: f64,
@@ -85,13 +85,14 @@ pub enum HandCommand {
     },
 }
 
-/// How much thinner (first) or wider (second) a part may be than the commanded width, m. A width read from a picture is right to
-/// a few millimetres, and a round part is met beside its thickest place; what the fingers must not do is close on nothing.
+/// Tolerances below (first) and above (second) the commanded width of a part, m. A width read from a picture is right
+/// to a few millimetres, and a round part may be gripped beside its thickest place; closing on nothing must be
+/// detected.
 pub const GRASP_TOLERANCE_M: [f64; 2] = [0.03, 0.03];
-/// Fingers that are nearer together than this hold nothing, m.
+/// Fingers closer together than this hold nothing, m.
 pub const MIN_HELD_WIDTH_M: f64 = 0.001;
 
-/// What the hand carries, for the controller's gravity compensation.
+/// The load of the hand, for the controller's gravity compensation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Load {
     /// Mass, kg.
@@ -105,20 +106,20 @@ impl Load {
     pub const NONE: Self = Self { mass_kg: 0.0, center_in_flange_m: [0.0; 3] };
 }
 
-/// At which contact the arm stops by itself.
+/// Contact threshold at which the arm stops by itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ContactSensitivity {
     /// In free motion, where nothing may touch the arm: low thresholds.
     Free,
-    /// Near and with the part, where the table and the part push back.
+    /// Near the part and with it, where the table and the part exert forces.
     Contact,
 }
 
-/// How a motion ended that did not fail.
+/// The end of a motion that did not fail.
 #[derive(Debug, Clone, PartialEq)]
 pub enum MotionEnd {
-    /// The arm is where the motion ends.
+    /// The arm is at the motion's end.
     Arrived,
-    /// Something held the arm up; what touched it, in words.
+    /// An obstacle stopped the arm; the contact, in words.
     Blocked(String),
 }

@@ -1,9 +1,9 @@
-//! Where a camera is fixed.
+//! The fixed pose of a camera.
 
 use nalgebra::Isometry3;
 use sdg_kinematics::ArmGeometry;
 
-/// Where a camera is fixed (optical frame); lengths in metres.
+/// The fixed pose of a camera (optical frame); lengths in metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum CameraPose {
     /// On the hand: `flange_from_camera`.
@@ -21,7 +21,7 @@ impl CameraPose {
         }
     }
 
-    /// The tcp's pose for the camera to be at a pose; that pose itself for one beside the robot.
+    /// The tcp's pose that puts the camera at a pose; for a camera beside the robot, that pose itself.
     pub(crate) fn base_from_tcp(&self, arm: &ArmGeometry, base_from_camera: &Isometry3<f64>) -> Isometry3<f64> {
         let tcp_from_camera = self.tcp_from_camera(arm);
         tcp_from_camera.map_or(*base_from_camera, |tcp_from_camera| base_from_camera * tcp_from_camera.inverse())

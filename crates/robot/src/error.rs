@@ -1,4 +1,4 @@
-//! What can go wrong with a robot, with what was expected and what was found.
+//! Errors of a robot, with the expected and the found value.
 
 use std::error::Error;
 
@@ -13,26 +13,26 @@ use crate::watch::StopReason;
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum RobotError {
-    /// A motion breaks a limit; it was not begun.
-    #[error("the motion was not begun: {0}")]
+    /// A motion violates a limit; it was not started.
+    #[error("the motion was not started: {0}")]
     Unsafe(#[from] Violation),
     /// No motion can be planned.
     #[error(transparent)]
     Planning(#[from] KinematicsError),
-    /// There is no way around what stands in the cell.
-    #[error("no way through the cell: {0}")]
+    /// There is no path around the obstacles of the cell.
+    #[error("no path through the cell: {0}")]
     NoWay(#[from] PlanError),
     /// The arm was stopped on its path.
     #[error("the arm was stopped: {0}")]
     Stopped(StopReason),
     /// The motion was blocked.
-    #[error("the arm was held up: {0}")]
+    #[error("the arm was blocked: {0}")]
     Blocked(String),
     /// The arm stopped by itself.
     #[error("the arm stopped itself: {0}")]
     Reflex(String),
-    /// The arm does not move, since it stopped before.
-    #[error("nothing moves until a person has looked and runs `sdg robot recover`: {0}")]
+    /// The arm does not move because it stopped before.
+    #[error("nothing moves until a person has checked the arm and runs `sdg robot recover`: {0}")]
     Latched(String),
     /// Arm or hand never answered.
     #[error("{peer} could not be reached: {why}")]
@@ -51,10 +51,10 @@ pub enum RobotError {
     /// The hand failed.
     #[error("the hand failed: {0}")]
     Hand(String),
-    /// Perception itself failed, which is not the same as finding nothing.
+    /// Perception itself failed, which differs from finding nothing.
     #[error("perception failed: {0}")]
     Perception(String),
-    /// A setting outside its range, or one that the arm cannot do.
+    /// A setting outside its range, or one that the arm does not support.
     #[error("{what}: expected {expected}, found {found}")]
     Configuration { what: String, expected: String, found: String },
     /// The system refuses real-time scheduling.
@@ -63,13 +63,13 @@ pub enum RobotError {
          rtprio 99\" in /etc/security/limits.conf, and the user in that group), found {found}"
     )]
     NoRealTime { found: String },
-    /// What lies below reports something else.
+    /// A lower layer reports another error.
     #[error(transparent)]
     Device(Box<dyn Error + Send + Sync>),
 }
 
 impl RobotError {
-    /// Whether the arm was, or may have been, in motion: afterwards nothing moves until a person says so.
+    /// Whether the arm was, or may have been, in motion; after such an error nothing moves until a person allows it.
     pub fn latches(&self) -> bool {
         !matches!(
             self,

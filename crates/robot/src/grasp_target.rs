@@ -1,8 +1,8 @@
-//! A grasp as perception tells it.
+//! A grasp from perception.
 
 use nalgebra::Isometry3;
 
-/// Where the hand should close, as perception sees it.
+/// The grasp pose from perception.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GraspTarget {
     /// Pose of the tool centre point when closing, in the base frame, metres: z into the table, y
@@ -10,6 +10,6 @@ pub struct GraspTarget {
     pub base_from_tcp: Isometry3<f64>,
     /// Width of the part between the fingers, in metres.
     pub jaw_width_m: f64,
-    /// How sure perception is, 0 to 1; 0.5 is where to decide.
+    /// Score of perception, 0 to 1; the threshold is 0.5.
     pub score: f64,
 }

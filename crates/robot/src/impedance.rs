@@ -1,17 +1,20 @@
-//! Cartesian impedance: joint torques that let the tcp yield like a spring, where contact is wanted.
+//! Cartesian impedance: joint torques that make the tcp compliant like a spring, for contact.
 //!
 //! ```text
 //! τ = Jᵀ (-K e - ∫ k_i K e dt - D (J q̇ - v_d))  +  (I - Jᵀ Jᵀ⁺) (k_n (q_n - q) - 2 √k_n q̇)  +  coriolis
 //!     └ spring, its integral and damper of the tcp   └ of the elbow, without moving the tcp
 //! ```
-//! J is the tcp's Jacobian in the base frame, e how far the tcp is from where it is wanted (m, and a rotation vector's half, rad),
-//! v_d the twist that is wanted, D = 2 √(K m) for a mass m of the tcp. Gravity is not in it: the robot adds it, of what it was told to carry, too.
+//! J is the tcp's Jacobian in the base frame, e the deviation of the tcp from its desired pose (m, and half of a
+//! rotation vector, rad), v_d the desired twist, D = 2 √(K m) for a mass m of the tcp. Gravity is not included: the
+//! robot adds it, also for the load that was given to it.
 //!
-//! A spring is not exact: at 150 N/m a part of 0.7 kg that the robot was not told of pulls the tcp down by 46 mm, and joint friction of
-//! 1 Nm costs some 20 mm. In free air the integral makes up for both; where something is touched it would press ever more, and is held.
+//! A spring is not exact: at 150 N/m an unreported part of 0.7 kg pulls the tcp down by 46 mm, and joint friction of 1
+//! Nm costs about 20 mm. In free air the integral compensates both; during contact it would press with increasing
+//! force, and is therefore frozen.
 //!
 //! # Source
-//! `cartesian_impedance_control.cpp` of libfranka's examples; the null space and the limit of the torque's rate as franka_ros has them.
+//! `cartesian_impedance_control.cpp` of libfranka's examples; the null space and the limit of the torque's rate as in
+//! franka_ros.
 
 use nalgebra::{Isometry3, SMatrix, Vector6};
 use sdg_kinematics::{ArmGeometry, JointVector};
@@ -21,18 +24,19 @@ use crate::arm_state::PERIOD_SECS;
 /// Keeps the pseudoinverse bounded near singular poses.
 const DAMPING: f64 = 1e-2;
 
-/// How stiff the tcp is held.
+/// Stiffness of the tcp.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Impedance {
     /// Along x, y and z of the base, N/m, and about them, N·m/rad.
     pub stiffness: Vector6<f64>,
-    /// What the damper takes the tcp's mass to be, kg along and kg·m² about each direction: libfranka's example has 1 for all.
+    /// Mass of the tcp assumed by the damper, kg along and kg·m² about each direction: libfranka's example has 1 for
+    /// all.
     pub mass: Vector6<f64>,
-    /// In each direction the spring's force grows by so many times itself in a second, 1/s.
+    /// Growth rate of the spring's force in each direction, as a multiple of itself per second, 1/s.
     pub integral_per_sec: Vector6<f64>,
-    /// Of the elbow about its configuration at the start, N·m/rad.
+    /// Stiffness of the elbow about its configuration at the start, N·m/rad.
     pub null_stiffness: f64,
-    /// A joint's torque changes by at most so much in a cycle, N·m; the robot stops for more.
+    /// Largest change of a joint's torque per cycle, N·m; the robot stops at a larger one.
     pub max_torque_step_nm: f64,
 }
 
@@ -45,8 +49,8 @@ impl Impedance {
         null_stiffness: 10.0,
         max_torque_step_nm: 0.9,
     };
-    /// Held in all directions, with integral action: for free air. The damping is for the arm's own mass at the tcp, some 5 kg; without it
-    /// integral action makes the tcp swing.
+    /// Stiff in all directions, with integral action: for free air. The damping is for the arm's own mass at the tcp,
+    /// about 5 kg; without it integral action makes the tcp oscillate.
     pub const FREE_AIR: Self = Self {
         stiffness: Vector6::new(1000.0, 1000.0, 1000.0, 50.0, 50.0, 50.0),
         mass: Vector6::new(5.0, 5.0, 5.0, 1.0, 1.0, 1.0),
@@ -54,7 +58,7 @@ impl Impedance {
         null_stiffness: 10.0,
         max_torque_step_nm: 0.9,
     };
-    /// Soft along z, held to the sides and in its turn: for pressing on something.
+    /// Soft along z, stiff sideways and in rotation: for pressing on something.
     pub const SOFT_DOWN: Self = Self {
         stiffness: Vector6::new(1000.0, 1000.0, 150.0, 50.0, 50.0, 50.0),
         mass: Vector6::new(5.0, 5.0, 1.0, 1.0, 1.0, 1.0),
@@ -64,7 +68,7 @@ impl Impedance {
     };
 }
 
-/// Where the tcp is wanted.
+/// The desired state of the tcp.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TcpReference {
     /// The pose.
@@ -73,32 +77,32 @@ pub struct TcpReference {
     pub twist: Vector6<f64>,
 }
 
-/// The law with what it remembers from cycle to cycle.
+/// The control law with its state between cycles.
 #[derive(Debug, Clone)]
 pub struct ImpedanceControl {
     impedance: Impedance,
     q_null: JointVector,
     torque: JointVector,
-    /// What the integral presses with, N and N·m.
+    /// Force and torque of the integral, N and N·m.
     integral: Vector6<f64>,
 }
 
-/// What the integral presses with at most, N and N·m.
+/// Largest force and torque of the integral, N and N·m.
 const MAX_INTEGRAL: Vector6<f64> = Vector6::new(15.0, 15.0, 15.0, 5.0, 5.0, 5.0);
 
 impl ImpedanceControl {
-    /// Begins at joint positions (rad), which are the elbow's, after this torque (N·m, without gravity).
+    /// Starts at joint positions (rad), which are the elbow's, after this torque (N·m, without gravity).
     pub fn new(impedance: Impedance, q: JointVector, torque: JointVector) -> Self {
         Self { impedance, q_null: q, torque, integral: Vector6::zeros() }
     }
 
-    /// Goes on with another stiffness; what the integral presses with stays.
+    /// Continues with another stiffness; force and torque of the integral are kept.
     pub fn change(&mut self, impedance: Impedance) {
         self.impedance = impedance;
     }
 
-    /// The torques of the next cycle (N·m) for measured joint positions (rad) and velocities (rad/s); `coriolis` is zero where the
-    /// robot does not tell it, which at the speeds of contact is less than friction.
+    /// The torques of the next cycle (N·m) for measured joint positions (rad) and velocities (rad/s); `coriolis` is
+    /// zero if the robot does not report it; at contact speeds it is less than friction.
     pub fn torque(
         &mut self,
         arm: &ArmGeometry,
@@ -116,7 +120,8 @@ impl ImpedanceControl {
         let force = -spring - self.integral - damping.component_mul(&(jacobian * dq - reference.twist));
         let wanted_null = (self.q_null - q) * null_stiffness - dq * (2.0 * null_stiffness.sqrt());
         let square = jacobian * jacobian.transpose() + SMatrix::<f64, 6, 6>::identity() * (DAMPING * DAMPING);
-        // What of the elbow's torque would press with the tcp is taken out; the sum is positive definite, so there is a factor.
+        // Removes the part of the elbow's torque that would press with the tcp; the sum is positive definite, so that a
+        // factor exists.
         let pressing = square.cholesky().map_or_else(Vector6::zeros, |factor| factor.solve(&(jacobian * wanted_null)));
         let wanted = jacobian.transpose() * (force - pressing) + wanted_null + coriolis;
         self.torque = JointVector::from_fn(|joint, _| {
@@ -132,11 +137,11 @@ impl ImpedanceControl {
     }
 }
 
-/// How far a pose is from the one that is wanted: m, and the vector part of the quaternion between them, in the base frame.
+/// Deviation of a pose from the desired one: m, and the vector part of the quaternion between them, in the base frame.
 pub(crate) fn pose_error(base_from_tcp: &Isometry3<f64>, wanted: &Isometry3<f64>) -> Vector6<f64> {
     let translation = base_from_tcp.translation.vector - wanted.translation.vector;
     let tcp_from_wanted = base_from_tcp.rotation.inverse() * wanted.rotation;
-    // Of the two quaternions of a turn the one of the shorter way.
+    // Of the two quaternions of a rotation the one of the shorter way.
     let sign = if tcp_from_wanted.w < 0.0 { -1.0 } else { 1.0 };
     let rotation = base_from_tcp.rotation * (tcp_from_wanted.imag() * -sign);
     Vector6::new(translation.x, translation.y, translation.z, rotation.x, rotation.y, rotation.z)
@@ -152,7 +157,7 @@ mod tests {
         TcpReference { base_from_tcp, twist: Vector6::zeros() }
     }
 
-    /// The torques once their rate is no longer limited, of an arm that is held at `q`.
+    /// The torques, once their rate is no longer limited, of an arm held at `q`.
     fn settled(impedance: Impedance, q_null: JointVector, q: &JointVector, wanted: Isometry3<f64>) -> JointVector {
         let mut control = ImpedanceControl::new(impedance, q_null, JointVector::zeros());
         let zero = JointVector::zeros();
@@ -219,7 +224,7 @@ mod tests {
         q_null[2] += 0.5;
         let torque = settled(Impedance::SOFT, q_null, &q, here);
         assert!(torque.amax() > 0.1, "{torque}");
-        // The tcp's force that these torques are balanced by.
+        // The tcp's force that balances these torques.
         let square = jacobian * jacobian.transpose();
         let force = square.cholesky().unwrap().solve(&(jacobian * torque));
         assert!(force.amax() < 0.02, "{force}");
@@ -238,9 +243,9 @@ mod tests {
             assert!((torque - last).amax() <= Impedance::SOFT.max_torque_step_nm + 1e-12);
             last = torque;
         }
-        // It takes power from the motion.
+        // It removes power from the motion.
         assert!(last.dot(&dq) < 0.0, "{last}");
-        // What is known of Coriolis torques is added.
+        // Known Coriolis torques are added.
         let mut coriolis = zero;
         coriolis[1] = 0.3;
         let with = ImpedanceControl::new(Impedance::SOFT, q, zero).torque(&panda, &q, &zero, &still(here), &coriolis);

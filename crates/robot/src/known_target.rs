@@ -1,4 +1,4 @@
-//! Perception for an arm that moves nothing: the part is where it was seen, wherever the arm is.
+//! Perception for an arm that does not move: the part is at its known place for any pose of the arm.
 
 use nalgebra::{Isometry3, Point3};
 
@@ -11,20 +11,20 @@ use crate::perception::PartFinder;
 use crate::planned_arm::PlannedArm;
 use crate::sequence::GraspConfig;
 
-/// Places and sizes are exact to so much, m and as a share.
+/// Assumed accuracy of positions and sizes, m and as a share.
 const EXACT: f64 = 1e-4;
 
-/// Finds the same target, or none, wherever the arm is.
+/// Finds the same target, or none, for any pose of the arm.
 #[derive(Debug, Clone, Copy)]
 pub struct KnownTarget {
     target: Option<GraspTarget>,
     camera: CameraPose,
-    /// How far the grasp lies below the marks, m.
+    /// Distance of the grasp below the marks, m.
     marks_over_grasp_m: f64,
 }
 
 impl KnownTarget {
-    /// A target that was seen, for a sequence with this camera and configuration.
+    /// A known target, for a sequence with this camera and configuration.
     pub fn new(target: Option<GraspTarget>, camera: CameraPose, config: &GraspConfig) -> Self {
         let marks_over_grasp_m = config.height.map_or(0.0, |height| height.marks_over_grasp_m());
         Self { target, camera, marks_over_grasp_m }
@@ -36,7 +36,7 @@ impl PartFinder<PlannedArm> for KnownTarget {
         Ok(self.target)
     }
 
-    /// What was put down lies where it was to lie.
+    /// A part that was put down lies at its intended place.
     fn find_nearest(&mut self, _arm: &mut PlannedArm, base_from_tcp: &Isometry3<f64>) -> Result<Option<GraspTarget>> {
         Ok(self.target.map(|target| GraspTarget { base_from_tcp: *base_from_tcp, ..target }))
     }

@@ -1,4 +1,4 @@
-//! One sequence of grasping and placing for every arm, and the limits that each motion is checked against.
+//! The sequence of grasping and placing for every arm, and the limits against which each motion is checked.
 //!
 //! ```text
 //! workcell file ─► SafetyLimits, GraspConfig
@@ -8,9 +8,10 @@
 //! [`Arm`] is implemented by [`FrankaArm`] here and by the simulated workcell in `simulation`. A motion reaches an arm only as a
 //! [`CheckedMotion`], and after an error nothing moves until [`Robot::recover`].
 //!
-//! [`grasp_and_place`] goes on to a [`PlaceGoal`]; [`Robot::plan_around`] finds ways around what stands in the cell.
+//! [`grasp_and_place`] continues to a [`PlaceGoal`]; [`Robot::plan_around`] finds paths around the obstacles of the
+//! cell.
 //!
-//! Left out: cameras and detection (a [`PartFinder`] is handed in), files and terminals.
+//! This crate has no cameras or detection (a [`PartFinder`] is handed in), no files and no terminal.
 //!
 //! ```
 //! use sdg_kinematics::{JointLimits, Trajectory, ready_pose};

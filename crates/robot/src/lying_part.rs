@@ -1,4 +1,4 @@
-//! Parts that lie in the cell, as obstacles.
+//! Parts lying in the cell, as obstacles.
 
 use nalgebra::{Isometry3, Translation3};
 use sdg_geometry::Polygon;
@@ -7,22 +7,22 @@ use sdg_kinematics::collision::{Obstacle, Shape};
 use crate::part_shape::PartShape;
 use crate::room::{MIN_FINGER_ROOM_M, gap_m};
 
-/// Capsules of the finger tips stand out of them by so much along the fingers' motion, m.
+/// Distance by which the finger tips' capsules extend beyond them along the fingers' motion, m.
 const CAPSULES_STAND_OUT_M: f64 = 0.0055;
-/// On straight ways, which lead fingers between parts, these are thinner by that, and by what the planner keeps off everything beyond the room that
-/// fingers must have in a tray (3 mm, and 1 mm), m.
+/// On straight paths, which lead fingers between parts, these capsules are thinner by that distance and by the
+/// planner's margin beyond the room that fingers must have in a tray (3 mm, and 1 mm), m.
 const THINNER_M: f64 = CAPSULES_STAND_OUT_M + 0.003 - MIN_FINGER_ROOM_M;
-/// A part that is thinner is taken to be so thick, m.
+/// Minimum thickness assumed for a part, m.
 const MIN_HALF_M: f64 = 0.0005;
-/// Grasps of two parts are not nearer to each other than this, m: it is the same one.
+/// Grasps closer together than this belong to the same part, m.
 const SAME_WITHIN_M: f64 = 0.015;
 
-/// A part that lies in the cell.
+/// A part lying in the cell.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LyingPart {
-    /// Its grasp as it was marked, base frame: x along the marked line, z down.
+    /// Its grasp as marked, base frame: x along the marked line, z down.
     pub base_from_part: Isometry3<f64>,
-    /// What is known of its shape.
+    /// Its known shape.
     pub shape: PartShape,
 }
 
@@ -37,24 +37,24 @@ impl LyingPart {
         self.shape.outline_in_base(&self.base_from_part)
     }
 
-    /// Whether the two lie one over the other.
+    /// Whether the two overlap as seen from above.
     pub(crate) fn overlaps(&self, other: &Self) -> bool {
         gap_m(&self.outline_in_base(), &other.outline_in_base()) < 0.0
     }
 
-    /// A solid that holds it, from what it lies on up to its top.
+    /// A solid that contains it, from the surface under it to its top.
     pub(crate) fn obstacle(&self, number: usize) -> Obstacle {
         self.solid(number, 0.0)
     }
 
-    /// The same for fingers that go straight down or up beside it.
+    /// The same for fingers that move straight down or up beside it.
     pub(crate) fn obstacle_beside_fingers(&self, number: usize) -> Obstacle {
         self.solid(number, THINNER_M)
     }
 
     fn solid(&self, number: usize, thinner_m: f64) -> Obstacle {
         let half_height_m = 0.5 * self.shape.top_m();
-        // z of the grasp's frame points down: the middle of the height is below the grasp by so much.
+        // z of the grasp's frame points down: the centre of the height is this far below the grasp.
         let middle_z_m = self.shape.grasp_height_m() - half_height_m;
         let (center, shape) = match self.shape.disc() {
             Some((center, radius_m)) => {
@@ -76,7 +76,7 @@ impl LyingPart {
     }
 }
 
-/// Parts that lie, each once: of those at one place the one that was told last.
+/// Lying parts, each once: of several at one place the latest report.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct LyingParts(Vec<LyingPart>);
 
@@ -88,7 +88,7 @@ impl LyingParts {
         parts
     }
 
-    /// A part may lie there, if none is known to.
+    /// A part may lie there, if none is known there yet.
     pub(crate) fn suppose(&mut self, part: LyingPart) {
         if !self.0.iter().any(|other| other.is_at(&part.base_from_part)) {
             self.0.push(part);
@@ -101,7 +101,7 @@ impl LyingParts {
         self.0.push(part);
     }
 
-    /// Nothing lies there any more, or it is to be touched.
+    /// Nothing lies there any more, or contact with it is intended.
     pub(crate) fn take(&mut self, base_from_part: &Isometry3<f64>) {
         self.0.retain(|part| !part.is_at(base_from_part));
     }

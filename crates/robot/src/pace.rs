@@ -7,21 +7,22 @@ use crate::error::{Result, RobotError};
 /// Shares of the arm's velocity, acceleration and jerk limits.
 type Shares = [f64; 3];
 
-/// The largest share of the joints' velocity limits, and that of rehearsals: beyond it nothing was ever tried.
+/// The largest share of the joints' velocity limits, which is that of rehearsals: higher speeds were never tried.
 pub const MAX_SPEED: f64 = 0.6;
-/// The speed of a real arm unless another is set.
+/// The default speed of a real arm.
 pub const DEFAULT_SPEED: f64 = 0.1;
 
-/// How fast each kind of motion goes.
+/// The speed of each kind of motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pace {
-    /// Free motions, of the joints' limits.
+    /// Free motions, as shares of the joints' limits.
     free: Shares,
-    /// Free motions with the part, of the joints' limits: what accelerates slowly does not slide between the fingers.
+    /// Free motions with the part, as shares of the joints' limits: slow acceleration keeps the part from sliding
+    /// between the fingers.
     carry: Shares,
-    /// The last way down, of the tcp's limits.
+    /// The final descent, as shares of the tcp's limits.
     approach: Shares,
-    /// The way up with the part, of the tcp's limits.
+    /// The ascent with the part, as shares of the tcp's limits.
     lift: Shares,
 }
 
@@ -34,7 +35,7 @@ impl Pace {
         lift: [0.25, 0.10, 0.05],
     };
 
-    /// Free motions at a share of the joints' velocity limits; everything else slower in the same proportion.
+    /// Free motions at a share of the joints' velocity limits; all other motions are slower in proportion.
     ///
     /// # Errors
     /// A share that is not above 0 and at most [`MAX_SPEED`].

@@ -1,4 +1,4 @@
-//! What is known of a part's shape.
+//! The known shape of a part.
 
 use nalgebra::{Isometry3, Point2, Point3};
 use sdg_geometry::{Polygon, convex_hull};
@@ -6,14 +6,15 @@ use sdg_kinematics::FINGER_HALF_WIDTH_M;
 
 use crate::error::{Result, RobotError};
 
-/// Outlines reach so far from their grasp at most, m.
+/// Largest extent of an outline from its grasp, m.
 const MAX_RADIUS_M: f64 = 1.0;
-/// An outline that fills at least this share of the circle around it is a disc: a square fills 0.64 of its own.
+/// Minimum share of the surrounding circle that a disc's outline fills: a square fills 0.64 of its circle.
 const DISC_SHARE: f64 = 0.9;
 
-/// A part from above, in the frame of its grasp, and how high it is.
+/// A part as seen from above, in the frame of its grasp, and its height.
 ///
-/// The grasp's frame is that of `base_from_tcp` when the part is held as it was marked: x along the marked line, y across it, z down.
+/// The grasp's frame is that of `base_from_tcp` when the part is held as marked: x along the marked line, y across it,
+/// z down.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PartShape {
     /// Convex, m.
@@ -24,11 +25,12 @@ pub struct PartShape {
 }
 
 impl PartShape {
-    /// A part with these points of its outline (m, the grasp's frame; their convex hull counts), this wide between the fingers (m). Its top and
-    /// its grasp are so high over what it lies on, m.
+    /// A part with these points of its outline (m, in the grasp's frame; their convex hull is used), this width between
+    /// the fingers (m), and these heights of its top and its grasp over the surface under it, m.
     ///
     /// # Errors
-    /// [`RobotError::Configuration`] for numbers that are not finite, an outline without an area, and one that does not hold its grasp within a metre.
+    /// [`RobotError::Configuration`] for numbers that are not finite, for an outline without an area, and for one that
+    /// extends more than a metre from its grasp.
     pub fn new(
         outline: impl IntoIterator<Item = Point2<f64>>,
         jaw_width_m: f64,
@@ -61,11 +63,11 @@ impl PartShape {
         Ok(Self { outline: Polygon { vertices: outline }, jaw_width_m, top_m, grasp_height_m })
     }
 
-    /// What a grasp alone tells of a part: that it is this wide (m) where the fingers hold it. It is taken to be as long as these are wide there, and
-    /// to reach as far over the tcp as below.
+    /// The shape that is known from a grasp alone: the width (m) between the fingers. The part is assumed to be as long
+    /// as it is wide there, and to extend as far above the tcp as below.
     ///
     /// # Errors
-    /// As [`PartShape::new`].
+    /// As for [`PartShape::new`].
     pub fn between_fingers(jaw_width_m: f64, grasp_height_m: f64) -> Result<Self> {
         let [x, y] = [FINGER_HALF_WIDTH_M, 0.5 * jaw_width_m];
         let corners = [[-x, -y], [x, -y], [x, y], [-x, y]].map(Point2::from);
@@ -77,14 +79,14 @@ impl PartShape {
         &self.outline.vertices
     }
 
-    /// Middle and radius (m) of the circle around an outline that fills nearly all of it; `None` for others.
+    /// Centre and radius (m) of the circle around an outline that fills nearly all of it; `None` for others.
     pub(crate) fn disc(&self) -> Option<(Point2<f64>, f64)> {
         let center = self.outline.bounds().center();
         let radius_m = self.outline().iter().map(|p| (p - center).norm()).fold(0.0, f64::max);
         (self.outline.area() >= DISC_SHARE * std::f64::consts::PI * radius_m * radius_m).then_some((center, radius_m))
     }
 
-    /// Middle of the rectangle around the outline, along the grasp's axes, and halves of its sides, m.
+    /// Centre of the rectangle around the outline, along the grasp's axes, and its half sides, m.
     pub(crate) fn bounds(&self) -> (Point2<f64>, [f64; 2]) {
         let bounds = self.outline.bounds();
         (bounds.center(), [0.5 * bounds.width(), 0.5 * bounds.height()])
@@ -95,17 +97,17 @@ impl PartShape {
         self.jaw_width_m
     }
 
-    /// Height of its top over what it lies on, m.
+    /// Height of its top over the surface under it, m.
     pub fn top_m(&self) -> f64 {
         self.top_m
     }
 
-    /// Height of its grasp over what it lies on, m.
+    /// Height of its grasp over the surface under it, m.
     pub fn grasp_height_m(&self) -> f64 {
         self.grasp_height_m
     }
 
-    /// The outline on the table of a part whose grasp is at a pose, m, base frame.
+    /// The outline on the table of a part with its grasp at a pose, m, base frame.
     pub(crate) fn outline_in_base(&self, base_from_part: &Isometry3<f64>) -> Polygon {
         let in_base = |p: &Point2<f64>| (base_from_part * Point3::new(p.x, p.y, 0.0)).xy();
         Polygon { vertices: self.outline().iter().map(in_base).collect() }
@@ -121,7 +123,7 @@ mod tests {
         let corners = [[-0.02, -0.01], [0.02, -0.01], [0.0, 0.0], [0.02, 0.01], [-0.02, 0.01]].map(Point2::from);
         let shape = PartShape::new(corners, 0.02, 0.01, 0.005).unwrap();
         assert_eq!(shape.outline().len(), 4);
-        // The grasp's y is the base's -y, for its z points down.
+        // The grasp's y is the base's -y, because its z points down.
         let down = Isometry3::rotation(nalgebra::Vector3::x() * std::f64::consts::PI);
         let in_base = shape.outline_in_base(&(Isometry3::translation(0.5, 0.1, 0.0) * down));
         assert!(in_base.vertices.iter().all(|p| ((p.x - 0.5).abs() - 0.02).abs() < 1e-12));

@@ -1,4 +1,4 @@
-//! The trait by which the sequence finds a part, and the one that observes its steps.
+//! The trait by which the sequence finds a part, and the trait that observes its steps.
 
 use std::fmt;
 use std::time::Instant;
@@ -10,46 +10,46 @@ use crate::error::Result;
 use crate::grasp_target::GraspTarget;
 use crate::height::{MeasuredHeight, Sighting};
 
-/// Finds the grasp of the taught part with the arm where it stands.
+/// Finds the grasp of the taught part from the arm's present pose.
 pub trait PartFinder<A: Arm> {
-    /// Takes a picture; the best grasp in it, sure or not, `None` where nothing is seen.
+    /// Takes a picture and returns the best grasp in it, with any score; `None` if nothing is seen.
     ///
     /// # Errors
-    /// Where no picture can be taken or perception could not do its work at all; the sequence is given up with this error.
+    /// If no picture can be taken or perception itself fails; the sequence is aborted with this error.
     fn find(&mut self, arm: &mut A) -> Result<Option<GraspTarget>>;
 
-    /// As [`PartFinder::find`], where several parts are seen: the one that is nearest to a grasp (`base_from_tcp`).
+    /// As [`PartFinder::find`] if several parts are seen: the one nearest to a grasp (`base_from_tcp`).
     ///
     /// # Errors
-    /// As [`PartFinder::find`].
+    /// As for [`PartFinder::find`].
     fn find_nearest(&mut self, arm: &mut A, _base_from_tcp: &Isometry3<f64>) -> Result<Option<GraspTarget>> {
         self.find(arm)
     }
 
-    /// Takes a picture and tells where it shows parts that may be the one at a grasp, wherever in height: for a height that is not known.
-    /// Nothing where it shows none, and for perception that measures no heights.
+    /// Takes a picture and returns the parts in it that may be the one at a grasp, at any height: for an unknown
+    /// height. Empty if there are none, and for perception that measures no heights.
     ///
     /// # Errors
-    /// As [`PartFinder::find`].
+    /// As for [`PartFinder::find`].
     fn sight(&mut self, _arm: &mut A, _expected: &GraspTarget) -> Result<Vec<Sighting>> {
         Ok(Vec::new())
     }
 
-    /// z of the surface beside a part that two sightings of the last calls of [`PartFinder::sight`] show, looked for about where it is expected;
-    /// `None` where nothing is seen of it.
+    /// z of the surface beside a part shown by two sightings of the last calls of [`PartFinder::sight`], searched near
+    /// its expected height; `None` if nothing of it is seen.
     ///
     /// # Errors
-    /// As [`PartFinder::find`].
+    /// As for [`PartFinder::find`].
     fn surface_beside(&mut self, _pair: &[Sighting; 2], _expected: &MeasuredHeight) -> Result<Option<MeasuredHeight>> {
         Ok(None)
     }
 
-    /// What else the picture of the last call shows for sure: parts of the same kind that lie beside the one that was found.
+    /// The other sure detections in the picture of the last call: parts of the same kind beside the one that was found.
     fn others(&self) -> Vec<GraspTarget> {
         Vec::new()
     }
 
-    /// When the picture of the last call was taken; `None` where time does not pass by a clock.
+    /// The time at which the picture of the last call was taken; `None` if time does not follow a clock.
     fn picture_time(&self) -> Option<Instant> {
         None
     }
@@ -60,7 +60,7 @@ pub trait PartFinder<A: Arm> {
 pub enum GraspStep {
     /// Perception finds the part.
     Detect,
-    /// The arm goes over the part and turns to it.
+    /// The arm moves over the part and turns to it.
     Hover,
     /// The hand comes down to the part.
     Approach,
@@ -70,21 +70,21 @@ pub enum GraspStep {
     Lift,
     /// The part stays between the fingers.
     Hold,
-    /// The arm takes it over its place.
+    /// The arm carries it over its place.
     Carry,
-    /// The hand comes down with it until its place is felt.
+    /// The hand comes down with it until it measures contact with the place.
     PutDown,
     /// The fingers open and the hand goes up.
     Release,
-    /// Perception looks where the part lies.
+    /// Perception measures where the part lies.
     Check,
 }
 
 impl GraspStep {
-    /// The steps of a grasp in their order.
+    /// The steps of a grasp in order.
     pub const ALL: [Self; 6] = [Self::Detect, Self::Hover, Self::Approach, Self::Close, Self::Lift, Self::Hold];
 
-    /// The steps of a grasp and of placing in their order.
+    /// The steps of a grasp and of placing in order.
     pub const WITH_PLACING: [Self; 10] = [
         Self::Detect,
         Self::Hover,
@@ -121,20 +121,20 @@ impl fmt::Display for GraspStep {
     }
 }
 
-/// Looks on, and may know more than the arm does: a simulation knows where the part is.
+/// Observes the steps, and may know more than the arm does: a simulation knows the part's true pose.
 pub trait StepObserver<A: Arm> {
-    /// Before a step.
+    /// Called before a step.
     ///
     /// # Errors
-    /// Ends the sequence.
+    /// An error ends the sequence.
     fn before(&mut self, _arm: &mut A, _step: GraspStep) -> Result<()> {
         Ok(())
     }
 
-    /// After a step, before the hand is asked; why it failed, where it did.
+    /// Called after a step, before the hand is read; returns the reason if the step failed.
     ///
     /// # Errors
-    /// Ends the sequence.
+    /// An error ends the sequence.
     fn after(&mut self, _arm: &mut A, _step: GraspStep) -> Result<Option<String>> {
         Ok(None)
     }

@@ -1,4 +1,4 @@
-//! Where parts are put down: a pose, the cells of a tray, a bin.
+//! Places for putting parts down: a pose, the cells of a tray, a bin.
 
 use nalgebra::{Isometry3, Point2, Translation3, UnitQuaternion, Vector3};
 
@@ -9,17 +9,17 @@ use crate::error::{Result, RobotError};
 pub struct Place {
     /// Its name.
     pub name: String,
-    /// Middle of a pose or a bin, or of a tray's first cell: x and y in the base frame, m.
+    /// Centre of a pose or a bin, or of a tray's first cell: x and y in the base frame, m.
     pub at_m: [f64; 2],
     /// Direction of the part's marked line, and of a tray's columns: about the vertical from the base's x, rad.
     pub yaw_rad: f64,
-    /// What the parts stand on: its z in the base frame, m.
+    /// Surface under the parts: its z in the base frame, m.
     pub surface_m: f64,
-    /// How many parts it takes, and how.
+    /// The number and arrangement of its parts.
     pub kind: PlaceKind,
 }
 
-/// How many parts a place takes, and how.
+/// The number and arrangement of a place's parts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum PlaceKind {
     /// One part in a pose.
@@ -28,17 +28,17 @@ pub enum PlaceKind {
     Tray {
         /// Cells along its x and its y.
         cells: [u32; 2],
-        /// From one cell to the next, m.
+        /// Pitch of the cells, m.
         pitch_m: [f64; 2],
     },
-    /// Any number of parts, anyhow.
+    /// Any number of parts, in any pose.
     Bin {
         /// Length of its inside along x and y, m.
         size_m: [f64; 2],
     },
 }
 
-/// Where one part is to lie.
+/// The goal for one part.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlaceGoal {
     /// The place, and the cell of a tray, in words.
@@ -47,29 +47,30 @@ pub struct PlaceGoal {
     pub at_m: [f64; 2],
     /// Direction of its marked line about the vertical from the base's x, rad.
     pub yaw_rad: f64,
-    /// z of what it is put on in the base frame, m.
+    /// z of the surface under it in the base frame, m.
     pub surface_m: f64,
-    /// Inside of a bin along the goal's x and y, m: there the part may lie anyhow. A pose is to be met where `None`.
+    /// Inside of a bin along the goal's x and y, m: the part may lie there in any pose. `None` for a pose that must be
+    /// met.
     pub bin_m: Option<[f64; 2]>,
-    /// The cells around it, of a tray.
+    /// The neighbouring cells of a tray.
     pub tray: Option<TrayCell>,
 }
 
-/// A cell among others.
+/// A cell and its neighbours.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrayCell {
-    /// From one cell to the next along the tray's x and y, m.
+    /// Pitch along the tray's x and y, m.
     pub pitch_m: [f64; 2],
-    /// The cells around it, up to eight: steps along the tray's x and y.
+    /// The neighbouring cells, up to eight: steps along the tray's x and y.
     pub neighbours: Vec<[i32; 2]>,
 }
 
-/// How far a part lies beside where it was to lie.
+/// Deviation of a part from its goal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlaceOffset {
     /// Along the marked line and across it, m.
     pub beside_m: [f64; 2],
-    /// Turn, without those that the part's symmetry hides, rad.
+    /// Turn, up to the part's symmetry, rad.
     pub angle_rad: f64,
 }
 
@@ -81,7 +82,7 @@ impl PlaceOffset {
 }
 
 impl Place {
-    /// How many cells it has.
+    /// Number of its cells.
     pub fn num_cells(&self) -> u32 {
         match self.kind {
             PlaceKind::Tray { cells: [columns, rows], .. } => columns * rows,
@@ -89,10 +90,10 @@ impl Place {
         }
     }
 
-    /// Where a part is to lie; cells count from 1.
+    /// The goal of a part; cells count from 1.
     ///
     /// # Errors
-    /// [`RobotError::Configuration`] for a cell that there is not.
+    /// [`RobotError::Configuration`] for a cell that does not exist.
     pub fn goal(&self, cell: u32) -> Result<PlaceGoal> {
         let num_cells = self.num_cells();
         if !(1..=num_cells).contains(&cell) {
@@ -118,7 +119,7 @@ impl Place {
         })
     }
 
-    /// The corners of all that it covers of the table, counter-clockwise, base frame, m: of a pose its point alone.
+    /// The corners of its area on the table, counter-clockwise, base frame, m: for a pose only its point.
     pub fn corners(&self) -> Vec<Point2<f64>> {
         let [low, high] = match self.kind {
             PlaceKind::Pose => return vec![self.at([0.0; 2])],
@@ -158,14 +159,15 @@ impl Place {
 }
 
 impl PlaceGoal {
-    /// The pose of the part's grasp there, `base_from_tcp` of a hand that holds it as it was marked: x along the marked line, z down.
+    /// The pose of the part's grasp there, `base_from_tcp` of a hand that holds it as marked: x along the marked line,
+    /// z down.
     pub fn base_from_part(&self, height_m: f64, turn_rad: f64) -> Isometry3<f64> {
         let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
         let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), self.yaw_rad + turn_rad);
         Isometry3::from_parts(Translation3::new(self.at_m[0], self.at_m[1], height_m), turn * down)
     }
 
-    /// As [`PlaceGoal::base_from_part`], in the cells around it.
+    /// As [`PlaceGoal::base_from_part`], in the neighbouring cells.
     pub(crate) fn neighbours_in_base(&self, height_m: f64) -> impl Iterator<Item = Isometry3<f64>> {
         let base_from_part = self.base_from_part(height_m, 0.0);
         let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), self.yaw_rad);
@@ -178,7 +180,7 @@ impl PlaceGoal {
     }
 }
 
-/// Steps from a cell to those around it that there are.
+/// Steps from a cell to its existing neighbours.
 fn neighbours(at: [u32; 2], cells: [u32; 2]) -> Vec<[i32; 2]> {
     let is_there = |axis: usize, step: i32| at[axis].checked_add_signed(step).is_some_and(|to| to < cells[axis]);
     (-1..=1)

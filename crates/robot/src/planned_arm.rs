@@ -1,4 +1,4 @@
-//! An arm that does not move: what a sequence would do, before it is done.
+//! An arm that does not move: it records a sequence before it is executed.
 
 use crate::arm::{Arm, CompliantArm};
 use crate::arm_state::{ArmMode, ArmState, ContactSensitivity, HandCommand, HandState, Load, MotionEnd, PERIOD_SECS};
@@ -8,7 +8,7 @@ use crate::touch::{TouchDown, Touched};
 use crate::watch::Watch;
 use sdg_kinematics::{ArmGeometry, JointVector, LineOptions};
 
-/// What a planned arm did.
+/// An action of a planned arm.
 #[derive(Debug, Clone)]
 pub enum PlannedAction {
     /// A motion, checked as for a real arm.
@@ -17,11 +17,11 @@ pub enum PlannedAction {
     Wait(f64),
     /// A command of the hand.
     Hand(HandCommand),
-    /// Coming down until something is felt: where it was expected.
+    /// Coming down until a contact: at its expected place.
     Down {
         /// Joint positions there, rad.
         end: JointVector,
-        /// How long it takes, s.
+        /// Its duration, s.
         duration_secs: f64,
     },
 }
@@ -36,7 +36,7 @@ pub struct PlannedArm {
 }
 
 impl PlannedArm {
-    /// Stands where a real arm stands, its hand as open as the real one.
+    /// Starts at the real arm's position with the real hand's opening.
     pub fn new(geometry: ArmGeometry, q: JointVector, opening_m: f64) -> Self {
         let zero = JointVector::zeros();
         Self {
@@ -47,12 +47,12 @@ impl PlannedArm {
         }
     }
 
-    /// What it was asked, in order.
+    /// Its commands, in order.
     pub fn actions(&self) -> &[PlannedAction] {
         &self.actions
     }
 
-    /// How long it takes, s; the hand's motions beside the arm's cost nothing.
+    /// Its duration, s; the hand's motions in parallel with the arm's take no time.
     pub fn duration_secs(&self) -> f64 {
         self.state.time_secs
     }
@@ -157,7 +157,7 @@ impl Arm for PlannedArm {
 }
 
 impl CompliantArm for PlannedArm {
-    /// What is felt is where it was expected: above the last part of the way, which is there for what is not known to a millimetre.
+    /// The contact is at its expected place: above the last part of the path, which allows for an uncertain height.
     fn touch_down(&mut self, touch_down: &TouchDown, _watch: &mut Watch) -> Result<Touched> {
         let way_m = (touch_down.max_way_m - touch_down.below_table_m).max(0.0);
         let mut base_from_tcp = self.geometry.forward(&self.state.q);

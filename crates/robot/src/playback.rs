@@ -1,19 +1,19 @@
-//! A checked motion, cycle by cycle, that can be stopped on its own path.
+//! A checked motion, cycle by cycle, which can be stopped on its path.
 //!
-//! To stop, the motion's own time is slowed down to a standstill: `q(s(t))` with `ds/dt` from 1 to 0 along a smooth step. The arm
-//! so stays on the path that was checked, and velocities only shrink. What is added to the acceleration is the velocity times
-//! `d²s/dt²`, at most `1.5 / STOP_SECS` of it: 3.4 rad/s² at 60 % of Franka's speed, where the slowest joint may have 7.5 and the motion itself, corners
-//! and all, takes 40 % of that.
+//! To stop, the motion's own time is slowed down to a standstill: `q(s(t))` with `ds/dt` from 1 to 0 along a smooth
+//! step. The arm thus stays on the checked path, and velocities only decrease. The additional acceleration is the
+//! velocity times `d²s/dt²`, at most `1.5 / STOP_SECS` of it: 3.4 rad/s² at 60 % of Franka's speed. The slowest joint's
+//! limit is 7.5, of which the motion itself, including corners, takes 40 %.
 
 use sdg_kinematics::JointVector;
 
 use crate::arm_state::PERIOD_SECS;
 use crate::safety::CheckedMotion;
 
-/// How long a controlled stop takes, in seconds.
+/// Duration of a controlled stop, in seconds.
 pub const STOP_SECS: f64 = 0.6;
 
-/// Where the arm is wanted at one instant.
+/// The desired state of the arm at one instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointReference {
     /// Positions, rad.
@@ -32,26 +32,26 @@ pub struct Playback<'a> {
     stopping: Option<Stopping>,
 }
 
-/// A stop under way.
+/// A stop in progress.
 #[derive(Debug, Clone, Copy)]
 struct Stopping {
-    /// The motion's time when it began, in seconds.
+    /// The motion's time at its start, in seconds.
     from_secs: f64,
     since_cycles: u64,
 }
 
 impl<'a> Playback<'a> {
-    /// Begins before the first cycle.
+    /// Starts before the first cycle.
     pub fn new(motion: &'a CheckedMotion) -> Self {
         Self { motion, num_cycles: 0, stopping: None }
     }
 
-    /// Where the motion starts, rad.
+    /// The start of the motion, rad.
     pub fn start(&self) -> &JointVector {
         self.motion.start()
     }
 
-    /// Begins a controlled stop; another call changes nothing.
+    /// Starts a controlled stop; another call changes nothing.
     pub fn stop(&mut self) {
         if self.stopping.is_none() {
             let from_secs = self.num_cycles as f64 * PERIOD_SECS;
@@ -59,12 +59,12 @@ impl<'a> Playback<'a> {
         }
     }
 
-    /// Whether a stop was begun.
+    /// Whether a stop was started.
     pub fn is_stopping(&self) -> bool {
         self.stopping.is_some()
     }
 
-    /// The reference of the next cycle; `None` where the arm is to be at rest, at the end or by a stop.
+    /// The reference of the next cycle; `None` when the arm is to be at rest, at the end or after a stop.
     pub fn next_reference(&mut self) -> Option<JointReference> {
         let Some(stopping) = self.stopping else {
             if self.num_cycles >= (self.motion.duration_secs() / PERIOD_SECS).ceil() as u64 {
@@ -124,7 +124,7 @@ mod tests {
 
     #[test]
     fn a_stop_in_a_corner_stays_on_the_path_and_within_the_limits() {
-        // Half of what lies between the path's places that are compared with.
+        // Half of the distance between the compared positions of the path.
         const ON_PATH_RAD: f64 = 1e-3;
         let (path, motion) = curved();
         let dynamics = ArmDynamics::new(&ArmGeometry::panda(), 0.08);
@@ -162,7 +162,7 @@ mod tests {
             largest[0], largest[1]
         );
         assert!(largest.iter().all(|share| *share <= 1.0), "{largest:?}");
-        // Braking in the corner adds to what the corner needs: this is not the motion alone.
+        // Braking in the corner adds to the corner's own accelerations, so that this exceeds the motion alone.
         assert!(largest[0] > 0.45, "{largest:?}");
     }
 
@@ -193,7 +193,7 @@ mod tests {
             assert!(references.len() <= stop_at + (STOP_SECS * 1e3) as usize + 1, "{stop_at}");
             let last = references.last().unwrap();
             assert!(last.dq.amax() < 1e-9, "stopped at {stop_at}: {}", last.dq);
-            // The path is straight in joint space: every joint has done the same share of its way.
+            // The path is straight in joint space: every joint has completed the same share of its distance.
             let (start, way) = (motion.start(), motion.end() - motion.start());
             let shares = (last.q - start).component_div(&way);
             assert!((shares.max() - shares.min()).abs() < 1e-9, "{shares}");

@@ -12,25 +12,25 @@ use crate::safety::{FeltBelow, LimitsFrom, SafetyLimits, Violation};
 use crate::touch::{TouchDown, Touched};
 use crate::watch::{StopReason, Watch};
 
-/// A motion must begin this near to the controller's reference, rad: a difference that a person cannot see.
+/// Largest distance of a motion's start from the controller's reference, rad: not visible to a person.
 const MAX_START_DISTANCE_RAD: f64 = 1e-3;
-/// How often a motion is slowed down so that joints and tcp keep to their limits, and to which share of its speed each time.
+/// How often a motion is slowed down until joints and tcp keep their limits, and the factor of its speed each time.
 const MAX_SLOWDOWNS: usize = 8;
 const SLOWDOWN: f64 = 0.8;
 
-/// An arm, the limits of its motions, and whether it may move at all.
+/// An arm, the limits of its motions, and whether it may move.
 ///
-/// After an error in motion nothing moves any more, neither arm nor hand, until [`Robot::recover`] is called, which a program does
-/// only where a person asked for it.
+/// After an error in motion nothing moves any more, neither arm nor hand, until [`Robot::recover`] is called, which a
+/// program does only at a person's request.
 #[derive(Debug)]
 pub struct Robot<'a, A: Arm> {
     arm: &'a mut A,
     limits: SafetyLimits,
     watch: Watch,
     latched: Option<String>,
-    /// What the hand was told to carry.
+    /// The load that was given to the hand.
     load: Load,
-    /// Where the hand last came down by contact, until it has gone up from there.
+    /// The place where the hand last came down by contact, until it has moved up from there.
     felt_below: Option<FeltBelow>,
 }
 
@@ -41,7 +41,7 @@ impl<'a, A: Arm> Robot<'a, A> {
         Self { arm, limits, watch, latched: None, load: Load::NONE, felt_below: None }
     }
 
-    /// The arm, to take pictures with it and to read what only it has. It is not for moving it.
+    /// The arm, for taking pictures with it and for reading its own data. It must not be used for motions.
     pub fn arm(&mut self) -> &mut A {
         self.arm
     }
@@ -51,7 +51,7 @@ impl<'a, A: Arm> Robot<'a, A> {
         self.arm.geometry()
     }
 
-    /// What every motion keeps to.
+    /// The limits of every motion.
     pub fn limits(&self) -> &SafetyLimits {
         &self.limits
     }
@@ -61,7 +61,7 @@ impl<'a, A: Arm> Robot<'a, A> {
         &self.watch
     }
 
-    /// Why nothing moves, if so.
+    /// The reason why nothing moves, if there is one.
     pub fn latched(&self) -> Option<&str> {
         self.latched.as_deref()
     }
@@ -69,16 +69,16 @@ impl<'a, A: Arm> Robot<'a, A> {
     /// The present state of the arm.
     ///
     /// # Errors
-    /// As [`Arm::state`].
+    /// As for [`Arm::state`].
     pub fn state(&mut self) -> Result<ArmState> {
         let state = self.arm.state();
         self.note(state)
     }
 
-    /// The controller's reference, rad: where the next motion begins.
+    /// The controller's reference, rad: the start of the next motion.
     ///
     /// # Errors
-    /// As [`Arm::state`].
+    /// As for [`Arm::state`].
     pub fn commanded(&mut self) -> Result<JointVector> {
         Ok(self.state()?.q_commanded)
     }
@@ -95,9 +95,10 @@ impl<'a, A: Arm> Robot<'a, A> {
         })
     }
 
-    /// The motion along a way with rounded corners, as fast as `joints`, the tcp's limits and the torques allow, with what the hand carries.
+    /// The motion along a path with rounded corners, as fast as `joints`, the tcp's limits and the torques allow, with
+    /// the hand's load.
     pub(crate) fn plan_through(&self, way: &RoundedPath, joints: &JointLimits) -> Result<Trajectory> {
-        // The fingers' opening shifts 0.12 kg by some centimetres: nothing that a torque shows.
+        // The fingers' opening shifts 0.12 kg by some centimetres, which changes no torque noticeably.
         let Load { mass_kg, center_in_flange_m } = self.load;
         let dynamics = ArmDynamics::new(self.geometry(), self.geometry().hand.opening_max_m)
             .with_load(mass_kg, center_in_flange_m);
@@ -119,9 +120,9 @@ impl<'a, A: Arm> Robot<'a, A> {
         })
     }
 
-    /// The first motion that keeps to the limits of speed; the slowest one tried where none does.
+    /// The first motion within the speed limits; if there is none, the slowest one tried.
     ///
-    /// A path is timed at samples of it; what a joint needs between two of them may be a little more than its limit.
+    /// A path is timed at samples; between two of them a joint may slightly exceed its limit.
     fn slowed(&self, plan: impl Fn(f64) -> Result<Trajectory>) -> Result<Trajectory> {
         let mut share = 1.0;
         for _ in 0..MAX_SLOWDOWNS {
@@ -135,7 +136,8 @@ impl<'a, A: Arm> Robot<'a, A> {
         plan(share)
     }
 
-    /// The limits of a motion from a configuration: a hand that came down by contact, lower than the limits allow, may go straight up.
+    /// The limits of a motion from a configuration: a hand that came down by contact below the limits may move straight
+    /// up.
     pub(crate) fn limits_from(&self, start: &JointVector) -> LimitsFrom<'_> {
         self.limits.starting_at(start, self.felt_below.as_ref())
     }
@@ -143,7 +145,7 @@ impl<'a, A: Arm> Robot<'a, A> {
     /// Checks a motion and follows it to its end.
     ///
     /// # Errors
-    /// [`RobotError::Unsafe`] before anything moves; afterwards what ended the motion, and from then on nothing moves.
+    /// [`RobotError::Unsafe`] before anything moves; later the reason that ended the motion, after which nothing moves.
     pub fn follow(&mut self, trajectory: Trajectory) -> Result<()> {
         let state = self.ready()?;
         let apart = (trajectory.start() - state.q_commanded).abs();
@@ -160,7 +162,7 @@ impl<'a, A: Arm> Robot<'a, A> {
             Err(error) => Err(error),
         };
         if ended.is_ok() {
-            // It has left what it felt: the limits count again.
+            // It has left the contact: the limits apply again.
             self.felt_below = None;
         }
         self.note(ended)
@@ -169,17 +171,17 @@ impl<'a, A: Arm> Robot<'a, A> {
     /// Stands still for some seconds.
     ///
     /// # Errors
-    /// As [`Arm::wait`].
+    /// As for [`Arm::wait`].
     pub fn wait(&mut self, duration_secs: f64) -> Result<()> {
         self.watch.begin();
         let waited = self.arm.wait(duration_secs, &mut self.watch);
         self.note(waited)
     }
 
-    /// Begins a motion of the hand.
+    /// Starts a motion of the hand.
     ///
     /// # Errors
-    /// As [`Robot::follow`].
+    /// As for [`Robot::follow`].
     pub fn start_hand(&mut self, command: HandCommand) -> Result<()> {
         self.ready()?;
         let started = self.arm.start_hand(command);
@@ -189,7 +191,7 @@ impl<'a, A: Arm> Robot<'a, A> {
     /// Waits for the hand.
     ///
     /// # Errors
-    /// As [`Arm::finish_hand`].
+    /// As for [`Arm::finish_hand`].
     pub fn finish_hand(&mut self) -> Result<HandState> {
         self.watch.begin();
         let finished = self.arm.finish_hand(&mut self.watch);
@@ -199,7 +201,7 @@ impl<'a, A: Arm> Robot<'a, A> {
     /// The present state of the hand.
     ///
     /// # Errors
-    /// As [`Arm::hand`].
+    /// As for [`Arm::hand`].
     pub fn hand(&mut self) -> Result<HandState> {
         let hand = self.arm.hand();
         self.note(hand)
@@ -208,7 +210,7 @@ impl<'a, A: Arm> Robot<'a, A> {
     /// As [`Arm::set_contact_sensitivity`].
     ///
     /// # Errors
-    /// What the arm reports.
+    /// Errors reported by the arm.
     pub fn set_contact_sensitivity(&mut self, sensitivity: ContactSensitivity) -> Result<()> {
         let set = self.arm.set_contact_sensitivity(sensitivity);
         self.note(set)
@@ -217,7 +219,7 @@ impl<'a, A: Arm> Robot<'a, A> {
     /// As [`Arm::set_load`].
     ///
     /// # Errors
-    /// What the arm reports.
+    /// Errors reported by the arm.
     pub fn set_load(&mut self, load: Load) -> Result<()> {
         let set = self.arm.set_load(load);
         self.note(set)?;
@@ -225,17 +227,17 @@ impl<'a, A: Arm> Robot<'a, A> {
         Ok(())
     }
 
-    /// Recovers the arm and lets it move again: a person has looked.
+    /// Recovers the arm and allows motions again, after a person has checked it.
     ///
     /// # Errors
-    /// Where the error stays; nothing moves then.
+    /// If the error persists; then nothing moves.
     pub fn recover(&mut self) -> Result<()> {
         self.arm.recover()?;
         self.latched = None;
         Ok(())
     }
 
-    /// The state, where the arm may move now.
+    /// The state, if the arm may move now.
     fn ready(&mut self) -> Result<ArmState> {
         if let Some(why) = &self.latched {
             return Err(RobotError::Latched(why.clone()));
@@ -253,7 +255,7 @@ impl<'a, A: Arm> Robot<'a, A> {
         }
     }
 
-    /// Remembers an error after which nothing moves.
+    /// Stores an error after which nothing moves.
     fn note<T>(&mut self, result: Result<T>) -> Result<T> {
         if let Err(error) = &result
             && error.latches()
@@ -265,15 +267,16 @@ impl<'a, A: Arm> Robot<'a, A> {
     }
 }
 
-/// Share of the tcp's limits at which the way down is checked: it is slower than that.
+/// Share of the tcp's limits at which the descent is checked; the actual descent is slower.
 const TOUCH_SHARES: [f64; 3] = [0.05, 0.05, 0.02];
 
 impl<A: CompliantArm> Robot<'_, A> {
-    /// Comes straight down from where the arm stands until something is felt. The whole way is checked before, with the table as low as
-    /// [`TouchDown::below_table_m`] says.
+    /// Moves straight down from the arm's position until a contact. The whole path is checked before, with the table
+    /// lowered by [`TouchDown::below_table_m`].
     ///
     /// # Errors
-    /// As [`Robot::follow`]; [`crate::RobotError::Configuration`] for a speed or a force that is none for contact.
+    /// As for [`Robot::follow`]; [`crate::RobotError::Configuration`] for a speed or a force that is not suitable for
+    /// contact.
     pub fn touch_down(&mut self, touch_down: &TouchDown) -> Result<Touched> {
         touch_down.validate()?;
         let start = self.ready()?.q_commanded;
@@ -288,7 +291,7 @@ impl<A: CompliantArm> Robot<'_, A> {
         self.limits.lowered(below_m, below_m).check(way)?;
         self.watch.begin();
         let touched = self.arm.touch_down(touch_down, &mut self.watch);
-        // After an error it stands anywhere on the way that was checked.
+        // After an error it may be anywhere on the checked path.
         let lowest_m = touched.as_ref().map_or(lowest.translation.z, |touched| touched.tcp_height_m);
         self.felt_below = Some(FeltBelow::new(&base_from_tcp.translation.vector, lowest_m, below_m));
         self.note(touched)

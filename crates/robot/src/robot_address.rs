@@ -1,4 +1,4 @@
-//! Where a robot is on the network.
+//! The network address of a robot.
 
 use std::fmt;
 use std::str::FromStr;
@@ -7,10 +7,10 @@ use sdg_fci::FciError;
 
 use crate::error::RobotError;
 
-/// Ports of arm and hand unless another is set.
+/// Default ports of arm and hand.
 const ROBOT_PORT: u16 = 1337;
 
-/// `HOST` or `HOST:PORT`; the hand is one port further, as Franka has it.
+/// `HOST` or `HOST:PORT`; the hand is on the next port, as in Franka's convention.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RobotAddress {
     /// Name or IP address.
@@ -22,16 +22,16 @@ pub struct RobotAddress {
 }
 
 impl RobotAddress {
-    /// A device at this address, such as `robot` or `hand`, does not let itself be connected to.
+    /// The error for a device at this address, such as `robot` or `hand`, that does not accept connections.
     pub(crate) fn refused(&self, device: &str, error: FciError) -> RobotError {
         match error {
-            // It was reached, and says itself why it cannot be driven.
+            // The error for a device that was reached and reports why it cannot be driven.
             FciError::Version { .. } => RobotError::Device(Box::new(error)),
             error => RobotError::Unreachable { peer: format!("the {device} at {self}"), why: error.to_string() },
         }
     }
 
-    /// The connection to a device at this address, such as `robot` or `hand`, is lost.
+    /// The error for a device at this address, such as `robot` or `hand`, whose connection is lost.
     pub(crate) fn lost(&self, device: &str, error: &FciError) -> RobotError {
         RobotError::Lost { peer: format!("the {device} at {self}"), why: error.to_string() }
     }

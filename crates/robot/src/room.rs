@@ -1,4 +1,4 @@
-//! Whether a part and the fingers that let it go have room in a cell of a tray, with parts in the cells around it.
+//! Whether a part and the fingers that release it have room in a cell of a tray, with parts in the neighbouring cells.
 //!
 //! ```text
 //!        ┌──────┐  part in the next cell along y
@@ -9,8 +9,8 @@
 //!        └──┬─┬─┘
 //!           └─┘
 //! ```
-//! All cells around count as filled. The order of filling would change nothing for a hand that cannot be turned: its fingers open to both sides
-//! alike, and of two neighbours the second one always has the first beside it.
+//! All neighbouring cells count as filled. The order of filling would change nothing for a hand with a fixed turn: its
+//! fingers open equally to both sides, and of two neighbours the second is always placed beside the first.
 
 use std::f64::consts::TAU;
 
@@ -22,18 +22,20 @@ use crate::error::{Result, RobotError};
 use crate::part_shape::PartShape;
 use crate::place::PlaceGoal;
 
-/// What is to be left between fingers and a part in a neighbouring cell, m: it may lie 2 mm beside its cell before it is taken again.
+/// Minimum distance between fingers and a part in a neighbouring cell, m: it may lie 2 mm beside its cell before it is
+/// grasped again.
 const FINGER_ROOM_M: f64 = 0.002;
-/// What is to be left between two parts, m: both may lie so.
+/// Minimum distance between two parts, m: both may have that offset.
 const PART_ROOM_M: f64 = 2.0 * FINGER_ROOM_M;
-/// Least room for fingers that aim with how a part slides in them, m: they are then not in the middle of their cell.
+/// Minimum room for fingers that compensate the sliding of a part, m: they are then not at the centre of their cell.
 pub(crate) const MIN_FINGER_ROOM_M: f64 = 0.5 * FINGER_ROOM_M;
-/// Turns that are tried of a part that looks the same in all: every 15°, so that both axes of a tray and its diagonals are among them.
+/// Turns that are tried for a part with full rotational symmetry: every 15°, which includes both axes of a tray and its
+/// diagonals.
 const NUM_TURNS: u32 = 24;
 /// Rounding of lengths, m.
 const ROUNDING_M: f64 = 1e-9;
 
-/// Turns in which the part looks the same, rad.
+/// Turns of the part's symmetry, rad.
 pub(crate) fn same_turns_rad(symmetry: RotationalSymmetry) -> Vec<f64> {
     let num = match symmetry {
         RotationalSymmetry::Fold(count) => count.clamp(1, 36),
@@ -43,17 +45,17 @@ pub(crate) fn same_turns_rad(symmetry: RotationalSymmetry) -> Vec<f64> {
     (0..num).map(|turn| TAU * f64::from(turn) / f64::from(num)).collect()
 }
 
-/// How far a hand opens to let a part go, m.
+/// Opening of the hand that releases a part, m.
 pub(crate) fn release_opening_m(width_m: f64, release_margin_m: f64) -> f64 {
     (width_m + release_margin_m).min(HAND_OPENING_MAX_M)
 }
 
 impl PlaceGoal {
-    /// Refuses a cell whose neighbours, if there are parts in them, leave no room for this one, or for fingers that open by `release_margin_m` more
-    /// than it is wide (m), in all turns that its symmetry allows.
+    /// Refuses a cell if parts in its neighbours leave no room for this part, or for fingers that open by
+    /// `release_margin_m` more than its width (m), at all turns of its symmetry.
     ///
     /// # Errors
-    /// [`RobotError::Configuration`] with what has no room, and a pitch that would do.
+    /// [`RobotError::Configuration`] with the object that has no room, and a sufficient pitch.
     pub fn check_room(&self, part: &PartShape, symmetry: RotationalSymmetry, release_margin_m: f64) -> Result<()> {
         let opening_m = release_opening_m(part.jaw_width_m(), release_margin_m);
         let turns_rad = same_turns_rad(symmetry);
@@ -75,7 +77,7 @@ impl PlaceGoal {
         Err(RobotError::Configuration { what: format!("\"{}\"", self.name), expected, found })
     }
 
-    /// What has no room, in words.
+    /// The object that has no room, in words.
     fn lacks_room(&self, part: &PartShape, turns_rad: &[f64], opening_m: f64) -> Option<String> {
         let base_from_part = self.base_from_part(0.0, 0.0);
         let own = part.outline_in_base(&base_from_part);
@@ -85,7 +87,7 @@ impl PlaceGoal {
                 true => format!("parts in neighbouring cells would overlap by {:.1} mm", -near * 1e3),
                 false => format!("parts in neighbouring cells are {:.1} mm apart", near * 1e3),
             };
-            return Some(format!("{what}, at least {:.0} mm are asked for", PART_ROOM_M * 1e3));
+            return Some(format!("{what}, at least {:.0} mm are required", PART_ROOM_M * 1e3));
         }
         let near =
             turns_rad.iter().map(|&turn_rad| self.finger_gap_m(part, &self.base_from_part(0.0, turn_rad), opening_m));
@@ -100,7 +102,7 @@ impl PlaceGoal {
         };
         Some(format!(
             "the part is {:.0} mm wide between the fingers; {:.0} mm thick and open to {:.0} mm to let it go, they {comes} a part in a \
-             neighbouring cell{turned} and at least {:.0} mm are asked for",
+             neighbouring cell{turned} and at least {:.0} mm are required",
             part.jaw_width_m() * 1e3,
             thickness_m(part) * 1e3,
             opening_m * 1e3,
@@ -108,7 +110,8 @@ impl PlaceGoal {
         ))
     }
 
-    /// Of poses of the hand those at which its fingers, open so far (m), have the most room among the parts around; none where that is too little.
+    /// The poses of the hand at which its fingers, at this opening (m), have the most room among the surrounding parts;
+    /// empty if that is too little.
     pub(crate) fn with_room_for_fingers<T>(
         &self,
         part: &PartShape,
@@ -125,7 +128,7 @@ impl PlaceGoal {
         poses.into_iter().zip(gaps_m).filter_map(|(pose, gap_m)| has_room(gap_m).then_some(pose)).collect()
     }
 
-    /// How near the fingers come to the parts around, m; infinite where there are none.
+    /// Smallest distance of the fingers to the surrounding parts, m; infinite without any.
     fn finger_gap_m(&self, part: &PartShape, base_from_tcp: &Isometry3<f64>, opening_m: f64) -> f64 {
         let fingers = fingers_in_base(base_from_tcp, part.jaw_width_m().min(opening_m), opening_m, thickness_m(part));
         self.neighbours(part)
@@ -133,12 +136,12 @@ impl PlaceGoal {
             .fold(f64::INFINITY, f64::min)
     }
 
-    /// Outlines of the parts around, base frame, m.
+    /// Outlines of the surrounding parts, base frame, m.
     fn neighbours(&self, part: &PartShape) -> impl Iterator<Item = Polygon> {
         self.neighbours_in_base(0.0).map(|base_from_part| part.outline_in_base(&base_from_part))
     }
 
-    /// The smallest pitch that does, in whole millimetres, longer along the tray's x, its y, or both.
+    /// The smallest sufficient pitch, in whole millimetres, increased along the tray's x, its y, or both.
     fn pitch_that_does(&self, along: [bool; 2], does: impl Fn(&Self) -> bool) -> Option<[f64; 2]> {
         const MAX_STEPS: u32 = 300;
         let before_m = self.tray.as_ref()?.pitch_m;
@@ -151,7 +154,7 @@ impl PlaceGoal {
         let both = |step: u32| along.map(|is_longer| if is_longer { step } else { 0 });
         let (num, mut pitch_m) = (1..=MAX_STEPS).find_map(|step| Some((step, does(both(step))?)))?;
         if along == [true, true] {
-            // One side alone may have asked for all of it.
+            // One side alone may have caused all of it.
             let fewer = (0..num).find_map(|step| does([step, num]).or_else(|| does([num, step])));
             pitch_m = fewer.unwrap_or(pitch_m);
         }
@@ -159,7 +162,7 @@ impl PlaceGoal {
     }
 }
 
-/// A length so many millimetres longer: whole ones, so that what is told is what does.
+/// A length increased by this many millimetres: whole ones, so that the reported pitch is sufficient.
 fn longer_m(before_m: f64, steps: u32) -> f64 {
     const STEP_M: f64 = 1e-3;
     if steps == 0 { before_m } else { ((before_m / STEP_M + ROUNDING_M).floor() + f64::from(steps)) * STEP_M }
@@ -169,12 +172,12 @@ fn told([along_m, across_m]: [f64; 2]) -> String {
     format!("{:.0} x {:.0} mm", along_m * 1e3, across_m * 1e3)
 }
 
-/// Thickness of a finger along its motion, where it is as low as the part's top, m.
+/// Thickness of a finger along its motion, up to the height of the part's top, m.
 fn thickness_m(part: &PartShape) -> f64 {
     finger_thickness_m(part.top_m() - part.grasp_height_m())
 }
 
-/// What the fingers take on the table, from where they hold the part to where they are open: corners in the base frame, m.
+/// The area of the fingers on the table, from the closed to the open position: corners in the base frame, m.
 fn fingers_in_base(base_from_tcp: &Isometry3<f64>, closed_m: f64, opening_m: f64, thickness_m: f64) -> [Polygon; 2] {
     let (x, inner, outer) = (FINGER_HALF_WIDTH_M, 0.5 * closed_m, 0.5 * opening_m + thickness_m);
     [1.0, -1.0].map(|side: f64| {
@@ -184,7 +187,7 @@ fn fingers_in_base(base_from_tcp: &Isometry3<f64>, closed_m: f64, opening_m: f64
     })
 }
 
-/// Distance of two convex polygons, m; negative where they overlap, by how far one has to be moved.
+/// Distance of two convex polygons, m; negative if they overlap, by the distance that separates them.
 pub(crate) fn gap_m(one: &Polygon, other: &Polygon) -> f64 {
     let edges = one.edges().chain(other.edges());
     let separation_m = edges.filter_map(|(from, to)| {

@@ -1,4 +1,4 @@
-//! Motions around what stands in the cell.
+//! Motions around the obstacles of the cell.
 
 use nalgebra::Isometry3;
 use sdg_kinematics::collision::{Body, Capsule, CollisionError, CollisionModel, Obstacle, Shape};
@@ -12,13 +12,14 @@ use crate::robot::Robot;
 
 /// The table's name among the obstacles.
 pub(crate) const TABLE: &str = "table";
-/// Searches whose ways are tried where the limits of every motion, of which the planner knows nothing, refuse one: the workspace above all.
+/// Number of searches whose paths are tried if a limit that the planner does not know, mainly the workspace, refuses
+/// one.
 const NUM_SEEDS: u64 = 5;
-/// Checks of a search before it gives up: a second or so, and some ten times what difficult ways take.
+/// Maximum number of checks of a search: about a second, and some ten times the number for difficult paths.
 const MAX_CHECKS: usize = 50_000;
-/// What the start keeps of its height over the table beside the planner's margin, m.
+/// Margin subtracted from the start's height over the table, in addition to the planner's margin, m.
 const START_ROOM_M: f64 = 0.002;
-/// How far the hand's capsules reach below the tcp of a hand that points down, m.
+/// Extent of the hand's capsules below the tcp for a hand that points down, m.
 const HAND_BELOW_TCP_M: f64 = 0.010;
 
 /// The arm with its fingers at an opening (m), the table and obstacles.
@@ -34,45 +35,46 @@ pub(crate) fn collision_model(
         base_from_obstacle: Isometry3::translation(0.0, 0.0, table_height_m),
     };
     let mut model = CollisionModel::new(arm, [&[table], obstacles].concat(), opening_m)?;
-    // Link 1 turns about the vertical only: a table that is higher than the base's foot is around it, not in its way.
+    // Link 1 turns only about the vertical: a table higher than the base's foot surrounds it and is no obstacle.
     model.allow(Body::link(1), TABLE)?;
     Ok(model)
 }
 
-/// Where a motion is to end.
+/// The end of a motion.
 #[derive(Debug, Clone, Copy)]
 pub enum Destination<'a> {
     /// A configuration, rad.
     Configuration(&'a JointVector),
     /// The best of several poses of the tcp in the base frame.
     Poses(&'a [Isometry3<f64>]),
-    /// As [`Destination::Poses`], at the end of a straight approach along the tcp's z axis of a length, m.
+    /// As [`Destination::Poses`], at the end of a straight approach of this length along the tcp's z axis, m.
     Approached(&'a [Isometry3<f64>], f64),
 }
 
-/// What stands around the arm, and what it holds; by default nothing.
+/// The obstacles around the arm, and the held part; by default nothing.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Surroundings<'a> {
-    /// What stands in the cell besides the table.
+    /// Obstacles in the cell besides the table.
     pub obstacles: &'a [Obstacle],
-    /// Parts that lie: fingers and what they hold keep off them, and on straight ways fingers may come between them.
+    /// Lying parts: fingers and the held part avoid them, and on straight paths fingers may move between them.
     pub lying: &'a [LyingPart],
     /// The part in the hand, in the tcp's frame; empty without one.
     pub held: &'a [Capsule],
-    /// How far the hand is open on straight ways, m; elsewhere it may be open as far as it goes.
+    /// Opening of the hand on straight paths, m; elsewhere it may be fully open.
     pub opening_m: f64,
-    /// Height over the table that is kept on the way, where start and destination are as high, m.
+    /// Height over the table during the motion, if start and destination are that high, m.
     pub table_clearance_m: f64,
 }
 
-/// A way around what stands in the cell.
+/// A path around the obstacles of the cell.
 #[derive(Debug, Clone)]
 pub struct Way {
-    /// Motions one after the other, each from rest to rest: one, unless the arm has to stop at a waypoint; none where it is there already.
+    /// Motions in sequence, each from rest to rest: one, unless the arm has to stop at a waypoint; none if it is there
+    /// already.
     pub motions: Vec<Trajectory>,
-    /// The straight approach, where one was asked for.
+    /// The straight approach, if one was requested.
     pub approach: Option<JointPath>,
-    /// Which of the poses is reached.
+    /// The pose that is reached.
     pub goal_idx: usize,
 }
 
@@ -98,8 +100,8 @@ impl Surroundings<'_> {
         Ok(model)
     }
 
-    /// The same where the hand may touch the table, and the held part whatever it is lifted from, put on or comes beside: it is not known as well as
-    /// the fingers are, and whether it has room in a tray is judged before.
+    /// The same where the hand may touch the table, and the held part may touch the surface or parts at its place: the
+    /// held part is not known as exactly as the fingers, and its room in a tray is judged before.
     pub(crate) fn contact_model(&self, arm: &ArmGeometry, table_height_m: f64) -> Result<CollisionModel> {
         let lying = self.lying.iter().enumerate().map(|(number, part)| part.obstacle_beside_fingers(number));
         let opening_m = self.opening_m.clamp(0.0, arm.hand.opening_max_m);
@@ -113,7 +115,7 @@ impl Surroundings<'_> {
         Ok(model)
     }
 
-    /// How high the table stands for a free motion: higher than it is by the clearance, as far as both ends let it.
+    /// Height of the table for a free motion: raised by the clearance, as far as both ends allow it.
     fn table_for_motion_m(
         &self,
         arm: &ArmGeometry,
@@ -156,10 +158,11 @@ fn lowest_m(model: &CollisionModel, arm: &ArmGeometry, q: &JointVector) -> f64 {
 }
 
 impl<A: Arm> Robot<'_, A> {
-    /// A way around what stands in the cell, whose motions keep to the limits.
+    /// A path around the obstacles of the cell, whose motions satisfy the limits.
     ///
     /// # Errors
-    /// [`RobotError::NoWay`] with what blocks; [`RobotError::Unsafe`] where every way that was found breaks a limit.
+    /// [`RobotError::NoWay`] with the blocking obstacle; [`RobotError::Unsafe`] if every path that was found violates a
+    /// limit.
     pub fn plan_around(
         &mut self,
         surroundings: &Surroundings<'_>,

@@ -1,10 +1,10 @@
-//! Coming down on something with a tcp that yields, until its force is felt.
+//! Coming down with a compliant tcp until a contact is measured by its force.
 //!
 //! ```text
-//! stand, to learn what is felt in free air ─> down at a constant speed ─> felt: press with a force ─> stand, told
+//! stand, to measure the forces in free air ─> down at a constant speed ─> felt: press with a force ─> stand, report
 //!      └ stiff, with integral action ────────────────┘ └ nothing felt     └ soft along z
 //! ```
-//! What is felt is the robot's own estimate of the external force; the height that counts is the measured one.
+//! The force is the robot's own estimate of the external force; the height is the measured one.
 
 use nalgebra::{Isometry3, Vector6};
 use sdg_kinematics::{ArmGeometry, JointVector};
@@ -13,40 +13,42 @@ use crate::arm_state::PERIOD_SECS;
 use crate::error::{Result, RobotError};
 use crate::impedance::{Impedance, ImpedanceControl, TcpReference};
 
-/// How long the arm stands to learn what is felt in free air, s, and the time over which force and height are told at the end.
+/// Time during which the arm stands still to measure the forces in free air, s, and averaging time of force and height
+/// at the end.
 const STANDING_SECS: f64 = 0.2;
 /// The reference reaches its speed within this time, s.
 const RAMP_SECS: f64 = 0.5;
-/// Joint friction lets the reference run ahead of the tcp; by more than this it does not, m: 15 N at 1000 N/m.
+/// Joint friction lets the reference lead the tcp; largest lead, m: 15 N at 1000 N/m.
 const MAX_LEAD_M: f64 = 0.015;
-/// The reference gives way by so much for each newton too much, m/(N s): pressing settles within a few tenths of a second.
+/// Yielding of the reference per newton above the pressing force, m/(N s): the force settles within a few tenths of a
+/// second.
 const YIELDING_M_PER_NS: f64 = 0.02;
-/// It gives way at this speed at most, m/s.
+/// Largest speed of that yielding, m/s.
 const MAX_YIELDING_M_S: f64 = 0.015;
 
-/// How to come down.
+/// Settings of a touch-down.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TouchDown {
-    /// How the tcp is held on the way.
+    /// Stiffness of the tcp during the descent.
     pub free_air: Impedance,
-    /// How soft it is once something is felt.
+    /// Stiffness after the contact.
     pub contact: Impedance,
     /// Speed of the reference, m/s.
     pub speed_m_s: f64,
-    /// The longest way down, as measured, m.
+    /// Largest length of the descent, as measured, m.
     pub max_way_m: f64,
-    /// How far below the table of the limits the way may lead, m: what the table's height is not known to.
+    /// Largest distance of the path below the table of the limits, m: the uncertainty of the table's height.
     pub below_table_m: f64,
-    /// A change of the vertical force by so much is a contact, N.
+    /// Change of the vertical force that counts as a contact, N.
     pub contact_n: f64,
-    /// What is then pressed with, N.
+    /// Pressing force after it, N.
     pub press_n: f64,
-    /// For how long, s.
+    /// Duration of pressing, s.
     pub press_secs: f64,
 }
 
 impl Default for TouchDown {
-    /// 6 mm/s, at most 30 mm and 10 mm below where the table is told to be; 3 N are a contact.
+    /// 6 mm/s, at most 30 mm and 10 mm below the given height of the table; 3 N are a contact.
     fn default() -> Self {
         Self {
             free_air: Impedance::FREE_AIR,
@@ -62,12 +64,12 @@ impl Default for TouchDown {
 }
 
 impl TouchDown {
-    /// Refuses what makes no sense.
+    /// Refuses impossible values.
     ///
     /// # Errors
     /// [`RobotError::Configuration`].
     pub(crate) fn validate(&self) -> Result<()> {
-        /// Faster than this, contact is a blow.
+        /// At higher speeds a contact is an impact.
         const MAX_SPEED_M_S: f64 = 0.05;
         const MAX_WAY_M: f64 = 0.2;
         const MAX_FORCE_N: f64 = 15.0;
@@ -87,22 +89,22 @@ impl TouchDown {
     }
 }
 
-/// What was touched.
+/// The result of a touch-down.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Touched {
-    /// Whether anything was felt before the way's end.
+    /// Whether there was a contact before the path's end.
     pub is_contact: bool,
     /// Measured height of the tcp in the base frame at the end, m.
     pub tcp_height_m: f64,
-    /// What was pressed with at the end, N.
+    /// The pressing force at the end, N.
     pub force_n: f64,
-    /// The largest force on the way and at the end, N.
+    /// The largest force on the path and at the end, N.
     pub peak_n: f64,
-    /// How far the tcp was beside its reference in free air at most, m and rad.
+    /// Largest deviation of the tcp from its reference in free air, m and rad.
     pub free_air_error: [f64; 2],
 }
 
-/// What coming down is at.
+/// The phase of a touch-down.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Phase {
     Standing,
@@ -110,7 +112,7 @@ enum Phase {
     Pressing,
 }
 
-/// The torques of coming down, cycle by cycle: for arms that take torques.
+/// The torques of a touch-down, cycle by cycle: for arms that accept torques.
 #[derive(Debug)]
 pub struct Descent {
     touch_down: TouchDown,
@@ -118,7 +120,7 @@ pub struct Descent {
     start: Isometry3<f64>,
     phase: Phase,
     phase_cycles: u32,
-    /// How far the reference is below the start, m, and how fast it goes down, m/s.
+    /// Distance of the reference below the start, m, and its downward speed, m/s.
     down_m: f64,
     speed_m_s: f64,
     free_air_n: f64,
@@ -131,7 +133,7 @@ pub struct Descent {
 }
 
 impl Descent {
-    /// Begins where the arm stands (rad), after this torque (N·m, without gravity).
+    /// Starts at the arm's position (rad), after this torque (N·m, without gravity).
     pub fn new(touch_down: TouchDown, arm: &ArmGeometry, q: JointVector, torque: JointVector) -> Self {
         Self {
             touch_down,
@@ -151,10 +153,10 @@ impl Descent {
         }
     }
 
-    /// The torques of the next cycle (N·m); and whether they are the last.
+    /// The torques of the next cycle (N·m), and whether they are the last.
     ///
-    /// `force_n` is the vertical external force, upwards, as the robot estimates it. Only its change against free air counts, so that a
-    /// part of unknown weight, or a robot that counts the other way round, makes no difference.
+    /// `force_n` is the vertical external force, upwards, as the robot estimates it. Only its change from free air
+    /// counts, so that a part of unknown weight, or a robot with the opposite sign, makes no difference.
     pub fn next(&mut self, arm: &ArmGeometry, q: &JointVector, dq: &JointVector, force_n: f64) -> (JointVector, bool) {
         let pressed_n = (force_n - self.free_air_n).abs();
         let base_from_tcp = arm.forward(q);
@@ -179,7 +181,8 @@ impl Descent {
                 if self.is_contact || is_at_end {
                     self.enter(Phase::Pressing);
                     self.control.change(self.touch_down.contact);
-                    // The softer spring presses as the stiff one did; at the way's end the tcp stays where it is.
+                    // The softer spring exerts the same force as the stiff one did; at the path's end the tcp stays in
+                    // place.
                     let [before, now] = [self.touch_down.free_air, self.touch_down.contact].map(|one| one.stiffness.z);
                     self.down_m = if is_at_end { way_m } else { way_m + (self.down_m - way_m) * (before / now) };
                 } else {
@@ -213,7 +216,8 @@ impl Descent {
         (self.control.torque(arm, q, dq, &reference, &JointVector::zeros()), is_last)
     }
 
-    /// How fast the reference goes on down while less is felt than is to be pressed with, or up while more is, m/s.
+    /// Downward speed of the reference while the force is below the pressing force, or upward speed while it is above,
+    /// m/s.
     fn yielding(&self, pressed_n: f64) -> f64 {
         let too_little_n = self.touch_down.press_n - pressed_n;
         (YIELDING_M_PER_NS * too_little_n).clamp(-MAX_YIELDING_M_S, MAX_YIELDING_M_S)
@@ -228,7 +232,7 @@ impl Descent {
         self.control.last_torque()
     }
 
-    /// What was found, once the last torques are told.
+    /// The result, after the last torques were sent.
     pub fn touched(&self) -> Touched {
         let num = f64::from(self.num_summed.max(1));
         Touched {

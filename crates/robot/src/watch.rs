@@ -7,13 +7,13 @@ use sdg_kinematics::{JointLimits, JointVector, NUM_JOINTS};
 
 use crate::arm_state::{ArmMode, ArmState};
 
-/// Why a motion was ended before its end.
+/// The reason why a motion was ended early.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum StopReason {
-    /// A person asked for it.
+    /// A person requested it.
     Interrupted,
-    /// A state that no arm can be in.
+    /// An impossible state of an arm.
     Implausible(String),
     /// No state for longer than [`MAX_SILENCE_SECS`] of the arm's clock, or a motion that does not end.
     Watchdog(String),
@@ -25,27 +25,29 @@ impl fmt::Display for StopReason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Interrupted => f.write_str("a person asked for it"),
-            Self::Implausible(what) => write!(f, "its state cannot be: {what}"),
+            Self::Implausible(what) => write!(f, "its state is implausible: {what}"),
             Self::Watchdog(what) => write!(f, "watchdog: {what}"),
             Self::Mode(mode) => write!(f, "the arm is in mode \"{}\"", mode.name()),
         }
     }
 }
 
-/// The longest gap between two states of a moving arm, in seconds of its clock: what Franka's controller bridges itself.
+/// The longest gap between two states of a moving arm, in seconds of its clock: the gap that Franka's controller itself
+/// bridges.
 pub const MAX_SILENCE_SECS: f64 = 0.020;
 /// States are a whole number of milliseconds apart; their difference in seconds is rounded.
 const ROUNDING_SECS: f64 = 0.5e-3;
-/// How much of the past is kept, in seconds of the arm's clock.
+/// Length of the kept history, in seconds of the arm's clock.
 pub const HISTORY_SECS: f64 = 1.0;
-/// A measured joint moves at most so many times as fast as its limit between two states, and by so much for noise, rad.
+/// Largest movement of a measured joint between two states, as a multiple of its limit, plus an allowance for noise,
+/// rad.
 const MAX_SPEED_SHARE: f64 = 2.0;
 const NOISE_RAD: f64 = 0.005;
 
-/// Asks, once in every cycle, whether to stop.
+/// Called once in every cycle: whether to stop.
 pub type StopRequest = Box<dyn FnMut() -> Option<StopReason> + Send>;
 
-/// Sees every state of a moving arm.
+/// Checks every state of a moving arm.
 pub struct Watch {
     request: StopRequest,
     states: VecDeque<ArmState>,
@@ -62,14 +64,14 @@ impl fmt::Debug for Watch {
 }
 
 impl Default for Watch {
-    /// Nobody asks to stop.
+    /// Without a stop request.
     fn default() -> Self {
         Self::new(Box::new(|| None))
     }
 }
 
 impl Watch {
-    /// Asks `request` in every cycle.
+    /// Calls `request` in every cycle.
     pub fn new(request: StopRequest) -> Self {
         let velocity_max = JointLimits::panda().velocity_max;
         Self { request, states: VecDeque::new(), stop: None, max_silence_secs: MAX_SILENCE_SECS, velocity_max }
@@ -80,21 +82,21 @@ impl Watch {
         self.max_silence_secs = max_silence_secs;
     }
 
-    /// Holds what is plausible to the limits of an arm instead of the Panda's.
+    /// Judges plausibility by the limits of an arm instead of the Panda's.
     pub(crate) fn of_arm(self, limits: &JointLimits) -> Self {
         Self { velocity_max: limits.velocity_max, ..self }
     }
 
-    /// Begins another motion: a gap since the last state is none.
+    /// Starts another motion: the time since the last state does not count as a gap.
     pub(crate) fn begin(&mut self) {
         self.stop = None;
         if let Some(state) = self.states.back_mut() {
-            // The states before stay for the file, but nothing is concluded from the distance to them.
+            // The earlier states stay for the file, but their distance is not evaluated.
             state.mode = ArmMode::Idle;
         }
     }
 
-    /// Looks at a state; the reason to stop, if there is one. The first reason stays.
+    /// Checks a state; returns the reason to stop, if there is one. The first reason is kept.
     pub fn observe(&mut self, state: &ArmState) -> Option<&StopReason> {
         if self.stop.is_none() {
             self.stop = self.implausible(state).or_else(|| (self.request)());
@@ -106,13 +108,13 @@ impl Watch {
         self.stop.as_ref()
     }
 
-    /// Whether a person or a program asks to stop now.
+    /// Whether a person or a program requests a stop now.
     pub fn is_stop_requested(&mut self) -> Option<StopReason> {
         (self.request)()
     }
 
     fn implausible(&self, state: &ArmState) -> Option<StopReason> {
-        let quantities = [(state.q, "is at"), (state.dq, "moves at"), (state.q_commanded, "is led to")];
+        let quantities = [(state.q, "is at"), (state.dq, "moves at"), (state.q_commanded, "is commanded to")];
         for (values, verb) in quantities {
             if let Some(joint_idx) = (0..NUM_JOINTS).find(|&idx| !values[idx].is_finite()) {
                 let (joint, value) = (joint_idx + 1, values[joint_idx]);
@@ -190,14 +192,14 @@ mod tests {
             (state(0.001, jumped), "joint 3 jumped by 1.000 rad within 1 ms"),
             (state(0.001, nan), "joint 5 is at NaN"),
             (led_to(jumped), "the reference of joint 3 jumped by 1.000 rad within 1 ms"),
-            (led_to(nan), "joint 5 is led to NaN"),
+            (led_to(nan), "joint 5 is commanded to NaN"),
             (state(0.050, ready_pose()), "no state of the arm for 50 ms"),
         ] {
             let mut watch = Watch::default();
             assert_eq!(watch.observe(&state(0.0, ready_pose())), None);
             let found = watch.observe(&second).unwrap().to_string();
             assert!(found.contains(expected), "{found}");
-            // What comes later does not make it good.
+            // A later state does not clear it.
             assert!(watch.observe(&state(0.051, ready_pose())).is_some());
         }
     }

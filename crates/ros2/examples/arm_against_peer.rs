@@ -1,7 +1,7 @@
-//! The arm behind ROS 2 against an action server of others: one line for each thing that was tried.
+//! The arm behind ROS 2 with another implementation of the action server: prints one line for each test.
 //!
-//! `make test-ros2` runs it beside crates/ros2/tests/peers/arm_peer.py, which plays the arm: what the peer does with the next goal
-//! follows from the motion's length.
+//! `make test-ros2` runs it with crates/ros2/tests/peers/arm_peer.py, which plays the arm: the peer chooses its
+//! reaction to the next goal by the motion's length.
 
 use std::time::{Duration, Instant};
 
@@ -45,7 +45,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// Moves the last joint so far, from where the arm is, through the limits that every motion is checked by.
+/// Moves the last joint by this much from the arm's position, with the limits by which every motion is checked.
 fn follow(arm: &mut TrajectoryArm, by_rad: f64, watch: Watch) -> Result<(), RobotError> {
     let mut robot = Robot::new(arm, SafetyLimits::default(), watch);
     let start = robot.commanded()?;

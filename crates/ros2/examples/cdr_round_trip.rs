@@ -1,4 +1,5 @@
-//! Messages of others through our reader and writer: lines of `TYPE HEX` in, lines of hex out, or of `error: WHY`.
+//! Passes messages of other implementations through our reader and writer: lines of `TYPE HEX` in, lines of hex or of
+//! `error: WHY` out.
 //!
 //! `make test-ros2` compares them with `rosbags`' bytes (crates/ros2/tests/peers/message_bytes.py).
 

@@ -1,28 +1,28 @@
-//! CDR, the encoding of messages on the network: plain XCDR1, as every ROS 2 middleware sends it.
+//! CDR, the encoding of messages on the network: plain XCDR1, as in every ROS 2 middleware.
 //!
-//! Numbers are aligned to their own size, counted from the message's start; texts carry their length with a zero at the end,
-//! sequences their number of elements, arrays nothing. Messages come from the network, so nothing is believed: every length is compared with
-//! the bytes that are there before anything is reserved.
+//! Numbers are aligned to their own size, counted from the message's start; texts contain their length and a final
+//! zero, sequences their number of elements, arrays neither. Messages come from the network and are not trusted: every
+//! length is compared with the available bytes before memory is allocated.
 
 use std::fmt;
 
-/// Why bytes are no message of a type.
+/// The reason why bytes are not a message of a type.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("expected {expected} at byte {at} of {length}, found {found}")]
 pub struct CdrError {
-    /// What should have been there.
+    /// The expected content.
     pub expected: String,
-    /// Where, counted from the message's start.
+    /// The position, counted from the message's start.
     pub at: usize,
-    /// How long the message is.
+    /// The length of the message.
     pub length: usize,
-    /// What was there.
+    /// The content found.
     pub found: String,
 }
 
 /// A value that can be read from CDR and written to it.
 pub trait Cdr: Sized {
-    /// The fewest bytes that a value takes, which bounds the elements of a sequence; at least 1.
+    /// Minimum number of bytes of a value, which limits the elements of a sequence; at least 1.
     const MIN_BYTES: usize;
 
     /// Appends the value.
@@ -31,18 +31,18 @@ pub trait Cdr: Sized {
     /// Reads the value.
     ///
     /// # Errors
-    /// Bytes that are no such value.
+    /// Bytes that are not such a value.
     fn read(from: &mut Reader<'_>) -> Result<Self, CdrError>;
 
-    /// Appends the elements of a sequence or an array; bytes do it at once.
+    /// Appends the elements of a sequence or an array; bytes in one copy.
     fn write_all(values: &[Self], to: &mut Writer) {
         values.iter().for_each(|value| value.write(to));
     }
 
-    /// Reads so many elements, which the reader has compared with the bytes that are left.
+    /// Reads this many elements; the reader has compared the number with the remaining bytes.
     ///
     /// # Errors
-    /// As [`Cdr::read`].
+    /// As for [`Cdr::read`].
     fn read_all(count: usize, from: &mut Reader<'_>) -> Result<Vec<Self>, CdrError> {
         (0..count).map(|_| Self::read(from)).collect()
     }
@@ -55,15 +55,15 @@ pub fn to_bytes(message: &impl Cdr) -> Vec<u8> {
     writer.bytes
 }
 
-/// Reads a little-endian message without the four bytes that name the encoding; what follows it is padding.
+/// Reads a little-endian message without the four bytes that name the encoding; further bytes are padding.
 ///
 /// # Errors
-/// Bytes that are no such message.
+/// Bytes that are not such a message.
 pub fn from_bytes<T: Cdr>(bytes: &[u8]) -> Result<T, CdrError> {
     T::read(&mut Reader { bytes, at: 0 })
 }
 
-/// Bytes that are being written.
+/// Bytes under construction.
 #[derive(Debug, Default)]
 pub struct Writer {
     bytes: Vec<u8>,
@@ -75,7 +75,7 @@ impl Writer {
         self.bytes.extend_from_slice(&bytes);
     }
 
-    /// Writes a value as it lies one byte behind a place that is aligned; into an empty writer only.
+    /// Writes a value as if it started one byte after an aligned position; only into an empty writer.
     pub(crate) fn shifted_by_one(&mut self, value: &impl Cdr) {
         let mut shifted = Self { bytes: vec![0] };
         value.write(&mut shifted);
@@ -83,12 +83,12 @@ impl Writer {
     }
 
     fn count(&mut self, count: usize) {
-        // Longer ones cannot be built here: messages are bounded far below.
+        // Longer ones cannot occur here: messages have a far lower limit.
         self.number(u32::try_from(count).unwrap_or(u32::MAX).to_le_bytes());
     }
 }
 
-/// Bytes that are being read.
+/// Bytes to be read.
 #[derive(Debug)]
 pub struct Reader<'a> {
     bytes: &'a [u8],
@@ -116,7 +116,7 @@ impl<'a> Reader<'a> {
         Ok(bytes)
     }
 
-    /// Reads a value as it lies one byte behind a place that is aligned.
+    /// Reads a value that starts one byte after an aligned position.
     pub(crate) fn shifted_by_one<T: Cdr>(&mut self) -> Result<T, CdrError> {
         let left = self.bytes.get(self.at..).unwrap_or_default();
         let shifted = [&[0], left].concat();
@@ -124,7 +124,7 @@ impl<'a> Reader<'a> {
         T::read(&mut Reader { bytes: &shifted, at: 1 })
     }
 
-    /// A sequence's number of elements, no more than the bytes that are left can hold.
+    /// A sequence's number of elements, at most what the remaining bytes can contain.
     fn count(&mut self, min_bytes: usize) -> Result<usize, CdrError> {
         let count = u32::from_le_bytes(self.number("a sequence's length")?) as usize;
         let most = (self.bytes.len() - self.at) / min_bytes;
@@ -193,7 +193,7 @@ impl Cdr for String {
     const MIN_BYTES: usize = 4;
 
     fn write(&self, to: &mut Writer) {
-        // A zero ends a text wherever it stands.
+        // A zero ends a text at any position.
         let text = self.split('\0').next().unwrap_or_default();
         to.count(text.len() + 1);
         to.bytes.extend_from_slice(text.as_bytes());

@@ -6,17 +6,18 @@ use sdg_camera::{PixelFrame, decode_picture, yuyv_to_rgb};
 use crate::error::PictureError;
 use crate::messages::{CompressedImage, Header, Image};
 
-/// Pixels in a row, or rows.
+/// Largest width or height in pixels.
 pub const MAX_SIDE: u32 = 1 << 14;
-/// Bytes of a picture or of a message around it, 64 MiB: 21 megapixels of three bytes. RustDDS is slow far below.
+/// Maximum number of bytes of a picture or of its message, 64 MiB: 21 megapixels of three bytes. RustDDS becomes slow
+/// far below this.
 pub const MAX_BYTES: usize = 64 << 20;
 
-/// How the pixels of a message lie in its rows.
+/// The layout of a message's pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Layout {
-    /// So many bytes a pixel, and where red, green and blue are among them.
+    /// Bytes per pixel, and the positions of red, green and blue in them.
     Channels(usize, [usize; 3]),
-    /// Numbers of two bytes, whose high one counts.
+    /// Numbers of two bytes, of which the high one is used.
     Grey16,
     /// Y0 U Y1 V.
     Yuyv,
@@ -24,7 +25,7 @@ enum Layout {
     Uyvy,
 }
 
-/// Names as `sensor_msgs/image_encodings.hpp` has them.
+/// Names as in `sensor_msgs/image_encodings.hpp`.
 const LAYOUTS: [(&str, Layout); 14] = [
     ("rgb8", Layout::Channels(3, [0, 1, 2])),
     ("bgr8", Layout::Channels(3, [2, 1, 0])),
@@ -58,7 +59,7 @@ fn refused(expected: impl Into<String>, found: impl ToString) -> PictureError {
 /// A message's picture.
 ///
 /// # Errors
-/// An encoding that is not read here, a size that is none, and rows that do not fit the bytes.
+/// An unsupported encoding, an invalid size, and rows that do not match the bytes.
 pub fn read_image(message: &Image) -> Result<RgbImage, PictureError> {
     let Image { width, height, step, data, .. } = message;
     let Some((_, layout)) = LAYOUTS.iter().find(|(name, _)| *name == message.encoding) else {
@@ -105,15 +106,15 @@ pub fn read_image(message: &Image) -> Result<RgbImage, PictureError> {
             return yuyv_to_rgb(&swapped, *width, *height, used).map_err(|found| refused("whole rows", found));
         }
     };
-    RgbImage::from_raw(*width, *height, pixels).ok_or_else(|| refused("as many pixels as the size says", "fewer"))
+    RgbImage::from_raw(*width, *height, pixels).ok_or_else(|| refused("as many pixels as its size states", "fewer"))
 }
 
-/// A compressed message's picture: JPEG or PNG, as its first bytes say.
+/// A compressed message's picture: JPEG or PNG, by its first bytes.
 ///
 /// # Errors
 /// Another format, and bytes that do not decode.
 pub fn read_compressed(message: &CompressedImage) -> Result<RgbImage, PictureError> {
-    // image_transport's depth pictures have a header of their own before the PNG.
+    // image_transport's depth pictures have their own header before the PNG.
     if message.format.contains("compressedDepth") {
         return Err(refused("jpeg or png of a colour camera", format!("\"{}\"", message.format)));
     }
@@ -121,7 +122,7 @@ pub fn read_compressed(message: &CompressedImage) -> Result<RgbImage, PictureErr
         [0xff, 0xd8, ..] | [0x89, b'P', b'N', b'G', ..] => {}
         _ => return Err(refused("jpeg or png", format!("\"{}\" of {} bytes", message.format, message.data.len()))),
     }
-    // What camera_info describes are the sensor's pixels.
+    // camera_info describes the sensor's pixels.
     decode_picture(&message.data, PixelFrame::Sensor).map_err(|found| refused("a whole picture", found))
 }
 

@@ -1,4 +1,4 @@
-//! What can go wrong with ROS 2, with what was expected and what was found.
+//! Errors of ROS 2, with the expected and the found value.
 
 use crate::cdr::CdrError;
 
@@ -7,19 +7,19 @@ use crate::cdr::CdrError;
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum RosError {
-    /// Text that is no name.
+    /// Text that is not a valid name.
     #[error("a name of ROS: expected {expected}, found \"{found}\"")]
     Name { expected: String, found: String },
-    /// Bytes that are no message of the topic's type.
+    /// Bytes that are not a message of the topic's type.
     #[error("{topic}: malformed message: {source}")]
     Malformed { topic: String, source: CdrError },
     /// A picture that cannot be read.
     #[error("{topic}: {why}")]
     Picture { topic: String, why: PictureError },
-    /// A camera_info that is of no use.
+    /// An unusable camera_info.
     #[error("camera_info: expected {expected}, found {found}")]
     CameraInfo { expected: String, found: String },
-    /// Frames without a connection, or an old one.
+    /// Frames without a connection, or with an outdated one.
     #[error("no transform from \"{source_frame}\" to \"{target_frame}\": {why}")]
     Transform { target_frame: String, source_frame: String, why: String },
     /// The network.
@@ -27,18 +27,18 @@ pub enum RosError {
     Network { what: String, why: String },
 }
 
-/// Why a message's picture cannot be read.
+/// The reason why a message's picture cannot be read.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("expected {expected}, found {found}")]
 pub struct PictureError {
-    /// What can be read.
+    /// The supported content.
     pub expected: String,
-    /// What came.
+    /// The received content.
     pub found: String,
 }
 
 impl PictureError {
-    /// What came, and what should have: for faults of cameras, which expect a picture.
+    /// The received and the expected content: for faults of cameras, which expect a picture.
     #[cfg(feature = "dds")]
     pub(crate) fn found_in_words(&self) -> String {
         format!("{} where {} was expected", self.found, self.expected)

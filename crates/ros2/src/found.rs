@@ -1,4 +1,4 @@
-//! What was found in a picture, as messages.
+//! Detections in a picture, as messages.
 
 use nalgebra::{Isometry3, Point2};
 
@@ -10,18 +10,18 @@ use crate::messages::{
 /// A part in a picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FoundPart {
-    /// What was taught.
+    /// The taught object.
     pub name: String,
-    /// 0 to 1; 0.5 is where to decide.
+    /// Score, 0 to 1; the threshold is 0.5.
     pub score: f64,
     /// Upper left and lower right corner of its box, in pixels whose first centre is at (0.5, 0.5).
     pub corners: [Point2<f64>; 2],
-    /// Pose of the tool centre point when closing, in the frame of the pictures' header or another, and the width of the part between
-    /// the fingers, m; `None` where the camera's place is not known.
+    /// Pose of the tool centre point when closing, in the frame of the pictures' header or another, and the width of
+    /// the part between the fingers, m; `None` if the camera's pose is not known.
     pub grasp: Option<(Isometry3<f64>, f64)>,
 }
 
-/// Detections with the picture's stamp and frame. Pixels as ROS counts them: the first one's centre is (0, 0).
+/// Detections with the picture's stamp and frame. Pixels in ROS's convention: the first one's centre is (0, 0).
 pub fn to_detections(header: &Header, found: &[FoundPart]) -> Detection2DArray {
     let detection = |part: &FoundPart| {
         let [from, to] = part.corners;

@@ -1,12 +1,12 @@
-//! ROS 2 without ROS: its messages, and with the feature `dds` its network.
+//! ROS 2 without a ROS installation: its messages and, with the feature `dds`, its network.
 //!
 //! ```text
 //! bytes ─ cdr ─ messages ─ encoding: pictures │ camera_info: PinholeCamera │ transforms: frames │ found: detections, poses
 //! feature dds:  Node ─ Subscription, Publisher, Server, ActionClient ─ RosCamera (camera's trait), TrajectoryArm (robot's trait)
 //! ```
-//! What comes from the network is checked here, once: a message that cannot be is a line in words, never a panic.
+//! Data from the network are checked here, once: an invalid message causes a line of text, never a panic.
 //!
-//! Absent: grasp models (crate `cli` joins them to the node), big-endian peers, ROS 2 itself.
+//! Not included: grasp models (crate `cli` connects them to the node), big-endian peers, ROS 2 itself.
 //!
 //! ```
 //! use sdg_ros2::{cdr, encoding, messages::{Header, Image}};

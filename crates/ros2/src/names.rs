@@ -4,7 +4,7 @@ use std::fmt;
 
 use crate::error::RosError;
 
-/// A node's name and namespace, and what its names are replaced by.
+/// A node's name and namespace, and the replacements of its names.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Naming {
     namespace: String,
@@ -15,7 +15,7 @@ pub struct Naming {
 /// `FROM:=TO`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Remapping {
-    /// A name as the node has it, or `__node`, `__ns`.
+    /// A name in the node, or `__node`, `__ns`.
     pub from: String,
     /// Its replacement.
     pub to: String,
@@ -41,10 +41,10 @@ impl fmt::Display for Remapping {
 }
 
 impl Naming {
-    /// A node's own name and namespace, which `__node` and `__ns` among the remappings replace.
+    /// A node's own name and namespace, which `__node` and `__ns` in the remappings replace.
     ///
     /// # Errors
-    /// What is no name, and a remapping whose sides are none.
+    /// An invalid name, and a remapping with invalid sides.
     pub fn new(namespace: &str, node: &str, remappings: &[Remapping]) -> Result<Self, RosError> {
         let (mut namespace, mut node) = (namespace.to_owned(), node.to_owned());
         let mut names = Vec::new();
@@ -69,7 +69,7 @@ impl Naming {
         Ok(naming)
     }
 
-    /// The namespace, from its slash; `/` for none.
+    /// The namespace, starting with a slash; `/` for none.
     pub fn namespace(&self) -> &str {
         if self.namespace.is_empty() { "/" } else { &self.namespace }
     }
@@ -82,7 +82,7 @@ impl Naming {
     /// A name's absolute form, after the remappings: the first that matches counts.
     ///
     /// # Errors
-    /// What is no name.
+    /// An invalid name.
     pub fn resolve(&self, name: &str) -> Result<String, RosError> {
         let absolute = self.expand(name)?;
         for Remapping { from, to } in &self.remappings {
@@ -102,7 +102,7 @@ impl Naming {
             None if name.starts_with('/') => name.to_owned(),
             None => format!("{}/{name}", self.namespace),
         };
-        // The first is what stands before the first slash.
+        // The first part is the text before the first slash.
         absolute.split('/').skip(1).try_for_each(|token| check_token(token, name))?;
         Ok(absolute)
     }

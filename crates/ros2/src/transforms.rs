@@ -1,4 +1,4 @@
-//! tf: where frames are in others, over the last seconds.
+//! tf: transforms between frames over the last seconds.
 //!
 //! ```text
 //! /tf, /tf_static ─ TfMessage ─ Transforms: of each frame its parent, and when it was where in it ─ target_from_source at a time
@@ -11,16 +11,16 @@ use nalgebra::Isometry3;
 use crate::error::RosError;
 use crate::messages::{TfMessage, Time};
 
-/// How far back a frame's motion is kept, s.
+/// Length of the stored history of a frame, s.
 const HISTORY_SECS: f64 = 10.0;
-/// And how many of its poses: 10 s at 400 Hz.
+/// Maximum number of its poses: 10 s at 400 Hz.
 const MAX_POSES: usize = 4000;
-/// More frames than any cell has: what comes from the network is bounded.
+/// More frames than any cell has, as a limit for data from the network.
 const MAX_FRAMES: usize = 2000;
 /// Longer chains have a loop.
 const MAX_DEPTH: usize = 100;
 
-/// Where frames are.
+/// The transforms.
 #[derive(Debug, Clone)]
 pub struct Transforms {
     frames: HashMap<String, Placed>,
@@ -41,12 +41,12 @@ enum Motion {
 }
 
 impl Transforms {
-    /// Nothing is known yet. A moving frame's last pose serves for so many seconds before and after it was sent.
+    /// Without any transform. A moving frame's last pose is valid for this many seconds before and after its time.
     pub fn new(max_age_secs: f64) -> Self {
         Self { frames: HashMap::new(), max_age_secs }
     }
 
-    /// Adds what a message says; how many of its transforms were of no use.
+    /// Adds the transforms of a message; returns the number of unusable ones.
     pub fn add(&mut self, message: &TfMessage, is_static: bool) -> usize {
         message.transforms.iter().filter(|transform| !self.add_one(transform, is_static)).count()
     }
@@ -73,7 +73,7 @@ impl Transforms {
             *placed = Placed { parent, motion: Motion::Moving(VecDeque::new()) };
         }
         if let Motion::Moving(poses) = &mut placed.motion {
-            // A clock that was set back begins again.
+            // After a clock was set back, the history starts again.
             if poses.back().is_some_and(|(newest, _)| secs < newest - HISTORY_SECS) {
                 poses.clear();
             }
@@ -90,7 +90,7 @@ impl Transforms {
     /// The pose of a frame in another at a time.
     ///
     /// # Errors
-    /// Frames that nothing connects, and a pose that is too old or too new for the time.
+    /// Frames without a connection, and a pose that is too old or too new for the time.
     pub fn lookup(&self, target: &str, source: &str, time: Time) -> Result<Isometry3<f64>, RosError> {
         let refused =
             |why: String| RosError::Transform { target_frame: target.into(), source_frame: source.into(), why };
@@ -118,7 +118,7 @@ impl Transforms {
         Ok(common_from_target.inverse() * common_from_source)
     }
 
-    /// A frame and all above it.
+    /// A frame and all its ancestors.
     fn ancestors(&self, frame: &str) -> Vec<String> {
         let mut frames = vec![frame.to_owned()];
         while let Some(placed) = frames.last().and_then(|frame| self.frames.get(frame))
@@ -140,7 +140,7 @@ impl Transforms {
             let (apart, side) = if known < secs { (secs - known, "before") } else { (known - secs, "after") };
             let limit = self.max_age_secs;
             (apart > limit).then(|| {
-                format!("stale: \"{frame}\" was last heard of {apart:.2} s {side} the picture, at most {limit:.2} s are allowed")
+                format!("stale: \"{frame}\" was last received {apart:.2} s {side} the picture, at most {limit:.2} s are allowed")
             })
         };
         match (after.checked_sub(1).and_then(|before| poses.get(before)), poses.get(after)) {
@@ -207,7 +207,7 @@ mod tests {
         let error = transforms.lookup("base", "camera", at(12.0)).unwrap_err().to_string();
         assert_eq!(
             error,
-            "no transform from \"camera\" to \"base\": stale: \"hand\" was last heard of 1.00 s before the picture, at most \
+            "no transform from \"camera\" to \"base\": stale: \"hand\" was last received 1.00 s before the picture, at most \
              0.50 s are allowed"
         );
         assert!(transforms.lookup("base", "camera", at(9.0)).unwrap_err().to_string().contains("after the picture"));

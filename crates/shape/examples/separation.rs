@@ -1,4 +1,4 @@
-//! Prints how refinement and agreement do on synthetic scenes: errors, and right poses against wrong ones.
+//! Prints the errors of refinement and the agreement of right and wrong poses on synthetic scenes.
 //!
 //! `cargo run --release -p sdg-shape --example separation -- [scenes per part] [folder for pictures]`
 
@@ -87,7 +87,7 @@ fn main() {
                 truth.scale,
             );
             t.turned.push(template.refine(&field, &half).agreement);
-            // Scenes without the part: at random places, and where other things lie, at several angles.
+            // Scenes without the part: poses at random places, and on other objects at several angles.
             let field = GradientField::new(&without.render());
             for _ in 0..4 {
                 let anywhere = scenes::pose(
@@ -124,7 +124,7 @@ fn main() {
 }
 
 fn timed<T>(ms: &mut Vec<f64>, work: impl Fn() -> T) -> T {
-    // The quickest of three: the machine does other things too.
+    // The fastest of three, because other programs run on the machine too.
     let mut best = f64::INFINITY;
     let mut out = None;
     for _ in 0..3 {
@@ -136,7 +136,7 @@ fn timed<T>(ms: &mut Vec<f64>, work: impl Fn() -> T) -> T {
     out.expect("three runs")
 }
 
-/// A place for another thing at least 150 px away from the part.
+/// A place for another object, at least 150 px away from the part.
 fn free_spot(rng: &mut Pcg64Mcg, part: &PlanarSimilarity) -> PlanarSimilarity {
     loop {
         let spot = scenes::pose(
@@ -151,7 +151,7 @@ fn free_spot(rng: &mut Pcg64Mcg, part: &PlanarSimilarity) -> PlanarSimilarity {
     }
 }
 
-/// Off by up to 12 px, 12 degrees and 5 % of scale.
+/// Wrong by up to 12 px, 12 degrees and 5 % of scale.
 fn perturbed(truth: &PlanarSimilarity, pivot: &nalgebra::Point2<f64>, rng: &mut Pcg64Mcg) -> PlanarSimilarity {
     let mut target = truth.apply(pivot);
     let (direction, distance) = (rng.random_range(0.0..6.3f64), rng.random_range(0.0..12.0));

@@ -1,4 +1,4 @@
-//! How well the directions of a template's edge points agree with those of a picture: many times at every pose that is tried.
+//! How well the directions of a template's edge points agree with those of a picture, computed many times at each pose.
 //!
 //! Legend: with `s` the picture's direction at a point, `d` the point's own, both at twice their angle, and `R` the pose's turn, also
 //! twice, a point's share of the sum is `w s · R d = cos (w s · d) + sin (w s.y d.x − w s.x d.y)`; both products are added up over all
@@ -12,7 +12,7 @@ use crate::gradient_field::GradientLevel;
 use crate::lanes::{LANES, in_lanes};
 use crate::pose::LevelMap;
 
-/// Edge points coordinate by coordinate, filled up to whole groups with points of no weight.
+/// Coordinates of the edge points, padded to whole groups with points of zero weight.
 #[derive(Debug, Clone)]
 pub(crate) struct PointLanes {
     groups: Vec<PointGroup>,
@@ -23,7 +23,8 @@ struct PointGroup {
     x: [f32; LANES],
     y: [f32; LANES],
     weights: [f32; LANES],
-    /// `w (d.x, d.y, 0, 0)` and `w (−d.y, d.x, 0, 0)`: as long as a sample, so that both products are made at once.
+    /// `w (d.x, d.y, 0, 0)` and `w (−d.y, d.x, 0, 0)`: as long as a sample, so that both products are computed
+    /// together.
     along: [f32x4; LANES],
     across: [f32x4; LANES],
 }
@@ -51,7 +52,7 @@ impl PointLanes {
         Self { groups: points.chunks(LANES).map(group).collect() }
     }
 
-    /// Weighted sum of cos 2(difference of directions) over the points inside the image, and of their weights.
+    /// Weighted sum of cos 2(difference of directions) over the points inside the image, and the sum of their weights.
     pub(crate) fn sums(&self, level: &GradientLevel, map: &LevelMap) -> (f32, f32) {
         in_lanes(Sums { points: self, level, map })
     }

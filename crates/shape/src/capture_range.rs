@@ -1,10 +1,10 @@
-//! Where a refinement may go, and the units in which it moves.
+//! The limits of a refinement, and the units of its steps.
 
 use crate::gradient_field::GradientField;
 use crate::pose::Pose;
 use crate::template::{MatchedLevel, ShapeTemplate, TemplateLevel};
 
-/// Where a refinement may go: a box about the initial pose.
+/// The limits of a refinement: a box around the initial pose.
 pub(crate) struct CaptureRange {
     pub(crate) start: Pose,
     /// Largest change of x (px), y (px), angle (rad), ln scale.
@@ -18,12 +18,12 @@ impl CaptureRange {
         Self { start, limits: [shift, shift, config.capture_angle_rad, config.scale.max_log()] }
     }
 
-    /// A box about `start` that reaches `limits` (px, px, rad, ln scale) to either side.
+    /// A box about `start` that reaches `limits` (px, px, rad, ln scale) in both directions.
     pub(crate) fn around(start: Pose, limits: [f64; 4]) -> Self {
         Self { start, limits }
     }
 
-    /// The level of the picture that a template's level is laid over at all poses of the range.
+    /// The pyramid level of the picture that a template level is compared with at all poses of the range.
     pub(crate) fn matched_level<'a>(&self, level: &TemplateLevel, field: &'a GradientField) -> MatchedLevel<'a> {
         level.matched_level(field, &self.start, self.limits)
     }

@@ -1,4 +1,4 @@
-//! A demonstration laid over an image, compared by its edges and by its surface.
+//! A demonstration laid over an image and compared by edges and surface.
 //!
 //! ```text
 //! start ─ ShapeTemplate::refine: edges alone ─ agreement at least `sure_agreement`? ─ done
@@ -7,11 +7,11 @@
 //!                     └─ still poor: climbed from six poses around it ─ refined by edges, kept where both still agree
 //! ```
 //! The edges alone place a part to a fraction of a pixel, but may match the wrong edges: a pipe is shifted along itself
-//! until one flank lies on its shadow. There both agreements are low, yet the refinement by edges uses neither. Such
-//! poses are therefore refined by edges and surface together, from the outcome and from the start. On 480 pictures of
-//! eight parts, from starts some pixels off, 25 of 960 ended beside the part and 60 more than 3 px off; now 0 and 7. Right
-//! poses agreed by 0.32 to 0.59 in the poorest hundredth of each part; now by 0.49 to 0.62. The highest agreement of
-//! anything wrong rose from 0.48 to 0.56.
+//! until one flank lies on its shadow. There both agreements are low, but refinement by edges uses neither. Such poses
+//! are therefore refined by edges and surface together, from the result and from the start. On 480 pictures of eight
+//! parts, from starts some pixels off, 25 of 960 ended beside the part and 60 had an error above 3 px; now 0 and 7. The
+//! first percentile of the agreement of right poses was 0.32 to 0.59 by part; now 0.49 to 0.62. The highest agreement
+//! of a wrong pose rose from 0.48 to 0.56.
 
 use std::ops::RangeInclusive;
 
@@ -30,48 +30,48 @@ use crate::structure::Structure;
 use crate::surface::Surface;
 use crate::template::ShapeTemplate;
 
-/// Steps of the climb, in pixels by which the part's rim moves: first and last. Chosen by hand, not measured apart; what the
-/// climbs as a whole gain was measured, see above.
+/// Steps of the climb, in pixels by which the part's rim moves: first and last. Chosen by hand, not measured
+/// separately; the gain of the climbs as a whole is given above.
 const STEPS_PX: (f64, f64) = (3.0, 0.3);
 /// Smallest gain of a step. Chosen by hand, not measured.
 const MIN_GAIN: f64 = 1e-4;
-/// Bounds climbs of many small steps. Chosen by hand, not measured.
+/// Maximum number of steps of a climb. Chosen by hand, not measured.
 const MAX_EVALUATIONS: usize = 120;
-/// Loss of agreement that the last refinement by edges may cause: its pose is more exact than one that was climbed. Chosen
-/// by hand, not measured.
+/// Largest loss of agreement by the last refinement by edges, whose pose is more exact than a climbed one. Chosen by
+/// hand, not measured.
 const MAX_LOSS_BY_EDGES: f64 = 0.005;
 
-/// A pose that agrees less is refused without a close look. Chosen by hand, for time.
+/// A pose of lower agreement is refused without a close look. Chosen by hand, for time.
 const MIN_LOOKED_AT: f64 = 0.3;
-/// A pose that agrees less is not turned. Chosen by hand, for time.
+/// A pose of lower agreement is not tried at other turns. Chosen by hand, for time.
 const MIN_TURNED: f64 = 0.45;
-/// Poses that agree less are not refined further. Chosen by hand, not measured.
+/// Poses of lower agreement are not refined further. Chosen by hand, not measured.
 pub(crate) const MIN_REFINED: f64 = 0.25;
 
-/// A demonstration and an image that it is laid over.
+/// A demonstration and an image over which it is laid.
 #[derive(Debug, Clone, Copy)]
 pub struct Comparison<'a> {
     /// The demonstration's edges.
     pub template: &'a ShapeTemplate,
-    /// What lies inside its outline.
+    /// The surface inside its outline.
     pub surface: &'a Surface,
-    /// Its edges over the whole area, compared both ways.
+    /// Its edges over the whole area, compared in both directions.
     pub structure: &'a Structure,
-    /// What the comparing network sees of it.
+    /// The input of the comparing network.
     pub likeness: &'a Likeness,
-    /// Its features, for a network.
+    /// Its features, for the details network.
     pub details: &'a Details,
     pub(crate) close_up: &'a CloseUp,
     pub(crate) mirrored: Option<&'a Rival>,
     pub(crate) turned: Option<&'a Rival>,
     pub(crate) profile: Option<&'a Profile>,
-    /// Poses that agree by less are not worth that network's time.
+    /// Poses of lower agreement are not given to that network.
     pub min_agreement: f64,
     /// The image over which the demonstration is laid.
     pub picture: Picture<'a>,
 }
 
-/// An image, and what every comparison reads out of it.
+/// An image, and the data of it that every comparison uses.
 #[derive(Debug, Clone, Copy)]
 pub struct Picture<'a> {
     /// The image itself.
@@ -103,17 +103,18 @@ impl Agreement {
     }
 }
 
-/// Whose likeness is less than this is refused: the details are not asked, for time. Chosen by hand.
+/// Minimum likeness for computing the details, which saves time; poses below it are refused. Chosen by hand.
 const MIN_LIKENESS: f64 = -4.0;
 
-/// All measurements of a pose in an image, from which a caller makes a score.
+/// All measurements of a pose in an image, from which the caller computes a score.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Evidence {
     /// [`ShapeTemplate::agreement`], in `[0, 1]`.
     pub edges: f64,
     /// [`Surface::agreement`], in `[0, 1]`; `None` where the demonstration's surface is plain.
     pub surface: Option<f64>,
-    /// How far the hue lies from the demonstration's, in shares of red, green and blue: 0.1 a little tinted, 0.5 another paint.
+    /// Distance of the hue from the demonstration's, in shares of red, green and blue: 0.1 is slightly tinted, 0.5 is
+    /// another paint.
     pub hue_shift: f64,
     /// [`crate::StructureAgreement::visible`], in `[0, 1]`.
     pub visible: f64,
@@ -123,19 +124,20 @@ pub struct Evidence {
     pub close: Option<CloseLook>,
 }
 
-/// Where, at a pose, the image does not show what the demonstration has, for people to look at; pixels of the image.
+/// Where, at a pose, the image differs from the demonstration, to be shown to people; in pixels of the image.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Differences {
-    /// Points with an edge in one of the two alone, or in another direction.
+    /// Points with an edge in only one of the two, or with edges of different directions.
     pub edges: Vec<Point2<f64>>,
-    /// Points of the surface whose brightness and colour do not follow the demonstration's.
+    /// Surface points whose brightness and colour do not follow the demonstration's.
     pub surface: Vec<Point2<f64>>,
     /// Squares in which a feature or print differs ([`Details::differing`]).
     pub features: Vec<Polygon>,
 }
 
 impl Comparison<'_> {
-    /// Where edges, surface and features disagree at a pose. Nothing of it counts in [`Self::evidence`], which is made of the same comparison.
+    /// Where edges, surface and features disagree at a pose. It adds nothing to [`Self::evidence`], which comes from
+    /// the same comparison.
     pub fn differences(&self, image_from_demonstration: &PlanarSimilarity) -> Differences {
         Differences {
             edges: self.structure.differing(self.picture.field, image_from_demonstration),
@@ -144,7 +146,7 @@ impl Comparison<'_> {
         }
     }
 
-    /// All measurements at a pose. Slower than [`Self::agreement`], which suffices to climb.
+    /// All measurements at a pose. Slower than [`Self::agreement`], which is enough for climbing.
     pub fn evidence(&self, image_from_demonstration: &PlanarSimilarity) -> Evidence {
         let (evidence, agreement) = self.evidence_from_afar(image_from_demonstration);
         let close =
@@ -152,8 +154,8 @@ impl Comparison<'_> {
         Evidence { close, ..evidence }
     }
 
-    /// `pose`, or a turn at which the part resembles itself and what differs between the two is seen; of a part of revolution, the place
-    /// along its axis and the end that its profile tells. Scales stay in `scales`.
+    /// `pose`, or another turn at which the part resembles itself if the distinguishing features favour it. For a part
+    /// of revolution, its position along the axis and its end, as found from the profile. Scales stay in `scales`.
     pub fn best_turn(&self, pose: &PlanarSimilarity, scales: &RangeInclusive<f64>) -> PlanarSimilarity {
         if self.agreement(pose).both() < MIN_TURNED {
             return *pose;
@@ -181,18 +183,19 @@ impl Comparison<'_> {
         let ((likeness, details), mirrored) = parallel::join(networks, mirrored);
         CloseLook {
             likeness,
-            // In another roll the part itself has its features elsewhere.
+            // In another roll the part's features are elsewhere.
             details: if self.profile.is_some() { details.map(|details| details.max(0.0)) } else { details },
             mirrored,
             ..look
         }
     }
 
-    /// As [`Self::evidence`] but for the close look, which takes nine tenths of the time; and [`Agreement::both`].
+    /// As [`Self::evidence`] without the close look, which takes nine tenths of the time; and [`Agreement::both`].
     pub fn evidence_from_afar(&self, image_from_demonstration: &PlanarSimilarity) -> (Evidence, f64) {
         let agreement = self.agreement(image_from_demonstration);
         let surface = agreement.surface;
-        // What edges a part of revolution has inside its outline depends on its roll: its profile counts as much as all of them.
+        // The edges of a part of revolution inside its outline depend on its roll, so its profile weighs as much as all
+        // of them.
         let profile = self.profile.map(|profile| profile.agreement(self.picture.field, image_from_demonstration));
         let edges = profile.map_or(agreement.edges, |profile| 0.5 * (agreement.edges + profile));
         let structure = self.structure.agreement(self.picture.field, image_from_demonstration);
@@ -207,7 +210,7 @@ impl Comparison<'_> {
         (evidence, agreement.both())
     }
 
-    /// How well the image agrees with the demonstration at a pose.
+    /// The agreement of the image with the demonstration at a pose.
     ///
     /// # Units and frames
     /// Poses map demonstration pixels to pixels of the image.
@@ -219,12 +222,12 @@ impl Comparison<'_> {
         )
     }
 
-    /// Refined by the edges alone: quick, and exact where it is right.
+    /// Refined by the edges alone: fast, and exact where it is right.
     pub fn refined_by_edges(&self, start: &PlanarSimilarity) -> PlanarSimilarity {
         self.template.refine(self.picture.field, start).image_from_demonstration
     }
 
-    /// `refined`, which the edges made of `start`, or a pose nearby of higher agreement where that is poor. Scales stay in
+    /// `refined` (from `start` by edges), or a nearby pose of higher agreement if its agreement is poor. Scales stay in
     /// `scales`.
     pub fn refine_pose(
         &self,
@@ -252,7 +255,7 @@ impl Comparison<'_> {
         if scales.contains(&last.scale) && both(&last) >= agreement - MAX_LOSS_BY_EDGES { last } else { best }
     }
 
-    /// The pose moved to all sides, six of them: chosen by hand, more cost time in proportion.
+    /// The pose shifted in six directions; chosen by hand, more cost proportionally more time.
     fn all_around(&self, pose: &PlanarSimilarity) -> [PlanarSimilarity; 6] {
         let center = pose.apply(&self.template.center);
         std::array::from_fn(|i| {
@@ -262,7 +265,8 @@ impl Comparison<'_> {
         })
     }
 
-    /// Compass search for the best agreement of edges and surface together about `from`; the pose and its agreement.
+    /// Compass search near `from` for the best agreement of edges and surface together; returns the pose and its
+    /// agreement.
     fn climbed(&self, from: PlanarSimilarity, scales: &RangeInclusive<f64>) -> (PlanarSimilarity, f64) {
         let search = CompassSearch {
             steps: STEPS_PX,
@@ -276,7 +280,7 @@ impl Comparison<'_> {
         search.climb(from, neighbour, |pose| self.agreement(pose).both())
     }
 
-    /// Moved along x or y, turned or scaled, so that edges move by about `step_px` pixels of the image.
+    /// Moves along x or y, turns or scales, so that edges move by about `step_px` pixels of the image.
     fn stepped(&self, pose: &PlanarSimilarity, direction: usize, step_px: f64) -> PlanarSimilarity {
         let center = pose.apply(&self.template.center);
         let turn = step_px / (self.template.radius_px() * pose.scale).max(1.0);

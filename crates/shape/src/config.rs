@@ -1,37 +1,37 @@
 //! Settings of the comparison of a demonstration with images, with the origin of each value.
 //!
-//! Values that were fitted stand here, so that they can be fitted again: `cargo run --release -p sdg-grasp --example
-//! fit_constants` does so on generated parts. docs/decisions/010-constants.md lists these and all other constants of this
-//! crate with their origin. "The simulator's pictures" below are 60 pictures of each of the eight shipped parts and 60
-//! without it (seeds from 50000), two starts a picture that are up to 12 px, 9° and 9 % off; the program that fitted on
-//! them was not kept.
+//! The fitted values are in this file, so that they can be fitted again: `cargo run --release -p sdg-grasp --example
+//! fit_constants` fits them on generated parts. docs/decisions/010-constants.md lists these and all other constants of
+//! this crate with their origin. "The simulator's pictures" below are 60 pictures of each of the eight shipped parts
+//! and 60 without it (seeds from 50000), two starts per picture with errors of up to 12 px, 9° and 9 %; the program
+//! that fitted on them was not kept.
 
 use std::f64::consts::PI;
 
 use crate::error::ShapeError;
 
-/// How a template is made, how far it is moved, and how it is compared with an image.
+/// How a template is made, how far it may move, and how it is compared with an image.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct ShapeConfig {
-    /// Most edge points kept at each pyramid level. Chosen by hand, not measured: more cost time.
+    /// Maximum number of edge points at each pyramid level. Chosen by hand, not measured: more points take more time.
     pub max_points: usize,
     /// Weight of an edge on the outline relative to one inside, where shading moves with the light. Chosen by hand, not
     /// measured.
     pub outline_weight: f64,
-    /// How far an initial pose may be off in x and in y, as a share of the image's width. Chosen by hand, not measured.
+    /// Largest error of an initial pose in x and in y, as a share of the image's width. Chosen by hand, not measured.
     pub capture_shift: f64,
-    /// How far an initial pose may be turned, in radians. Chosen by hand, not measured.
+    /// Largest error of an initial pose's angle, in radians. Chosen by hand, not measured.
     pub capture_angle_rad: f64,
-    /// How far an initial pose's scale may be off. Chosen by hand, not measured.
+    /// Largest relative error of an initial pose's scale. Chosen by hand, not measured.
     pub scale: ScaleRange,
     /// Which gradients count as edges.
     pub gradient: GradientConfig,
     /// How colours inside the outline are compared.
     pub surface: SurfaceConfig,
-    /// How edge directions are compared both ways.
+    /// How edge directions are compared in both directions.
     pub structure: StructureConfig,
-    /// How edges and surface become one number.
+    /// How edges and surface are combined into one number.
     pub agreement: AgreementConfig,
     /// When and from where a poor pose is refined again.
     pub refinement: RefinementConfig,
@@ -59,7 +59,7 @@ impl Default for ShapeConfig {
     }
 }
 
-/// What a refinement may do to the scale.
+/// How a refinement may change the scale.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ScaleRange {
     /// Keep the initial pose's scale: the camera's height over the table is known.
@@ -82,11 +82,11 @@ impl ScaleRange {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct GradientConfig {
-    /// Gradient below which a direction is not trusted even in a noiseless image, in grey levels per level pixel. A step of
-    /// 5 grey levels has about this gradient after smoothing. Chosen by that reasoning, not measured.
+    /// Gradient below which a direction is ignored even in a noiseless image, in grey levels per level pixel. A step of
+    /// 5 grey levels has about this gradient after smoothing. Derived from that, not measured.
     pub min_gradient: f32,
-    /// An edge's energy must exceed this many times that of the quiet quarter of the pixels, which tells the noise. Chosen
-    /// by hand, not measured.
+    /// An edge's energy must exceed this many times that of the quiet quarter of the pixels, from which the noise is
+    /// estimated. Chosen by hand, not measured.
     pub noise_factor: f32,
 }
 
@@ -105,16 +105,16 @@ impl Default for GradientConfig {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct SurfaceConfig {
-    /// Cells of equal size that the outline's area would fill. Chosen by hand together with `cells_share`; other numbers
-    /// were not recorded.
+    /// Number of cells of equal size that would fill the outline's area. Chosen by hand together with `cells_share`; no
+    /// other numbers were recorded.
     pub num_cells: f64,
-    /// The weight of the correlation within cells; the correlation of the whole surface has the rest. Fitted on the
-    /// simulator's pictures together with [`AgreementConfig::surface_share`].
+    /// The weight of the correlation within cells; the correlation over the whole surface has the remaining weight.
+    /// Fitted on the simulator's pictures together with [`AgreementConfig::surface_share`].
     pub cells_share: f64,
-    /// Contrast below this, in grey values, is noise: a surface without any agrees with nothing. Chosen by hand, not
-    /// measured.
+    /// Contrast below this, in grey values, is noise: a surface without contrast agrees with nothing. Chosen by
+    /// hand, not measured.
     pub noise: f64,
-    /// The same within a cell, where there is less contrast. Chosen by hand, not measured.
+    /// The same within a cell, where contrast is lower. Chosen by hand, not measured.
     pub noise_in_cell: f64,
 }
 
@@ -129,18 +129,19 @@ impl Default for SurfaceConfig {
     }
 }
 
-/// How edge directions are compared both ways; see [`crate::Structure`]. Chosen by hand, not measured apart: with them
-/// the score's loss on held-out generated parts fell from 372 to 274 (docs/decisions/007-score.md).
+/// How edge directions are compared in both directions; see [`crate::Structure`]. Chosen by hand, not measured
+/// separately: with them the score's loss on held-out generated parts fell from 372 to 274
+/// (docs/decisions/007-score.md).
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct StructureConfig {
-    /// Points of the grid over the part.
+    /// Number of grid points over the part.
     pub num_points: f64,
-    /// Regions of equal size that the outline's area would fill.
+    /// Number of regions of equal size that would fill the outline's area.
     pub num_regions: f64,
-    /// Energy of a direction, from 0 to 1, that is taken to be everywhere, so that two empty areas agree.
+    /// Energy of a direction, from 0 to 1, that is added everywhere, so that two empty areas agree.
     pub noise: f64,
-    /// Correlation from which a region counts as visible.
+    /// Minimum correlation of a visible region.
     pub visible_from: f64,
 }
 
@@ -155,17 +156,18 @@ impl Default for StructureConfig {
     }
 }
 
-/// How edges and surface become one number.
+/// How edges and surface are combined into one number.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct AgreementConfig {
-    /// Extent of the part at which its edges are compared, in level pixels. Coarser than the finest level, so that a pixel
-    /// of parallax or of lens distortion does not count as another shape. Chosen by that reasoning; no measurement is
-    /// recorded.
+    /// Extent of the part at which its edges are compared, in level pixels. It is coarser than the finest level, so
+    /// that a pixel of parallax or of lens distortion does not count as another shape. Derived from that; no
+    /// measurement is recorded.
     pub extent: f64,
-    /// The weight of the surface where it is averaged with the edges; the edges have the rest. Fitted on the simulator's
-    /// pictures: edges, cells and whole surface weighed 7 : 2 : 1 left 30 of 950 right poses below the best wrong one of any
-    /// part, edges and whole surface weighed 6 : 4 left 48. Before, 0.4 was fitted on levers that resemble the pendulum.
+    /// The weight of the surface in the average with the edges, which have the remaining weight. Fitted on the
+    /// simulator's pictures: weights of 7 : 2 : 1 for edges, cells and whole surface left 30 of 950 right poses below
+    /// the best wrong one of any part, weights of 6 : 4 for edges and whole surface left 48. The earlier value, 0.4,
+    /// was fitted on levers that resemble the pendulum.
     pub surface_share: f64,
 }
 
@@ -182,16 +184,16 @@ impl Default for AgreementConfig {
 
 /// When and from where a poor pose is refined again; see [`crate::Comparison::refine_pose`].
 ///
-/// All of them were fitted on the simulator's pictures: with them 0 instead of 25 of 960 poses ended beside the part, and 7
-/// instead of 60 more than 3 px off.
+/// All of them were fitted on the simulator's pictures: with them 0 instead of 25 of 960 poses ended beside the part,
+/// and 7 instead of 60 had an error above 3 px.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct RefinementConfig {
-    /// A pose that agrees so well is left where the edges put it.
+    /// A pose of at least this agreement is not refined again.
     pub sure_agreement: f64,
-    /// Further climbs begin so many pixels around a pose that stays poor.
+    /// Distance in pixels of further climbs from a pose whose agreement stays poor.
     pub restart_px: f64,
-    /// They begin only where the agreement is at least this: what agreed by less was never the part.
+    /// Minimum agreement for further climbs: no pose below it was the part.
     pub min_restart_agreement: f64,
 }
 
@@ -206,7 +208,7 @@ impl Default for RefinementConfig {
     }
 }
 
-/// Fewer edge points than this recognise nothing. Chosen by hand, not measured.
+/// Minimum number of edge points for recognition. Chosen by hand, not measured.
 pub(crate) const MIN_POINTS: usize = 20;
 
 /// # Errors
@@ -287,7 +289,7 @@ mod tests {
     fn the_default_is_accepted_and_is_what_the_constants_were() {
         let config = ShapeConfig::default();
         assert_eq!(check_config(&config), Ok(()));
-        // The values before they became a configuration, by their old names' order of files.
+        // The values before they became a configuration, ordered by their former names and files.
         assert_eq!((config.gradient.min_gradient, config.gradient.noise_factor), (1.5, 3.0));
         assert_eq!((config.surface.num_cells, config.surface.cells_share), (6.0, 2.0 / 3.0));
         assert_eq!((config.surface.noise, config.surface.noise_in_cell), (8.0, 6.0));

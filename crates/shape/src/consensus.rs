@@ -1,13 +1,13 @@
 //! The pose on which most edge points agree to a fraction of a pixel.
 //!
 //! Beside the part's own edge an image often shows another of the same direction: the edge of its
-//! shadow, its chamfer, a board it lies along. Least squares on the nearest edges ends between the two.
-//! Here each edge point keeps all crests of the gradient near it along its normal, and the pose is
-//! sought whose points nearly all have *one* of their crests within a pixel: the shadow lies on one
-//! side only, so following it there breaks the other sides.
+//! shadow, its chamfer, a board next to it. Least squares on the nearest edges ends between the two.
+//! Here each edge point keeps all gradient crests near it along its normal, and the search maximises
+//! the number of points that have *one* of their crests within a pixel. A shadow lies on one side only,
+//! so a pose that follows it there loses the other sides.
 //!
-//! Legend: `row` is how far a point moves along its normal per unit of (x, y, angle, ln scale), units
-//! that move edges by about a level pixel; a crest at distance `d` asks for `row · step = d`.
+//! Legend: `row` is how far a point moves along its normal per unit of (x, y, angle, ln scale), in
+//! units that move edges by about a level pixel; a crest at distance `d` requires `row · step = d`.
 
 use nalgebra::{Const, DimMin, SMatrix, SVector, Vector4};
 use pulp::{Simd, WithSimd};
@@ -19,18 +19,18 @@ use crate::pose::Pose;
 use crate::sightings::{EdgePlace, FIRST_REACH, Group, LATER_REACH, Sightings};
 use crate::template::{MatchedLevel, TemplateLevel};
 
-/// Width of "on the edge" in level pixels, from the first look to the last. Chosen by hand, not measured.
+/// Width of "on the edge" in level pixels, from the first round to the last. Chosen by hand, not measured.
 pub(crate) const WIDTHS: [f64; 3] = [2.0, 1.2, 0.7];
 /// Starts of the first round, in level pixels of edge movement by shift and by scale. Chosen by hand, not measured.
 const START_STEP: f64 = 3.0;
-/// Rounds of gathering crests anew, and the movement (level pixels) below which they stop. Both bound the
-/// time; chosen by hand, not measured.
+/// Maximum rounds of gathering crests, and the movement (level pixels) below which they stop. Both limit
+/// the time; chosen by hand, not measured.
 const MAX_ROUNDS: usize = 5;
 const STILL: f64 = 0.01;
-/// Steps that differ by less, in level pixels, end in the same place. Chosen by hand, for time.
+/// Steps that differ by less, in level pixels, are treated as one. Chosen by hand, for time.
 const SAME_PLACE: f64 = 0.02;
 
-/// A pose and how many of the points found a crest there.
+/// A pose and the share of points with a crest there.
 pub(crate) struct Snapped {
     pub(crate) pose: Pose,
     /// Weighted share of the points that lie on a crest of their direction, in `[0, 1]`.
@@ -38,16 +38,16 @@ pub(crate) struct Snapped {
     pub(crate) num_rounds: usize,
 }
 
-/// Where the first round begins.
+/// Starts of the first round.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Starts {
-    /// At the pose itself, and a step to each side: an edge beside the part's own does not hold it.
+    /// At the pose itself and one step to each side, so that an edge beside the part's own does not capture it.
     Around,
-    /// At the pose itself, a fifth of the time: it is known to be about a pixel off.
+    /// At the pose itself only, for a fifth of the time: its error is known to be about a pixel.
     Here,
 }
 
-/// Moves `from` to the consensus nearby.
+/// Moves `from` to the nearby consensus.
 pub(crate) fn snap(level: &TemplateLevel, matched: &MatchedLevel<'_>, range: &CaptureRange, from: Pose) -> Snapped {
     snap_from(level, matched, range, from, Starts::Around)
 }
@@ -96,7 +96,7 @@ fn gather(level: &TemplateLevel, matched: &MatchedLevel<'_>, pose: &Pose, reach:
     Sightings::gather(matched.image_level, &places, reach)
 }
 
-/// The step of most consensus from any of the starts; those that have come to the same place go on as one.
+/// The step of highest consensus from any of the starts; starts that reach the same place are merged.
 fn best_fit(sightings: &Sightings<4>, is_free: [bool; 4], mut steps: Vec<Vector4<f64>>) -> (Vector4<f64>, f64) {
     for width in &WIDTHS {
         let mut fitted: Vec<Vector4<f64>> = Vec::with_capacity(steps.len());
@@ -128,14 +128,14 @@ fn starts(is_free: [bool; 4], first: Starts) -> Vec<Vector4<f64>> {
     starts
 }
 
-/// Tukey's biweight, 1 at 0 and 0 beyond 3 widths: no exponential, no far influence.
+/// Tukey's biweight, 1 at 0 and 0 beyond 3 widths: needs no exponential and ignores distant residuals.
 #[inline(always)]
 fn kernel(x: f32) -> f32 {
     let rest = (1.0 - x * x / 9.0).max(0.0);
     rest * rest
 }
 
-/// Residual, and the weighted share in the consensus, of the crest of each point that fits a step best.
+/// Residual and weighted consensus share of the crest of each point that fits a step best.
 #[inline(always)]
 fn best_crests<const N: usize>(group: &Group<N>, step: &[f32; N], width: f32) -> ([f32; LANES], [f32; LANES]) {
     let (mut rests, mut shares) = ([0.0f32; LANES], [0.0f32; LANES]);
@@ -160,8 +160,8 @@ fn best_crests<const N: usize>(group: &Group<N>, step: &[f32; N], width: f32) ->
     (rests, shares)
 }
 
-/// The weighted normal equations of the crests that fit a step best: the matrix, of which the lower triangle alone is filled
-/// (nothing above it is read), and the right-hand side.
+/// The weighted normal equations of the crests that fit a step best: the matrix (only the lower triangle is filled and
+/// read) and the right-hand side.
 struct NormalEquations<'a, const N: usize> {
     sightings: &'a Sightings<N>,
     step: [f32; N],
@@ -232,7 +232,7 @@ pub(crate) fn consensus_at<const N: usize>(sightings: &Sightings<N>, step: &SVec
     f64::from(in_lanes(Consensus { sightings, step: in_single(step), width }))
 }
 
-/// Iteratively re-weighted least squares from `start`, narrowing.
+/// Iteratively re-weighted least squares from `start`, with decreasing width.
 pub(crate) fn fit_offsets<const N: usize>(
     sightings: &Sightings<N>,
     is_free: [bool; N],
@@ -249,7 +249,7 @@ where
             let (lower, right) = in_lanes(equations);
             let mut normal_matrix = SMatrix::<f64, N, N>::from_fn(|i, j| f64::from(lower[i][j]));
             let right = SVector::<f64, N>::from_fn(|i, _| f64::from(right[i]));
-            // Directions that no edge holds (the angle of a ring) stay where they are. The share was chosen by hand.
+            // Directions that no edge constrains (the angle of a ring) are not changed. The share was chosen by hand.
             normal_matrix += SMatrix::<f64, N, N>::identity() * (2e-3 * normal_matrix.trace()).max(1e-9);
             for k in 0..N {
                 if !is_free[k] {

@@ -1,22 +1,22 @@
-//! The points of the demonstration by which the part is recognised: few, sharp, spread out, and
-//! chosen so that together they hold the part in every direction.
+//! The edge points of the demonstration by which the part is recognised: few, sharp, spread out,
+//! and chosen so that together they constrain the pose in every direction.
 
 use nalgebra::{Matrix4, Point2, Vector2, Vector4};
 use sdg_geometry::{Polygon, upper_median};
 
 use crate::gradient_field::GradientLevel;
 
-/// An edge must be this many times the gradient that is trusted at all. Chosen by hand, not measured.
+/// An edge must exceed the smallest trusted gradient by this factor. Chosen by hand, not measured.
 const STRENGTH_OVER_FLOOR: f32 = 1.5;
-/// Edges weaker than this share of the strong ones (the 90th percentile) are shading, not shape. Chosen by hand, not
+/// Edges below this share of the strong ones (the 90th percentile) are shading, not shape. Chosen by hand, not
 /// measured.
 const STRENGTH_OVER_STRONG: f32 = 0.08;
-/// The least share of energy in one direction: less is a corner or a texture. Chosen by hand, not measured.
+/// Minimum share of energy in one direction; below it the point is a corner or texture. Chosen by hand, not measured.
 const MIN_COHERENCE: f32 = 0.5;
 /// |cos 2φ| between an edge's normal and the outline's beyond which the edge is the outline's own: up to 30° between
 /// them. Chosen by hand, not measured.
 const OUTLINE_ALIGNMENT: f64 = 0.5;
-/// Rounds of the re-weighting that balances the directions of the pose, and the most it may do. Chosen by hand, not
+/// Rounds of the re-weighting that balances the directions of the pose, and its largest factor. Chosen by hand, not
 /// measured.
 const BALANCE_ROUNDS: usize = 3;
 const BALANCE_LIMITS: (f64, f64) = (0.4, 4.0);
@@ -26,22 +26,22 @@ const BALANCE_LIMITS: (f64, f64) = (0.4, 4.0);
 pub(crate) struct EdgePoint {
     /// From the part's centre, in demonstration pixels.
     pub(crate) offset: [f32; 2],
-    /// Unit vector across the edge; its sign means nothing.
+    /// Unit vector across the edge; its sign has no meaning.
     pub(crate) normal: [f32; 2],
     /// (cos 2φ, sin 2φ) of the normal.
     pub(crate) double: [f32; 2],
-    /// Share of the agreement; all points of a level sum to 1.
+    /// Weight in the agreement; the weights of a level sum to 1.
     pub(crate) weight: f32,
 }
 
-/// What the points are chosen by.
+/// Criteria of the choice of points.
 pub(crate) struct EdgeSelection<'a> {
     pub(crate) outline: &'a Polygon,
     pub(crate) center: Point2<f64>,
     pub(crate) max_points: usize,
     /// Weight of an edge on the outline relative to one inside.
     pub(crate) outline_weight: f64,
-    /// Weight of an edge inside: less than 1 where edges there are not the part's in every roll.
+    /// Weight of an edge inside: below 1 where the edges there depend on the part's roll.
     pub(crate) inner_weight: f64,
 }
 
@@ -86,7 +86,8 @@ pub(crate) fn select_edge_points(
 
 /// Edge pixels on the crest of the gradient, moved onto the crest, inside the outline or on it.
 fn find_candidates(level: &GradientLevel, pixel_size: f64, selection: &EdgeSelection<'_>) -> Vec<EdgeCandidate> {
-    // An outline drawn by hand or cut from a mask is about a pixel and a half off, at any level: estimated, not measured.
+    // An outline drawn by hand or cut from a mask has an error of about 1.5 pixels at any level: estimated, not
+    // measured.
     let margin_px = 1.5 + pixel_size;
     let bounds = selection.outline.bounds();
     let first = |bound: f64| ((bound - margin_px) / pixel_size).floor().max(0.0) as usize;
@@ -102,7 +103,7 @@ fn find_candidates(level: &GradientLevel, pixel_size: f64, selection: &EdgeSelec
             let inside = selection.outline.contains(&position);
             let on_outline = outline_normal_near(selection.outline, &position, margin_px)
                 .is_some_and(|outline_normal| 2.0 * normal.dot(&outline_normal).powi(2) - 1.0 > OUTLINE_ALIGNMENT);
-            // Just outside, only the part's own edge belongs to it.
+            // Just outside the outline, only the part's own edge belongs to it.
             if inside || on_outline {
                 candidates.push(EdgeCandidate { position, normal, strength, on_outline });
             }
@@ -116,7 +117,7 @@ fn find_candidates(level: &GradientLevel, pixel_size: f64, selection: &EdgeSelec
     candidates
 }
 
-/// Position in level pixels, unit normal and gradient where pixel `(col, row)` is a crest.
+/// Position in level pixels, unit normal and gradient if pixel `(col, row)` is a crest.
 fn crest_at(level: &GradientLevel, col: usize, row: usize) -> Option<(Point2<f64>, Vector2<f64>, f64)> {
     let (x, y) = (col as f32 + 0.5, row as f32 + 0.5);
     let [dx, dy, energy] = level.nearest(x, y)?;
@@ -133,7 +134,7 @@ fn crest_at(level: &GradientLevel, col: usize, row: usize) -> Option<(Point2<f64
         Some(along.max(0.0).sqrt())
     };
     let (before, here, after) = (strength(-1.0)?, strength(0.0)?, strength(1.0)?);
-    // `<=` on one side only: of two equal neighbours one is kept.
+    // `<=` on one side only, so that one of two equal neighbours is kept.
     if before > here || after >= here {
         return None;
     }
@@ -142,7 +143,7 @@ fn crest_at(level: &GradientLevel, col: usize, row: usize) -> Option<(Point2<f64
     Some((position, Vector2::new(f64::from(nx), f64::from(ny)), f64::from(here)))
 }
 
-/// Where the parabola through three values one apart has its top, from the middle one, in `[-1/2, 1/2]`.
+/// The vertex of the parabola through three values one apart, relative to the middle one, in `[-1/2, 1/2]`.
 pub(crate) fn parabola_peak(before: f32, here: f32, after: f32) -> f32 {
     let bend = before - 2.0 * here + after;
     if bend < 0.0 { (0.5 * (before - after) / bend).clamp(-0.5, 0.5) } else { 0.0 }
@@ -166,12 +167,12 @@ fn outline_normal_near(outline: &Polygon, point: &Point2<f64>, reach: f64) -> Op
     best.1
 }
 
-/// Indices of at most `max_points` candidates, the strong first, that keep a distance from each other.
+/// Indices of at most `max_points` candidates, strong ones first, with a minimum distance between them.
 fn spread_out(candidates: &[EdgeCandidate], max_points: usize, pixel_size: f64) -> Vec<usize> {
     if candidates.len() <= max_points {
         return (0..candidates.len()).collect();
     }
-    // Edge length shared evenly would give this distance; it shrinks until enough points fit.
+    // An even distribution along the edges would give this distance; it shrinks until enough points fit.
     let mut distance = pixel_size * candidates.len() as f64 / max_points as f64;
     loop {
         let mut kept: Vec<usize> = Vec::with_capacity(max_points);
@@ -183,8 +184,8 @@ fn spread_out(candidates: &[EdgeCandidate], max_points: usize, pixel_size: f64) 
                 kept.push(idx);
             }
         }
-        // A full set may have left out weak regions that the next larger distance would reach, but
-        // it never holds fewer points than asked for by much. The shares trade time for an even spread; chosen by hand.
+        // A full set may lack weak regions that the next larger distance would reach; it never has far fewer points
+        // than requested. The shares trade time for an even spread; chosen by hand.
         if kept.len() >= max_points * 9 / 10 || distance < 0.5 * pixel_size {
             return kept;
         }
@@ -194,7 +195,7 @@ fn spread_out(candidates: &[EdgeCandidate], max_points: usize, pixel_size: f64) 
 
 /// Gives more weight to points whose normals constrain a direction of the pose that few others constrain.
 ///
-/// The ends of a tube are few beside its flanks, yet only they say where along its axis it lies.
+/// The ends of a tube have few points compared with its flanks, but only they fix its position along its axis.
 ///
 /// # Source
 /// The multiplicative algorithm for D-optimal designs (Silvey, Titterington and Torsney, 1978), with
@@ -213,7 +214,7 @@ fn balance_directions(points: &mut [EdgePoint]) {
         for ((row, w), boost) in rows.iter().zip(&base).zip(&boosts) {
             information += row * row.transpose() * (w * boost / total);
         }
-        // The angle of a ring cannot be known: without this its noise would be weighed up. Chosen by hand.
+        // The angle of a ring is undetermined; without this bound its noise would get a large weight. Chosen by hand.
         information += Matrix4::identity() * (1e-2 * information.trace() / 4.0);
         let Some(inverse) = information.try_inverse() else { return };
         for (row, boost) in rows.iter().zip(&mut boosts) {

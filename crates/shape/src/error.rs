@@ -1,4 +1,4 @@
-//! What can go wrong when a template is made.
+//! Errors of making a template.
 
 /// Why a [`crate::ShapeTemplate`] could not be made.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -8,10 +8,10 @@ pub enum ShapeError {
     /// The outline is not an area: too few vertices, or a coordinate that is not a number.
     #[error("expected an outline of at least 3 finite vertices, found {found}")]
     OutlineDegenerate {
-        /// What the outline held instead.
+        /// The content of the outline.
         found: String,
     },
-    /// The outline and the image have too little in common.
+    /// The outline and the image overlap too little.
     #[error(
         "expected an outline at least {expected_px} px wide and high inside the {width}x{height} image, found {found_width_px:.1} x {found_height_px:.1} px"
     )]
@@ -25,12 +25,13 @@ pub enum ShapeError {
         /// Height of the outline's part inside the image, in pixels.
         found_height_px: f64,
     },
-    /// The part shows too few edges to be recognised by.
+    /// The part has too few edges for recognition.
     #[error(
-        "expected at least {expected} edge points inside the outline, found {found}: the part hardly differs from what surrounds it; photograph it on a plain background of another brightness, or mark it where it is"
+        "expected at least {expected} edge points inside the outline, found {found}: the part hardly differs from its \
+         surroundings; photograph it on a plain background of another brightness, or correct its marks"
     )]
     TooFewEdges { expected: usize, found: usize },
-    /// A file of weights does not hold those of the network that compares photo and picture.
+    /// A file of weights does not contain those of the network that compares photo and picture.
     #[error("weights of the comparing network: {0}")]
     Weights(String),
     /// A configuration value lies outside its range.

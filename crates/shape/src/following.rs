@@ -1,11 +1,11 @@
-//! A pose that was right in the last picture of a sequence, moved onto the edges of the next one.
+//! Moves a pose that was right in the last picture of a sequence onto the edges of the next.
 //!
 //! ```text
 //! start ─ a few pixels off ─ snapped: the agreement's level, then the finest ─ pose
 //!       ─ further off ────── captured: every level climbed and snapped ─────── pose
 //! ```
-//! Refinement of a single picture ([`ShapeTemplate::refine`]) begins with a grid of poses over its capture range. In a sequence
-//! the last pose and its velocity give a start that is about a pixel off, and the grid is not needed.
+//! Refinement of a single picture ([`ShapeTemplate::refine`]) starts from a grid of poses over its capture range. In a
+//! sequence the last pose and its velocity give a start with an error of about a pixel, so no grid is needed.
 
 use sdg_geometry::PlanarSimilarity;
 
@@ -15,14 +15,14 @@ use crate::gradient_field::GradientField;
 use crate::pose::Pose;
 use crate::template::ShapeTemplate;
 
-/// How far from its start a pose may be moved.
+/// Largest movement of a pose from its start.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reach {
     /// In x and in y, in pixels of the image.
     pub shift_px: f64,
-    /// Turn to either side, in radians.
+    /// Turn in either direction, in radians.
     pub turn_rad: f64,
-    /// Change of ln scale to either side; 0 keeps the scale.
+    /// Change of ln scale in either direction; 0 keeps the scale.
     pub log_scale: f64,
 }
 
@@ -33,15 +33,15 @@ impl Reach {
 }
 
 impl ShapeTemplate {
-    /// Image pixels for one of the coarsest level that poses are refined at, for a part `scale` times as large as in the
-    /// demonstration. A window of an image whose corner stands at multiples of it has the same pyramid as the image.
+    /// Image pixels per pixel of the coarsest level of refinement, for a part `scale` times as large as in the
+    /// demonstration. An image window whose corner is at multiples of it has the same pyramid as the image.
     pub fn coarsest_pixel(&self, scale: f64) -> u32 {
         let pixel_size = self.levels[self.levels.len() - 1].pixel_size * scale;
         1 << pixel_size.max(1.0).log2().round() as u32
     }
 
-    /// Moves a pose that is at most about six pixels of the agreement's level off onto the edges: of a part of 128 pixels, twelve
-    /// pixels. Deterministic.
+    /// Moves a pose onto the edges; its error may be at most about six pixels of the agreement's level (for a part of
+    /// 128 pixels, twelve image pixels). Deterministic.
     ///
     /// # Units and frames
     /// Poses map demonstration pixels to pixels of the image the field was computed from.
@@ -57,7 +57,7 @@ impl ShapeTemplate {
         pose.to_similarity(self.center)
     }
 
-    /// As [`Self::captured`] at the coarsest level alone; the pose and how well it agrees there.
+    /// As [`Self::captured`] at the coarsest level only; returns the pose and its agreement there.
     pub(crate) fn captured_coarsely(
         &self,
         field: &GradientField,
@@ -69,7 +69,8 @@ impl ShapeTemplate {
         (pose.to_similarity(self.center), agreement)
     }
 
-    /// As [`Self::captured`] down to the agreement's level, and the agreement there: a pose that is compared, not grasped.
+    /// As [`Self::captured`] down to the agreement's level, with the agreement there: for a pose that is compared but
+    /// not grasped.
     pub(crate) fn captured_roughly(
         &self,
         field: &GradientField,
@@ -81,7 +82,7 @@ impl ShapeTemplate {
         (pose.to_similarity(self.center), self.agreement_at(field, &pose))
     }
 
-    /// Moves a pose that may be further off onto the edges: climbed and snapped at every level, about five times slower than
+    /// Moves a pose with a larger error onto the edges: climbs and snaps at every level, about five times slower than
     /// [`Self::snapped`]. Deterministic.
     ///
     /// # Units and frames
@@ -128,7 +129,7 @@ mod tests {
         ((pose.apply(&MIDDLE) - middle).norm(), pose.angle.distance(Angle::from_degrees(angle_deg)).to_degrees())
     }
 
-    /// The crest of a sampled edge is found by a parabola, which is off by up to a seventh of a pixel either side.
+    /// The crest of a sampled edge is found by a parabola, with an error of up to a seventh of a pixel.
     const MAX_OFF_PX: f64 = 0.2;
     const MAX_OFF_DEG: f64 = 0.15;
     const REACH: Reach = Reach { shift_px: 16.0, turn_rad: 0.2, log_scale: 0.02 };

@@ -1,8 +1,8 @@
-//! How much shorter a part looks in one direction than in the other, beside the photo: the slant of an uncalibrated camera.
+//! Foreshortening of a part compared with the photo, from the slant of an uncalibrated camera.
 //!
-//! A camera tilted by t from the vertical shows a flat part shortened by cos t in one direction of the image. From a pose that
-//! only turns, shifts and scales, the part's edge points are followed to a pose that may shorten, too: an affine map, of six
-//! coordinates, by the same consensus of crests as [`crate::consensus`].
+//! A camera tilted by t from the vertical shows a flat part shortened by cos t in one direction of the image. Starting
+//! from a pose of turn, shift and scale, the part's edge points are followed to an affine map of six coordinates, by
+//! the same consensus of crests as [`crate::consensus`].
 
 use nalgebra::{Matrix2, Point2, SVector, Vector2};
 use sdg_geometry::{Angle, PlanarSimilarity};
@@ -15,23 +15,25 @@ use crate::pose::Pose;
 use crate::sightings::{EdgePlace, FIRST_REACH, LATER_REACH, Sightings};
 use crate::template::{MatchedLevel, ShapeTemplate, TemplateLevel};
 
-/// Starts: no shortening, and so much (ln) in each of so many directions. A start is followed over about half of that.
+/// Starts: no shortening, and this shortening (ln) in each of this many directions. A start is followed over about half
+/// of that.
 const START_LOG_RATIOS: [f64; 2] = [0.1, 0.22];
 const NUM_DIRECTIONS: usize = 6;
 /// Rounds of gathering crests anew. Chosen by hand, for time.
 const ROUNDS: usize = 3;
-/// More is no part on a table: 50°. Derived.
+/// Maximum tilt of a part on a table: 50°. Derived.
 const MAX_LOG_RATIO: f64 = 0.45;
 
-/// What a shortening moves edges by, as shift in x and in y (px), turn (rad) and ln scale. Chosen by hand, and more than any does.
+/// Largest edge movement by a shortening, as shift in x and in y (px), turn (rad) and ln scale. Chosen by hand, larger
+/// than any observed.
 const READ_WITHIN: [f64; 4] = [24.0, 24.0, 0.0, 0.5];
 
 /// The shortening of a part at a pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Foreshortening {
-    /// ln of the length across the direction over the length along it, from 0 on.
+    /// ln of the length across the direction over the length along it, at least 0.
     pub log_ratio: f64,
-    /// The direction of the image in which the part is shortened; turned by half a turn it is the same.
+    /// The direction of the image in which the part is shortened; its sign has no meaning.
     pub direction: Angle,
     /// The share of edge points on a crest of the image, in `[0, 1]`, and that of the pose without shortening.
     pub consensus: f64,
@@ -47,7 +49,7 @@ struct Affine {
 }
 
 impl ShapeTemplate {
-    /// How much the part is shortened where it lies at about this pose; `None` where no edge is near.
+    /// The shortening of the part at about this pose; `None` where no edge is near.
     ///
     /// # Units and frames
     /// The pose maps demonstration pixels to pixels of the image the field was computed from.
@@ -84,7 +86,7 @@ impl ShapeTemplate {
     }
 }
 
-/// Maps of the image that shorten it in one direction, its area as before.
+/// Maps of the image that shorten it in one direction and keep its area.
 fn starts() -> impl Iterator<Item = Matrix2<f64>> {
     let shortened = START_LOG_RATIOS.into_iter().flat_map(|log_ratio| {
         (0..NUM_DIRECTIONS).map(move |k| {
@@ -125,7 +127,7 @@ fn radius(level: &TemplateLevel, image_pixel_size: f64, pose: &Affine) -> f64 {
     (level.radius_px * pose.linear.determinant().abs().sqrt() / image_pixel_size).max(1.0)
 }
 
-/// What the edge points see at an affine pose; `None` for one that cannot be.
+/// The crests of the edge points at an affine pose; `None` for an impossible pose.
 fn gather(level: &TemplateLevel, matched: &MatchedLevel<'_>, pose: &Affine, reach: usize) -> Option<Sightings<6>> {
     let pixel = matched.image_pixel_size;
     let normal_map = pose.linear.try_inverse()?.transpose();

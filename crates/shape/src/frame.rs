@@ -1,4 +1,4 @@
-//! A square about the part, in the frame of its photo, into which photo and pictures are sampled alike.
+//! A square around the part, in the frame of its photo, into which photo and pictures are sampled.
 
 use image::RgbImage;
 use nalgebra::{Point2, Vector2};
@@ -12,7 +12,7 @@ use crate::pixel_cell::PixelReader;
 /// The square, `side` pixels wide.
 #[derive(Debug, Clone)]
 pub(crate) struct Frame {
-    /// Pixels of the cut-out for one of the square's.
+    /// Cut-out pixels per pixel of the square.
     step: f64,
     /// In pixels of the cut-out.
     center: Point2<f64>,
@@ -20,40 +20,40 @@ pub(crate) struct Frame {
 }
 
 impl Frame {
-    /// With the part, whose bounds are in pixels of the cut-out, `part_side` pixels long.
+    /// A square with the part, whose bounds are in pixels of the cut-out, `part_side` pixels long.
     pub(crate) fn about(bounds: &BoundingBox, part_side: f64, side: usize) -> Self {
         Self { step: bounds.width().max(bounds.height()) / part_side, center: bounds.center(), side }
     }
 
-    /// Pixels of the cut-out for one of the square's.
+    /// Cut-out pixels per pixel of the square.
     pub(crate) fn step(&self) -> f64 {
         self.step
     }
 
-    /// Where a point of the square lies in the cut-out.
+    /// The place of a point of the square in the cut-out.
     pub(crate) fn place(&self, at: [f64; 2]) -> Point2<f64> {
         self.center + self.step * Vector2::from(at.map(|coordinate| coordinate - 0.5 * self.side as f64))
     }
 
-    /// Where a point of the cut-out lies in the square.
+    /// The place of a point of the cut-out in the square.
     pub(crate) fn place_of(&self, point: &Point2<f64>) -> [f64; 2] {
         let from_center = (point - self.center) / self.step;
         [from_center.x, from_center.y].map(|coordinate| coordinate + 0.5 * self.side as f64)
     }
 
-    /// Middles of the pixels, row by row.
+    /// Pixel centres, row by row.
     pub(crate) fn pixels(&self) -> impl Iterator<Item = [f64; 2]> + use<> {
         let side = self.side;
         (0..side * side).map(move |i| [i % side, i / side].map(|k| k as f64 + 0.5))
     }
 
-    /// Mean colours over the pixels, from 0 to 1, row by row; `None` where there is no image. So many samples a side are taken that no
-    /// pixel of the image is skipped.
+    /// Mean colours over the pixels, from 0 to 1, row by row; `None` where there is no image. Enough samples are taken
+    /// per side that no pixel of the image is skipped.
     pub(crate) fn sampled(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> Vec<Option<[f32; 3]>> {
         self.sampled_by(image, image_from_cutout, (self.step * image_from_cutout.scale).ceil())
     }
 
-    /// The same with fewer samples where few pixels are skipped.
+    /// The same with fewer samples, so that few pixels are skipped.
     pub(crate) fn sampled_sparsely(
         &self,
         image: &RgbImage,
@@ -77,7 +77,8 @@ impl Frame {
     }
 }
 
-/// Reads `num` × `num` samples a pixel, the first at `origin`; `across` is the way from one pixel to the next of its row.
+/// Reads `num` × `num` samples per pixel, the first at `origin`; `across` is the step between neighbouring pixels of a
+/// row.
 struct SampleFrame<'a> {
     reader: PixelReader<'a>,
     side: usize,

@@ -2,7 +2,7 @@
 
 use pulp::WithSimd;
 
-/// Points, pixels or places that are taken at once.
+/// Points, pixels or places that are processed at once.
 pub(crate) const LANES: usize = 8;
 
 /// Does the work with the widest instructions that the machine has.
@@ -12,7 +12,7 @@ pub(crate) fn in_lanes<W: WithSimd>(work: W) -> W::Output {
     pulp::Arch::new().dispatch(work)
 }
 
-/// Does the work with the instructions that all of a page is compiled for: one version of it is downloaded, not three.
+/// Does the work with the instructions for which the whole page is compiled: the page downloads one version, not three.
 #[cfg(target_arch = "wasm32")]
 #[inline]
 pub(crate) fn in_lanes<W: WithSimd>(work: W) -> W::Output {

@@ -1,17 +1,18 @@
-//! Convolutions and sums of small networks in plain loops, compiled for the widest instructions that the machine has where their caller is.
+//! Convolutions and sums of small networks in plain loops. They are compiled for the widest instructions of the machine
+//! if their caller is.
 
 use safetensors::SafeTensors;
 
 use crate::error::ShapeError;
 
-/// A convolution of 3×3 pixels, with a border of zeros, and a rectifier behind it.
+/// A convolution of 3×3 pixels with zero padding, followed by a rectifier.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Layer {
-    /// Channels that it reads.
+    /// Input channels.
     pub inputs: usize,
-    /// Channels that it makes.
+    /// Output channels.
     pub outputs: usize,
-    /// Pixels from one place to the next.
+    /// Stride in pixels.
     pub stride: usize,
 }
 
@@ -19,7 +20,7 @@ pub(crate) const fn layer(inputs: usize, outputs: usize, stride: usize) -> Layer
     Layer { inputs, outputs, stride }
 }
 
-/// Weights by what is read, then by what is made; and what is added.
+/// Weights by input, then by output; and the bias.
 #[derive(Debug, Clone)]
 pub(crate) struct Linear {
     pub(crate) weights: Vec<f32>,
@@ -34,7 +35,7 @@ impl Linear {
     }
 }
 
-/// From output, input, tap to tap, input, output: outputs lie next to each other where the loops add them up.
+/// From output, input, tap to tap, input, output, so that the summing loops read adjacent outputs.
 fn outputs_last(weights: &[f32], outputs: usize, inputs: usize) -> Vec<f32> {
     let taps = weights.len() / (outputs * inputs);
     let place = |i: usize| {
@@ -117,7 +118,7 @@ pub(crate) fn pooled<const CHANNELS: usize>(map: &[f32]) -> Vec<f32> {
     pooled
 }
 
-/// One value of many, by way of `HIDDEN` rectified units.
+/// One value from many, through `HIDDEN` rectified units.
 #[inline(always)]
 pub(crate) fn answered<const HIDDEN: usize>(values: &[f32], hidden: &Linear, answer: &Linear) -> f32 {
     let mut units = [0.0; HIDDEN];

@@ -1,20 +1,20 @@
 //! Colours between the pixels of a picture, by bilinear interpolation, many at once.
 //!
-//! Loops of their own, each with its reason beside it: [`GradientField`](crate::GradientField) (directions, three floats),
-//! `sdg-demonstration`'s raster (the border goes on), `sdg-orientation`'s crop (beyond the border a colour; weights belong to its
-//! bits), `sdg-detection`'s pasted masks (single numbers).
+//! Other interpolation loops, each with its reason beside it: [`GradientField`](crate::GradientField) (directions,
+//! three floats), `sdg-demonstration`'s raster (repeats the border), `sdg-orientation`'s crop (a fixed colour beyond
+//! the border; the weights depend on its exact bits), `sdg-detection`'s pasted masks (single numbers).
 
 use image::RgbImage;
 use wide::{f32x4, i32x4};
 
 use crate::gradient_field::whole;
 
-/// A picture whose colours are read between its pixels.
+/// A picture whose colours are interpolated between its pixels.
 #[derive(Clone, Copy)]
 pub(crate) struct PixelReader<'a> {
     raw: &'a [u8],
     width: u32,
-    /// Column and row of the last pixel that has a neighbour; below 0 where there is none.
+    /// Column and row of the last pixel that has a neighbour; below 0 if there is none.
     last_pair: [f32; 2],
 }
 
@@ -24,8 +24,8 @@ impl<'a> PixelReader<'a> {
         Self { raw: image.as_raw(), width, last_pair: [width, height].map(|side| side as f32 - 2.0) }
     }
 
-    /// The colours `[r, g, b, _]`, from 0 to 255, at places in pixels; zeros where a place does not lie between four pixel centres.
-    /// Which of the places do, as 1 or 0.
+    /// The colours `[r, g, b, _]`, from 0 to 255, at places in pixels; zeros for a place that does not lie between four
+    /// pixel centres. Also returns 1 for places that do and 0 for others.
     #[inline(always)]
     pub(crate) fn colors<const N: usize>(&self, x: &[f32; N], y: &[f32; N], out: &mut [f32x4; N]) -> [f32; N] {
         let mut inside = [0.0; N];
@@ -42,7 +42,7 @@ impl<'a> PixelReader<'a> {
         inside
     }
 
-    /// The same; a place beyond the border, or one that is no number, has the colour of the nearest pixel.
+    /// The same; a place beyond the border, or one that is not a number, gets the colour of the nearest pixel.
     #[inline(always)]
     pub(crate) fn colors_to_border<const N: usize>(&self, x: &[f32; N], y: &[f32; N], out: &mut [f32x4; N]) {
         let (mut along, mut below, mut idxs) = ([0.0; N], [0.0; N], [0u32; N]);
@@ -64,7 +64,7 @@ impl<'a> PixelReader<'a> {
         }
     }
 
-    /// A pixel and its right neighbour, each with a fourth number that means nothing: four bytes are read at once.
+    /// A pixel and its right neighbour, each with an unused fourth number: four bytes are read at once.
     #[inline(always)]
     fn pair(&self, at: usize) -> [f32x4; 2] {
         let color = |[a, b, c, d]: [u8; 4]| f32x4::from_i32x4(i32x4::new([a, b, c, d].map(i32::from)));

@@ -10,10 +10,10 @@ use crate::lanes::in_lanes;
 use crate::parallel;
 use crate::pixel_cell::PixelReader;
 
-/// Pixels of the plan view between two places whose position in the picture is computed; between them it is interpolated. At a
-/// tilt of 25° and a wide lens the error is below a fiftieth of a pixel (tested).
+/// Distance in plan-view pixels of two places whose position in the picture is computed; positions between them are
+/// interpolated. At a tilt of 25° with a wide lens the error is below a fiftieth of a pixel (tested).
 const CELL: u32 = 8;
-/// Most samples of the picture a side for a pixel of the plan view.
+/// Maximum samples of the picture per side for a pixel of the plan view.
 const MAX_SAMPLES: usize = 8;
 
 /// A rectangle of pixels.
@@ -29,7 +29,7 @@ pub struct PixelRect {
     pub height: u32,
 }
 
-/// Where the picture shows each pixel of a plan view: computed once for all pictures of a camera.
+/// The picture position of each pixel of a plan view, computed once for all pictures of a camera.
 #[derive(Debug, Clone)]
 pub struct PlanMap {
     width: u32,
@@ -37,17 +37,17 @@ pub struct PlanMap {
     columns: usize,
     /// Row by row, [`CELL`] pixels apart.
     nodes: Vec<Option<Point2<f64>>>,
-    /// Samples a side for a pixel, so that no pixel of the picture is skipped.
+    /// Samples per side for a pixel, so that no pixel of the picture is skipped.
     samples: usize,
 }
 
 impl PlanMap {
-    /// Of a camera that looks at the plane of a plan view.
+    /// For a camera that looks at the plane of a plan view.
     pub fn new(camera: &PosedCamera, view: &PlanView) -> Self {
         Self::of([view.width, view.height], |at| camera.project(&view.point(&at)))
     }
 
-    /// Of `width` × `height` pixels, each point of which the picture shows where `seen` says.
+    /// For `width` × `height` pixels; `seen` gives the picture position of each point.
     pub fn of([width, height]: [u32; 2], seen: impl Fn(Point2<f64>) -> Option<Point2<f64>>) -> Self {
         let [columns, rows] = [width, height].map(|side| side.div_ceil(CELL) + 1);
         let place = |column: u32, row: u32| Point2::new(f64::from(column * CELL), f64::from(row * CELL));
@@ -62,12 +62,12 @@ impl PlanMap {
         Self { width, height, columns: columns as usize, nodes, samples: (widest.ceil() as usize).min(MAX_SAMPLES) }
     }
 
-    /// The plan view of a picture. Outside the picture it repeats the picture's border, so that no edge is made.
+    /// The plan view of a picture. Outside the picture it repeats the picture's border, so that no edge appears.
     pub fn resample(&self, picture: &RgbImage) -> RgbImage {
         self.resample_window(picture, &PixelRect { left: 0, top: 0, width: self.width, height: self.height })
     }
 
-    /// A rectangle of the plan view, which must lie in it: the same pixels as [`Self::resample`] gives there.
+    /// A rectangle of the plan view, which must lie inside it: the same pixels as [`Self::resample`] gives there.
     pub fn resample_window(&self, picture: &RgbImage, window: &PixelRect) -> RgbImage {
         let rows: Vec<u32> = (window.top..window.top + window.height).collect();
         let reader = PixelReader::new(picture);
@@ -77,8 +77,8 @@ impl PlanMap {
         RgbImage::from_raw(window.width, window.height, rows.concat()).unwrap_or_default()
     }
 
-    /// Where the picture shows both ends of a line across a column of cells, `down` of a pixel below the top of row `y`; `None` where the
-    /// lens shows nothing.
+    /// The picture positions of both ends of a line across a column of cells, `down` of a pixel below the top of row
+    /// `y`; `None` where the lens shows nothing.
     fn cell_line(&self, column: u32, y: u32, down: f64) -> Option<[Vector2<f64>; 2]> {
         let below = (f64::from(y % CELL) + down) / f64::from(CELL);
         let at = (y / CELL) as usize * self.columns + column as usize;

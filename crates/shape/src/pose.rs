@@ -1,10 +1,10 @@
-//! A pose of the template while it is being moved: about the part's centre, where turning and scaling
-//! do not shift it.
+//! A pose of the template during refinement, about the part's centre, where turning and scaling do
+//! not shift it.
 
 use nalgebra::Point2;
 use sdg_geometry::{Angle, PlanarSimilarity};
 
-/// Where the part's centre lies in the image, how the part is turned and scaled.
+/// The position of the part's centre in the image, its turn and its scale.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Pose {
     /// In image pixels.
@@ -35,7 +35,7 @@ impl Pose {
         }
     }
 
-    /// Whether no coordinate differs by a unit of (x, y, angle, ln scale).
+    /// Whether every coordinate differs by less than a unit of (x, y, angle, ln scale).
     pub(crate) fn is_near(&self, other: &Self, units: [f64; 4]) -> bool {
         (self.center.x - other.center.x).abs() < units[0]
             && (self.center.y - other.center.y).abs() < units[1]
@@ -76,7 +76,7 @@ impl LevelMap {
         [self.a * x - self.b * y + self.tx, self.b * x + self.a * y + self.ty]
     }
 
-    /// [`Self::apply`] of many places.
+    /// [`Self::apply`] for many places.
     #[inline(always)]
     pub(crate) fn apply_all<const N: usize>(&self, x: &[f32; N], y: &[f32; N]) -> [[f32; N]; 2] {
         [

@@ -1,7 +1,7 @@
-//! Where a part of revolution lies along its axis, and which of its ends is which.
+//! The position of a part of revolution along its axis, and which end is which.
 //!
-//! In another roll its threads have moved along it and its light has changed, so that edges inside its outline draw a pose along the
-//! axis or to its other end. Its profile is the same in every roll.
+//! In another roll the threads are shifted along the part and its light has changed, so that edges inside its outline
+//! shift a pose along the axis or turn it end for end. The profile is the same in every roll.
 
 use std::ops::RangeInclusive;
 
@@ -15,13 +15,14 @@ use crate::gradient_field::GradientField;
 use crate::revolution::Revolution;
 use crate::template::ShapeTemplate;
 
-/// Shifts along the axis from which the profile is laid over the picture, in lengths: a thread's pitch and more to either side.
+/// Shifts along the axis at which the profile is compared with the picture, in part lengths: more than a thread's pitch
+/// in both directions.
 const NUM_SHIFTS: i32 = 4;
 const SHIFT: f64 = 0.03;
-/// How far it then moves, and what it must gain in agreement.
+/// Largest further movement, and minimum gain of agreement.
 const REACH: Reach = Reach { shift_px: 4.0, turn_rad: 0.06, log_scale: 0.03 };
 const MIN_GAIN: f64 = 0.05;
-/// Into how many steps a shift is divided. Chosen by hand: the largest are of nine pixels.
+/// Number of steps into which a shift is divided. Chosen by hand: the largest are of nine pixels.
 const SHARES: usize = 8;
 
 /// The edges along the outline of a part of revolution.
@@ -29,25 +30,25 @@ const SHARES: usize = 8;
 pub(crate) struct Profile {
     template: ShapeTemplate,
     middle: Point2<f64>,
-    /// As long as the part.
+    /// Vector along the axis, as long as the part.
     axis: Vector2<f64>,
     pub(crate) revolution: Revolution,
 }
 
 impl Profile {
-    /// `None` for any other part.
+    /// `None` for other parts.
     pub(crate) fn of(image: &RgbImage, outline: &Polygon, config: &ShapeConfig) -> Option<Self> {
         let revolution = Revolution::of(image, outline)?;
         let template = ShapeTemplate::of_outline(image, outline, config).ok()?;
         Some(Self { template, middle: outline.bounds().center(), axis: revolution.axis(), revolution })
     }
 
-    /// How well the edges along the outline agree at a pose, in `[0, 1]`.
+    /// The agreement of the edges along the outline at a pose, in `[0, 1]`.
     pub(crate) fn agreement(&self, field: &GradientField, pose: &PlanarSimilarity) -> f64 {
         self.template.agreement(field, pose)
     }
 
-    /// The share of `shift`, in `[0, 1]`, by which the pose moves so that the profile agrees best.
+    /// The share of `shift`, in `[0, 1]`, by which the pose moves to the best agreement of the profile.
     pub(crate) fn share_of(&self, field: &GradientField, pose: &PlanarSimilarity, shift: Vector2<f64>) -> f64 {
         let share = |k: usize| k as f64 / SHARES as f64;
         let agreements: Vec<f64> =
@@ -56,17 +57,18 @@ impl Profile {
         if best == 0 || best == SHARES {
             return share(best);
         }
-        // The top of the parabola through the best and those beside it.
+        // The vertex of the parabola through the best value and its neighbours.
         let [before, top, after] = [best - 1, best, best + 1].map(|k| agreements[k]);
         let curvature = before - 2.0 * top + after;
         let offset = if curvature < 0.0 { 0.5 * (before - after) / curvature } else { 0.0 };
         share(best) + offset / SHARES as f64
     }
 
-    /// `pose`, or one along the axis or the other way round at which the profile agrees better. Scales stay in `scales`.
+    /// `pose`, or a pose shifted along the axis or turned end for end at which the profile agrees better. Scales stay
+    /// in `scales`.
     ///
-    /// `all_edges` of the part may agree worse there by no more than the profile must gain: the edge of a hard shadow has the same
-    /// profile, and nothing of what lies inside it.
+    /// The agreement of `all_edges` of the part may fall by at most [`MIN_GAIN`]: the edge of a hard shadow has the
+    /// part's profile, but no edges inside it.
     pub(crate) fn placed(
         &self,
         field: &GradientField,
@@ -163,7 +165,7 @@ mod tests {
             let found = profile.share_of(&field, &pose, shift);
             assert!((found - share).abs() < 0.08, "{share}: {found}");
         }
-        // Away from the outline and back again is no share.
+        // A movement away from the outline and back has no share.
         assert_eq!(profile.share_of(&field, &PlanarSimilarity::IDENTITY.shifted(shift), shift), 0.0);
     }
 
@@ -179,7 +181,7 @@ mod tests {
     #[test]
     fn a_pose_does_not_go_to_the_shadow() {
         let (photo, outline) = screw(0.0);
-        // On a table as bright as the part's sides, which are lost in it; the shadow is seen whole.
+        // The table is as bright as the part's sides, which therefore have no edges; the whole shadow is visible.
         let is_bright = |at: Point2<f64>| outline.contains(&Point2::new(at.x, 60.0 + (at.y - 60.0) / 0.6));
         let picture = |shadow: Vector2<f64>| {
             RgbImage::from_fn(photo.width(), photo.height(), |x, y| {

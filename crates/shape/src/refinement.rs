@@ -1,4 +1,4 @@
-//! Moves a template from a predicted pose to where its edges agree best.
+//! Moves a template from a predicted pose to the pose of best edge agreement.
 //!
 //! ```text
 //! initial ─ grid of poses on the coarsest level ─ a few best ─┐
@@ -7,8 +7,9 @@
 //!        └─ finest level: snap until still ─ agreement
 //! ```
 //! The agreement is flat across a blurred edge, since direction does not change there: climbing it is
-//! robust but not exact. Snapping measures how far each edge point is from the crest of the image's
-//! gradient along its normal and solves for the pose by weighted least squares: exact, but only near.
+//! robust but not exact. Snapping measures the distance of each edge point from the crest of the
+//! image's gradient along its normal and solves for the pose by weighted least squares: exact, but
+//! only near the solution.
 
 use sdg_geometry::{CompassSearch, PlanarSimilarity};
 
@@ -18,22 +19,22 @@ use crate::gradient_field::GradientField;
 use crate::pose::Pose;
 use crate::template::{LevelSampling, MatchedLevel, ShapeTemplate, TemplateLevel};
 
-/// Poses that are followed from the coarsest level. More cost time in proportion. Chosen by hand, not measured.
+/// Number of poses followed from the coarsest level; time is proportional to it. Chosen by hand, not measured.
 const NUM_CANDIDATES: usize = 5;
-/// Step of the grid of poses, in level pixels of edge movement: directions hold for two pixels about
-/// an edge. Chosen by that reasoning, not measured.
+/// Step of the grid of poses, in level pixels of edge movement: directions are constant within two
+/// pixels of an edge. Derived from that, not measured.
 const GRID_STEP: f64 = 1.5;
-/// Agreement given up for a start at the far end of the capture range: ties go to the prediction. Chosen by
-/// hand, not measured.
+/// Penalty of agreement for a start at the border of the capture range, so that the prediction wins ties.
+/// Chosen by hand, not measured.
 const DISTANCE_PENALTY: f64 = 0.03;
-/// The climb: steps in level pixels of edge movement, and a bound for climbs of many small steps. Chosen by hand, not measured.
+/// The climb: steps in level pixels of edge movement, and the maximum number of steps. Chosen by hand, not measured.
 const CLIMB: CompassSearch =
     CompassSearch { steps: (0.5, 0.1), min_gain: 1e-6, max_rounds: 24, max_evaluations: usize::MAX };
 
 /// A pose after refinement.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Refinement {
-    /// Where the demonstration lies in the image.
+    /// The pose of the demonstration in the image.
     pub image_from_demonstration: PlanarSimilarity,
     /// [`ShapeTemplate::agreement`] at that pose.
     pub agreement: f64,
@@ -46,8 +47,8 @@ pub struct Refinement {
 impl ShapeTemplate {
     /// Climbs from a predicted pose to the best agreement within the configured capture range.
     ///
-    /// The answer is only as far from `initial` as [`crate::ShapeConfig`] allows, whatever the image
-    /// shows; deterministic.
+    /// The result is only as far from `initial` as [`crate::ShapeConfig`] allows, for any image;
+    /// deterministic.
     ///
     /// # Units and frames
     /// Poses map demonstration pixels to pixels of the image the field was computed from.
@@ -74,7 +75,7 @@ impl ShapeTemplate {
             let units = step_units(level, &matched, &start);
             candidates.clear();
             for Snapped { pose, .. } in snapped {
-                // Several starts often end on one pose: it is followed once.
+                // Several starts often end at one pose, which is followed once.
                 if candidates.len() < keep && candidates.iter().all(|other| !pose.is_near(other, units)) {
                     candidates.push(pose);
                 }
@@ -89,7 +90,7 @@ impl ShapeTemplate {
         }
     }
 
-    /// Climbs from `from` within `range` at the coarsest level; the pose and its agreement there.
+    /// Climbs from `from` within `range` at the coarsest level; returns the pose and its agreement there.
     pub(crate) fn climb_coarsest(&self, field: &GradientField, range: &CaptureRange, from: Pose) -> (Pose, f64) {
         let level = &self.levels[self.levels.len() - 1];
         let matched = range.matched_level(level, field);
@@ -102,7 +103,7 @@ impl ShapeTemplate {
         self.follow_to(field, range, from, 0)
     }
 
-    /// The same down to a level that need not be the finest.
+    /// The same down to a level that may be coarser than the finest.
     pub(crate) fn follow_to(&self, field: &GradientField, range: &CaptureRange, from: Pose, last_idx: usize) -> Pose {
         self.levels[last_idx..].iter().rev().fold(from, |pose, level| {
             let matched = range.matched_level(level, field);
@@ -110,7 +111,7 @@ impl ShapeTemplate {
         })
     }
 
-    /// The best poses of a grid over the capture range, on the coarsest level, no two alike.
+    /// The best poses of a grid over the capture range, on the coarsest level, without duplicates.
     fn grid_candidates(&self, field: &GradientField, range: &CaptureRange) -> Vec<Pose> {
         let level = &self.levels[self.levels.len() - 1];
         let matched = range.matched_level(level, field);
@@ -144,7 +145,7 @@ impl ShapeTemplate {
     }
 }
 
-/// Compass search for the best alignment at a level, less a penalty for the distance from the start.
+/// Compass search for the best alignment at a level, minus a penalty for the distance from the start.
 fn climb(level: &TemplateLevel, matched: &MatchedLevel<'_>, range: &CaptureRange, from: Pose) -> Pose {
     let units = step_units(level, matched, &from);
     let evaluate = |pose: &Pose| {

@@ -1,32 +1,34 @@
-//! Parts of revolution, which lie on their side rolled by any angle: screws, pins, fittings.
+//! Parts of revolution, which lie on their side at any roll angle: screws, pins, fittings.
 //!
-//! Their outline is its own mirror image about a long axis, and across that axis the light on them changes in the same way all along
-//! it, which it does not on a flat part: docs/decisions/028-parts-of-revolution.md.
+//! Their outline is its own mirror image about a long axis, and the light on them changes across that axis in the same
+//! way along its whole length. On a flat part it does not: docs/decisions/028-parts-of-revolution.md.
 
 use image::RgbImage;
 use nalgebra::{Point2, Rotation2, Vector2};
 use sdg_geometry::{GraspLine, Mask, Polygon};
 
-/// The least share of the part that its mirror image covers, its least length over its mean width, and how much of the light's
-/// variance must be explained by the place across the axis. Seven rendered parts of revolution and a photographed screw have 0.92 (a deep
-/// thread with one start, whose sides differ), 3.4 and 0.39 at least; of the flat parts that are as symmetric and as slender none has more
-/// than 0.19 of the last.
+/// Minimum share of the part covered by its mirror image, minimum length over mean width, and minimum share of the
+/// light's variance that is explained by the position across the axis. Seven rendered parts of revolution and a
+/// photographed screw have at least 0.92 (a deep thread with one start, whose sides differ), 3.4 and 0.39; flat parts
+/// that are as symmetric and as slender have at most 0.19 of the last.
 const MIN_SYMMETRY: f64 = 0.85;
 const MIN_SLENDERNESS: f64 = 2.5;
 const MIN_EXPLAINED: f64 = 0.28;
-/// How the light must at least change across the axis, as a standard deviation over the mean. Chosen by hand.
+/// Minimum change of the light across the axis, as a standard deviation over the mean. Chosen by hand.
 const MIN_CHANGE: f64 = 0.06;
-/// The axis is looked for so far about the main axis of the outline, in degrees and in shares of the greatest width. Chosen by hand.
+/// Search range of the axis about the main axis of the outline, in degrees and in shares of the greatest width. Chosen
+/// by hand.
 const TURNS: (i32, f64) = (12, 0.5);
 const OFFSETS: (i32, f64) = (6, 0.005);
-/// Pixels that the axis is looked for by. Chosen for time.
+/// Number of pixels used to find the axis. Chosen for time.
 const AXIS_PIXELS: usize = 1000;
-/// Pieces along the axis and across it in which the light is averaged; those nearest to the outline show the background.
+/// Sections along the axis and across it in which the light is averaged; those nearest to the outline show the
+/// background.
 const ALONG: usize = 40;
 const ACROSS: usize = 8;
 const INNER: f64 = 0.8;
-/// What reaches further from the axis, in mean radii, is a wing: heads and hexagons of the parts above reach up to 1.9, the wings of a wing
-/// bolt 2.9.
+/// A point further from the axis, in mean radii, belongs to a wing: heads and hexagons of the parts above reach up to
+/// 1.9, the wings of a wing bolt 2.9.
 const MOST_OF_MEAN: f64 = 2.3;
 
 /// The axis of such a part, as its photo shows it.
@@ -39,12 +41,12 @@ pub struct Revolution {
 }
 
 impl Revolution {
-    /// The axis of the part that `outline` encloses; `None` for any other part.
+    /// The axis of the part that `outline` encloses; `None` for other parts.
     ///
     /// # Units and frames
     /// `outline` is in pixels of `cutout`.
     pub fn of(cutout: &RgbImage, outline: &Polygon) -> Option<Self> {
-        // Most parts are not slender, which is seen at once.
+        // Most parts are not slender, which is quick to check.
         let bounds = outline.bounds();
         let longest = bounds.width().hypot(bounds.height());
         if longest * longest < MIN_SLENDERNESS * outline.area() {
@@ -56,7 +58,7 @@ impl Revolution {
             .filter(|&(x, y)| mask.get(x, y))
             .map(|(x, y)| Point2::new(f64::from(x) + 0.5, f64::from(y) + 0.5))
             .collect();
-        // Spread over the part by a stride that falls in step with no row.
+        // Spread over the part by a stride that does not coincide with the rows.
         let few: Vec<Point2<f64>> = pixels.iter().step_by((pixels.len() / AXIS_PIXELS).max(1) | 1).copied().collect();
         let (on_axis, axis) = axis_of_symmetry(&mask, &few)?;
         let pixels_by_axis: Vec<[f64; 2]> = pixels.iter().map(|at| by_axis(at, &on_axis, &axis)).collect();
@@ -68,19 +70,20 @@ impl Revolution {
         made.is_round(&pixels.iter().map(brightness).collect::<Vec<_>>()).then_some(made)
     }
 
-    /// Along the axis, as long as the part.
+    /// Vector along the axis, as long as the part.
     pub(crate) fn axis(&self) -> Vector2<f64> {
         let (first, last) = self.ends();
         (last - first) * self.axis
     }
 
-    /// The part's first and last place along the axis.
+    /// The first and last position of the part along the axis.
     fn ends(&self) -> (f64, f64) {
         let along = self.pixels.iter().map(|[along, _]| *along);
         along.fold((f64::INFINITY, f64::NEG_INFINITY), |(first, last), at| (first.min(at), last.max(at)))
     }
 
-    /// How far above the axis the part's upper side lies beside a line: as far as the outline lies from the axis there.
+    /// Height of the part's upper side above the axis, beside a line: equal to the distance of the outline from the
+    /// axis there.
     pub fn radius_beside(&self, line: &GraspLine) -> f64 {
         let ends = [line.start, line.end].map(|end| by_axis(&end, &self.on_axis, &self.axis)[0]);
         let (first, last) = (ends[0].min(ends[1]) - 1.0, ends[0].max(ends[1]) + 1.0);
@@ -103,12 +106,12 @@ impl Revolution {
         if last - first < MIN_SLENDERNESS * 2.0 * mean_radius || greatest > MOST_OF_MEAN * mean_radius {
             return false;
         }
-        // Of each piece the mean light in each place across, over that of the piece.
+        // For each section the mean light at each position across, divided by the section's mean.
         let rows: Vec<[Option<f64>; ACROSS]> = pieces
             .iter()
             .map(|piece| {
                 let radius = radius(piece);
-                // Keeps dark parts from being all noise.
+                // Keeps dark parts from being only noise.
                 const DARK: f64 = 8.0;
                 let mean_light = piece.iter().map(|(_, light)| light).sum::<f64>() / piece.len() as f64 + DARK;
                 let mut sums = [(0.0, 0.0); ACROSS];
@@ -126,7 +129,7 @@ impl Revolution {
         let across: [f64; ACROSS] = std::array::from_fn(|k| mean(&mut rows.iter().filter_map(|row| row[k])));
         let middle = mean(&mut across.iter().copied());
         let change = mean(&mut across.iter().map(|light| (light - middle).powi(2))).sqrt();
-        // Variance about the mean of each piece, and what the place across leaves of it.
+        // Variance about the mean of each section, and the variance that the position across does not explain.
         let own = mean(&mut rows.iter().flat_map(|row| {
             let own_mean = mean(&mut row.iter().flatten().copied());
             row.iter().flatten().map(move |light| (light - own_mean).powi(2))
@@ -142,13 +145,13 @@ impl Revolution {
     }
 }
 
-/// A pixel's place along the axis and its distance from it, to the left of the axis's direction.
+/// A pixel's position along the axis and its distance from it, to the left of the axis's direction.
 fn by_axis(at: &Point2<f64>, on_axis: &Point2<f64>, axis: &Vector2<f64>) -> [f64; 2] {
     let from = at - on_axis;
     [from.dot(axis), axis.x * from.y - axis.y * from.x]
 }
 
-/// The line about the outline's main axis about which it is its own mirror image; `None` where there is none.
+/// The mirror axis of the outline near its main axis; `None` if there is none.
 fn axis_of_symmetry(mask: &Mask, pixels: &[Point2<f64>]) -> Option<(Point2<f64>, Vector2<f64>)> {
     let count = pixels.len() as f64;
     let middle = Point2::from(pixels.iter().map(|at| at.coords).sum::<Vector2<f64>>() / count.max(1.0));
@@ -186,7 +189,7 @@ mod tests {
     use super::*;
     use image::Rgb;
 
-    /// A stepped bar along an axis at 30°, lit from the side as a round or as a flat one.
+    /// A stepped bar along an axis at 30°, lit from the side as a round or as a flat body.
     fn bar(light: impl Fn(f64) -> f64) -> (RgbImage, Polygon) {
         let (middle, axis) = (Point2::new(100.0, 80.0), Vector2::new(0.75f64.sqrt(), 0.5));
         let left = Vector2::new(-axis.y, axis.x);

@@ -1,7 +1,7 @@
-//! What the edge points of a template see in a picture: the crests of the gradient near each along its normal.
+//! The observations of a template's edge points in a picture: the gradient crests near each point along its normal.
 //!
-//! Points stand in groups of [`LANES`], coordinate by coordinate, so that the fits ([`crate::consensus`]) take a group at a time. All
-//! sums are made in the same order whatever instructions the machine has.
+//! Points are stored in groups of [`LANES`], coordinate by coordinate, so that the fits ([`crate::consensus`]) process
+//! a group at once. All sums use the same order with any instructions.
 
 use pulp::{Simd, WithSimd};
 use wide::f32x4;
@@ -10,15 +10,15 @@ use crate::edge_points::parabola_peak;
 use crate::gradient_field::GradientLevel;
 use crate::lanes::{LANES, in_lanes};
 
-/// How far along its normal an edge point looks for crests, in level pixels: first and later rounds. Chosen by hand,
-/// not measured.
+/// Search distance of an edge point along its normal, in level pixels: first and later rounds. Chosen by hand, not
+/// measured.
 pub(crate) const FIRST_REACH: usize = 6;
 pub(crate) const LATER_REACH: usize = 3;
-/// Most crests kept for a point. Chosen by hand, not measured.
+/// Maximum number of crests per point. Chosen by hand, not measured.
 pub(crate) const MAX_CRESTS: usize = 3;
-/// Least alignment of a crest's direction, noise floor included. Chosen by hand, not measured.
+/// Minimum alignment of a crest's direction, noise floor included. Chosen by hand, not measured.
 const MIN_TRUST: f32 = 0.2;
-/// Samples along a normal, one beyond the reach on either side; derived.
+/// Samples along a normal, with one beyond the search distance at both ends; derived.
 const MAX_SAMPLES: usize = 2 * FIRST_REACH + 3;
 const _: () = assert!(MAX_SAMPLES <= 2 * LANES, "two groups hold the samples of a normal");
 
@@ -33,23 +33,24 @@ pub(crate) struct EdgePlace<const N: usize> {
     pub(crate) weight: f32,
 }
 
-/// A group of points, those that are left over without weight.
+/// A group of points; unused ones have no weight.
 #[derive(Clone, Copy)]
 pub(crate) struct Group<const N: usize> {
     pub(crate) rows: [[f32; LANES]; N],
     pub(crate) weights: [f32; LANES],
-    /// Of each crest, along the normal; with a trust of 0 there is none.
+    /// Distance of each crest along the normal; a trust of 0 means no crest.
     pub(crate) distances: [[f32; LANES]; MAX_CRESTS],
     pub(crate) trusts: [[f32; LANES]; MAX_CRESTS],
 }
 
-/// The points that see a crest.
+/// The points with a crest.
 pub(crate) struct Sightings<const N: usize> {
     pub(crate) groups: Vec<Group<N>>,
 }
 
 impl<const N: usize> Sightings<N> {
-    /// Looks from every place along its normal, `reach` pixels to either side; beyond the border nothing is seen.
+    /// Samples along the normal at every place, up to `reach` pixels in both directions; beyond the border there are no
+    /// crests.
     pub(crate) fn gather(level: &GradientLevel, places: &[EdgePlace<N>], reach: usize) -> Self {
         in_lanes(Gather { level, places, reach })
     }
@@ -115,12 +116,12 @@ fn seen<const N: usize>(level: &GradientLevel, place: &EdgePlace<N>, reach: usiz
     samples
 }
 
-/// Distance and trust of the crests of the gradient's part along the normal, the nearest kept; `None` where there is none.
+/// Distance and trust of the crests of the gradient's component along the normal, nearest first; `None` for no crest.
 #[inline(always)]
 fn crests(samples: &Samples, floor: f32, double: [f32; 2], reach: usize) -> Option<[(f32, f32); MAX_CRESTS]> {
     let len = 2 * reach + 3;
     let middle = (reach + 1) as f32;
-    // Of the gradient's strength: roots are taken of crests alone.
+    // Crests of the gradient's strength: roots are computed at crests only.
     let mut squares = [0.0f32; 2 * LANES];
     let mut trusts = [0.0f32; 2 * LANES];
     for (k, sample) in samples.iter().enumerate() {

@@ -1,15 +1,15 @@
-//! Edge directions compared in both directions: what the demonstration has and the image lacks, and the other way round.
+//! Edge directions compared in both directions: edges of the demonstration that the image lacks, and the reverse.
 //!
-//! [`crate::ShapeTemplate`] reads the image at the demonstration's edges alone: a plate without
-//! the holes agrees with every plate that has holes beside. Here directions are compared at a grid of points over the
-//! whole part, whether the demonstration has an edge there or not.
+//! [`crate::ShapeTemplate`] reads the image only at the demonstration's edges, so that a plate without holes agrees
+//! with every plate that also has holes. Here directions are compared at a grid of points over the whole part,
+//! whether or not the demonstration has an edge there.
 //!
 //! ```text
 //! outline ─ grid ─ direction at each point, demonstration and image ─ correlation by region ─ those that agree ─ visible
 //! ```
-//! Legend: a direction is `(cos 2φ, sin 2φ)` times a length from 0 (no edge) to 1 (a clear edge), as
-//! [`GradientField`] keeps it; the correlation of two fields is `Σ a·b / √(Σ a² Σ b²)`. Unlike the colours' it does not
-//! depend on what lies under light or shadow, only on where edges run.
+//! Legend: a direction is `(cos 2φ, sin 2φ)` times a length from 0 (no edge) to 1 (a clear edge), as [`GradientField`]
+//! keeps it; the correlation of two fields is `Σ a·b / √(Σ a² Σ b²)`. Unlike the correlation of colours it does not
+//! depend on light or shadow, only on the edges.
 
 use nalgebra::Point2;
 use sdg_geometry::{PlanarSimilarity, Polygon};
@@ -17,13 +17,13 @@ use sdg_geometry::{PlanarSimilarity, Polygon};
 use crate::config::{AgreementConfig, StructureConfig};
 use crate::gradient_field::GradientField;
 
-/// How well the edges of an image agree with the demonstration's, both ways.
+/// How well the edges of an image agree with the demonstration's, in both directions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StructureAgreement {
-    /// The share of the edges in regions that agree by [`StructureConfig::visible_from`] or more, in `[0, 1]`: what is
-    /// neither covered nor another part's.
+    /// The share of the edges in regions that agree by [`StructureConfig::visible_from`] or more, in `[0, 1]`: these
+    /// are neither covered nor of another part.
     pub visible: f64,
-    /// The share of the part that lies outside the image, in `[0, 1]`; it counts in nothing else.
+    /// The share of the part that lies outside the image, in `[0, 1]`; the other values ignore it.
     pub outside: f64,
 }
 
@@ -34,7 +34,7 @@ pub struct Structure {
     num_regions: usize,
     /// Demonstration pixels per pixel of the level that is compared.
     pixel_size: f64,
-    /// All points lie within `reach` of it, in demonstration pixels.
+    /// All points lie within this distance of it, in demonstration pixels.
     center: Point2<f64>,
     reach: f64,
     config: StructureConfig,
@@ -49,7 +49,7 @@ struct GridPoint {
 }
 
 impl Structure {
-    /// Reads the directions out of `field`, the gradients of the demonstration; `outline` in its pixels.
+    /// Reads the directions from `field`, the gradients of the demonstration; `outline` is in its pixels.
     pub fn new(
         field: &GradientField,
         outline: &Polygon,
@@ -62,7 +62,7 @@ impl Structure {
         let (level, pixel_size) = (field.level(level_idx), f64::from(1u32 << level_idx));
         let step = (outline.area() / config.num_points).sqrt().max(0.5);
         let region_side = (outline.area() / config.num_regions).sqrt().max(1.0);
-        // The outline's own edge stands up to a level pixel outside.
+        // The outline's own edge may be up to a level pixel outside.
         let margin = pixel_size;
         let [width, height] = [bounds.width(), bounds.height()].map(|side| side + 2.0 * margin);
         let (columns, rows) = ((width / step) as usize, (height / step) as usize);
@@ -103,13 +103,13 @@ impl Structure {
         }
     }
 
-    /// The points with an edge in demonstration or image, in regions that do not agree; in pixels of the image.
+    /// The points with an edge in demonstration or image, in regions that disagree; in pixels of the image.
     pub(crate) fn differing(
         &self,
         field: &GradientField,
         image_from_demonstration: &PlanarSimilarity,
     ) -> Vec<Point2<f64>> {
-        /// From this squared length a direction is an edge that a person sees. Chosen by hand, not measured.
+        /// Minimum squared length of a direction that a person sees as an edge. Chosen by hand, not measured.
         const CLEAR: f32 = 0.25;
         let mut regions = vec![Correlation::default(); self.num_regions];
         let mut edges = Vec::new();
@@ -123,8 +123,8 @@ impl Structure {
         edges.into_iter().filter(|(region, _)| differs(*region)).map(|(_, at)| at).collect()
     }
 
-    /// Calls `visit` for every point inside the image, with its place there and the directions of demonstration, turned into the
-    /// image, and of the image.
+    /// Calls `visit` for every point inside the image, with its place there, the demonstration's direction turned into
+    /// the image, and the image's direction.
     fn compare(
         &self,
         field: &GradientField,
@@ -147,8 +147,8 @@ impl Structure {
         }
     }
 
-    /// The share of the edges in regions that agree. A region counts by the edges of demonstration or image, whichever has
-    /// more: what is there in one alone counts.
+    /// The share of the edges in regions that agree. A region's weight is the larger amount of edges of demonstration
+    /// and image, so that edges in only one of them count.
     fn visible(&self, regions: &[Correlation]) -> f64 {
         let (mut all, mut visible) = (0.0, 0.0);
         for region in regions.iter().filter(|region| region.count > 0) {
@@ -165,7 +165,7 @@ fn squared([x, y]: [f32; 2]) -> f32 {
     x * x + y * y
 }
 
-/// Sums over pairs of a taught and a seen direction.
+/// Sums over pairs of a taught and an observed direction.
 #[derive(Debug, Clone, Copy, Default)]
 struct Correlation {
     count: usize,
@@ -182,7 +182,7 @@ impl Correlation {
         self.products += taught[0] * seen[0] + taught[1] * seen[1];
     }
 
-    /// Two empty areas agree: `noise` is the energy that every point is taken to share.
+    /// Two empty areas agree: `noise` is an energy that is added to every point.
     fn value(&self, noise: f64) -> f64 {
         let shared = noise * self.count as f64;
         let [taught, seen, products] = [self.taught, self.seen, self.products].map(|sum| f64::from(sum) + shared);

@@ -1,19 +1,19 @@
-//! What lies inside the outline, compared as correlations of brightness and colour.
+//! The surface inside the outline, compared by correlations of brightness and colour.
 //!
-//! A lever of nearly the same outline as the taught one agrees in its edges (0.71 to 0.75 was measured, where the part
-//! itself in bad light gave 0.64), but where the part has a bushing it has a hole. That shows in the surface: brightness and
-//! colour inside the outline, as correlations, so that the light's strength and tint do not count.
+//! A lever with nearly the same outline as the taught one agrees in its edges (0.71 to 0.75 was measured; the part
+//! itself in poor light gave 0.64), but has a hole in place of the part's bushing. The surface shows this: brightness
+//! and colour inside the outline, compared as correlations, so that the light's strength and tint do not count.
 //!
 //! ```text
 //! outline ─ grid of points ─┬─ one correlation of them all             1/3 ─┐
 //!                           └─ cells ─ a correlation about each          ├─ agreement
 //!                              cell's own mean, averaged               2/3 ─┘
 //! ```
-//! Across the whole part, bright against dark ends count; so does the edge of another thing's shadow that falls over it,
-//! and there the correlation over the whole part is low. Within a cell that shadow is in most cells no edge at all. On 480
-//! pictures of the eight shipped parts and 480 without them, edges and the whole correlation (6 : 4) left 48 of 950 right
-//! poses below the best wrong one of any part; edges, cells and the whole (7 : 2 : 1) left 30, and 4 instead of 13 below the
-//! best wrong one of their own part.
+//! The correlation over the whole part compares its bright and dark ends, but a shadow edge of another object that
+//! falls across the part makes it low. Within most cells that shadow has no edge. On 480 pictures of the eight shipped
+//! parts and 480 without them, edges and the whole correlation (6 : 4) left 48 of 950 right poses below the best wrong
+//! one of any part; edges, cells and the whole (7 : 2 : 1) left 30, and 4 instead of 13 below the best wrong one of
+//! their own part.
 
 use std::collections::BTreeMap;
 
@@ -27,19 +27,20 @@ use crate::config::SurfaceConfig;
 use crate::lanes::{LANES, in_lanes};
 use crate::pixel_cell::PixelReader;
 
-/// Points that are compared; a few hundred are enough for correlations, and cost microseconds. Chosen by that reasoning; 700
-/// before there were cells.
+/// Number of compared points; a few hundred are enough for correlations and take microseconds. Derived from that; it
+/// was 700 before cells were introduced.
 const POINTS: f64 = 900.0;
-/// A cell of fewer points is not compared. Chosen by hand, not measured.
+/// Minimum number of points of a compared cell. Chosen by hand, not measured.
 const MIN_IN_CELL: usize = 4;
-/// Points this near to the outline show the background when the pose is a pixel off. Chosen by that reasoning, not
-/// measured.
+/// Points within this distance of the outline show the background when the pose is wrong by a pixel. Derived from
+/// that, not measured.
 const EDGE_MARGIN_PX: f64 = 2.0;
-/// Grey values that a colour needs to have a hue. Chosen by hand, not measured.
+/// Minimum grey value of a colour with a hue. Chosen by hand, not measured.
 const DARK: f64 = 3.0;
-/// How pale highlights may make a colour, and how strong shadow, as a share of what was taught. Chosen by hand, not measured.
+/// Largest desaturation by highlights and largest saturation by shadow, as a share of the taught value. Chosen by hand,
+/// not measured.
 const STRENGTHS: (f64, f64) = (0.6, 1.4);
-/// Least share of the points that must lie inside the image. Chosen by hand, not measured.
+/// Minimum share of the points inside the image. Chosen by hand, not measured.
 const MIN_INSIDE: f64 = 0.5;
 
 /// The colours inside an outline, at a grid of points.
@@ -50,19 +51,19 @@ pub struct Surface {
     config: SurfaceConfig,
 }
 
-/// Points that lie beside each other.
+/// Adjacent points.
 #[derive(Debug, Clone)]
 struct Cell {
     points: Vec<Point2<f64>>,
     groups: Vec<PointGroup>,
 }
 
-/// [`LANES`] points of a cell; those that are left over count nothing.
+/// [`LANES`] points of a cell; unused ones do not count.
 #[derive(Debug, Clone, Copy)]
 struct PointGroup {
     x: [f32; LANES],
     y: [f32; LANES],
-    /// 1, or 0 for a point that is left over.
+    /// 1, or 0 for an unused point.
     counts: [f32; LANES],
     colors: [f32x4; LANES],
 }
@@ -87,7 +88,7 @@ impl Cell {
 }
 
 impl Surface {
-    /// Reads the colours of the demonstration, `cutout`; `outline` in its pixels.
+    /// Reads the colours of the demonstration, `cutout`; `outline` is in its pixels.
     pub fn new(cutout: &RgbImage, outline: &Polygon, config: &SurfaceConfig) -> Self {
         let bounds = outline.bounds();
         let step = (outline.area() / POINTS).sqrt().max(1.0);
@@ -114,8 +115,8 @@ impl Surface {
         made
     }
 
-    /// Whether the demonstration has less contrast than noise, as a black silhouette: what correlates with it then tells
-    /// nothing.
+    /// Whether the demonstration's contrast is below noise, as in a black silhouette; correlations with it then carry
+    /// no information.
     pub fn is_plain(&self) -> bool {
         self.is_plain
     }
@@ -124,7 +125,7 @@ impl Surface {
         self.cells.iter().flat_map(|cell| &cell.points)
     }
 
-    /// Of every cell and what an image shows of it at a pose.
+    /// Each cell, and the image's colours for it at a pose.
     fn correlations(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> Vec<Correlation> {
         let reader = PixelReader::new(image);
         in_lanes(Correlate { cells: &self.cells, reader, image_from_cutout: *image_from_cutout })
@@ -151,9 +152,9 @@ impl Surface {
         if taught > 0.0 { seen / taught } else { 1.0 }
     }
 
-    /// How far the hue lies from the demonstration's: the median over cells of the distance between the shares of red, green
-    /// and blue; 0 where none of it is in the image. Highlights make a colour paler and shadows make it stronger, which does not
-    /// count, nor does what covers less than half; the light's tint does.
+    /// Distance of the hue from the demonstration's: the median over cells of the distance between the shares of red,
+    /// green and blue; 0 where none of it is in the image. Desaturation by highlights and saturation by shadows do not
+    /// count, nor does anything that covers less than half; the light's tint counts.
     pub(crate) fn hue_shift(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> f64 {
         let mut shifts = Vec::with_capacity(self.cells.len());
         for sums in self.correlations(image, image_from_cutout) {
@@ -165,11 +166,11 @@ impl Surface {
         weighted_median(shifts)
     }
 
-    /// The points, in pixels of the image, of cells with contrast in the demonstration that the image does not show.
+    /// The points, in pixels of the image, of cells whose contrast in the demonstration is missing in the image.
     pub(crate) fn differing(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> Vec<Point2<f64>> {
-        /// From this contrast on a cell tells something. Chosen by hand, not measured.
+        /// Minimum contrast of an informative cell. Chosen by hand, not measured.
         const MIN_CONTRAST: f64 = 0.5;
-        /// Below this correlation it differs. Chosen by hand, not measured.
+        /// Cells of lower correlation differ. Chosen by hand, not measured.
         const MAX_CORRELATION: f64 = 0.2;
         let noise = self.config.noise_in_cell;
         let differs = |local: &Correlation| {
@@ -183,7 +184,7 @@ impl Surface {
     }
 
     /// The correlation of colours between the cut-out and the image at a pose, within cells and over the whole; 0 for
-    /// none, 1 for the same surface under any light.
+    /// no correlation, 1 for the same surface under any light.
     pub fn agreement(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> f64 {
         let SurfaceConfig { cells_share, noise, noise_in_cell, .. } = self.config;
         let mut whole = Correlation::default();
@@ -204,7 +205,7 @@ impl Surface {
     }
 }
 
-/// Sums over pairs of a taught and a seen colour.
+/// Sums over pairs of a taught and an observed colour.
 #[derive(Default)]
 struct Correlation {
     count: usize,
@@ -256,25 +257,26 @@ impl Correlation {
         ]
     }
 
-    /// What so many points of noise alone would give.
+    /// The value that this many points of noise alone would give.
     fn floor(&self, noise: f64) -> f64 {
         3.0 * self.count as f64 * noise * noise
     }
 
-    /// In `[0, 1]`: opposite is no better than none.
+    /// In `[0, 1]`: negative correlation counts as none.
     fn value(&self, noise: f64) -> f64 {
         let ([taught, seen, products], floor) = (self.about_means(), self.floor(noise));
         (products / ((taught + floor) * (seen + floor)).sqrt()).clamp(0.0, 1.0)
     }
 
-    /// How much there is to correlate with, in `[0, 1)`: nothing on a plain surface.
+    /// The amount of contrast available for correlation, in `[0, 1)`: nothing on a plain surface.
     fn contrast_taught(&self, noise: f64) -> f64 {
         let [taught, _, _] = self.about_means();
         (taught / (taught + self.floor(noise))).sqrt()
     }
 }
 
-/// Distance of the shares of red, green and blue between a colour and another, or the same made paler or stronger.
+/// Distance between the shares of red, green and blue of a colour and of another, where the other may be desaturated or
+/// saturated.
 fn hue_distance(taught: &[f64; 3], seen: &[f64; 3]) -> f64 {
     let from_grey = |color: &[f64; 3]| {
         let sum = color.iter().sum::<f64>() + 3.0 * DARK;
@@ -312,7 +314,8 @@ impl WithSimd for Correlate<'_> {
         let (sin, cos) = angle.radians().sin_cos();
         let [a, b, tx, ty] = [scale * cos, scale * sin, tx, ty].map(|value| value as f32);
         let of_cell = |cell: &Cell| {
-            // From a colour that is near all others: sums of squares of large numbers would lose the small differences.
+            // Relative to a colour near all others, because sums of squares of large numbers would lose small
+            // differences.
             let (mut base, mut count) = (None, 0.0f32);
             let [mut taught, mut seen, mut taught_squares, mut seen_squares, mut products] = [f32x4::ZERO; 5];
             for group in &cell.groups {
@@ -393,7 +396,8 @@ mod tests {
         assert_eq!(surface().differing(&plate(0.6, false), &PlanarSimilarity::IDENTITY), []);
         let hole = surface().differing(&plate(1.0, true), &PlanarSimilarity::IDENTITY);
         let bushing = Point2::new(40.0, 40.0);
-        // Cells that the bushing reaches into, the farthest corner of one 34 pixels from its middle; the plate goes on to 70.
+        // Cells that the bushing reaches into, the farthest corner of one 34 pixels from its centre; the plate extends
+        // to 70.
         assert!(hole.len() > 20 && hole.iter().all(|p| (p - bushing).norm() < 40.0), "{hole:?}");
         assert!(!surface().differing(&plate(1.0, false), &away).is_empty());
     }
@@ -402,7 +406,7 @@ mod tests {
     fn the_hue_shifts_with_another_paint_and_not_with_the_light() {
         let shift = |image: &RgbImage| surface().hue_shift(image, &PlanarSimilarity::IDENTITY);
         assert!(shift(&plate(1.0, false)) < 1e-9 && shift(&plate(0.6, false)) < 0.06);
-        // What covers a third does not count.
+        // An object that covers a third does not count.
         let hand = Rgb([20, 40, 200]);
         let covered = |x: u32, y: u32| if x < 40 { hand } else { *plate(1.0, false).get_pixel(x, y) };
         let covered = RgbImage::from_fn(120, 80, covered);

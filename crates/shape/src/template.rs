@@ -1,4 +1,4 @@
-//! A demonstration made ready to be laid over images.
+//! A demonstration prepared for comparison with images.
 
 use image::RgbImage;
 use nalgebra::Point2;
@@ -14,12 +14,12 @@ use crate::sightings::FIRST_REACH;
 
 /// Smallest extent of an outline, in demonstration pixels. Chosen by hand, not measured.
 const MIN_EXTENT_PX: f64 = 12.0;
-/// The finest level shows the part no larger than this, the coarsest no smaller, in level pixels. Chosen by
+/// Largest extent of the part at the finest level and smallest at the coarsest, in level pixels. Chosen by
 /// hand, not measured.
 const FINEST_EXTENT: f64 = 400.0;
 const COARSEST_EXTENT: f64 = 32.0;
-/// Less than this share of the template inside the image is judged as if it were this much. Chosen by
-/// hand, not measured.
+/// If less than this share of the template is inside the image, it is scored as if this share were.
+/// Chosen by hand, not measured.
 const MIN_VISIBLE: f64 = 0.6;
 
 /// The edges of one demonstrated part, ready to be compared with images.
@@ -33,10 +33,10 @@ pub struct ShapeTemplate {
     pub(crate) agreement_level_idx: usize,
 }
 
-/// What is read beside the edge points, in level pixels: along their normals, and between pixels.
+/// Margin read around the edge points, in level pixels: along their normals, and for interpolation between pixels.
 const BESIDE: f64 = (FIRST_REACH + 4) as f64;
 
-/// The edge points seen at one pyramid level of the demonstration.
+/// The edge points at one pyramid level of the demonstration.
 #[derive(Debug, Clone)]
 pub(crate) struct TemplateLevel {
     /// Demonstration pixels per level pixel, a power of two.
@@ -53,17 +53,17 @@ impl ShapeTemplate {
     /// Reads the part's edges from the demonstration.
     ///
     /// # Units and frames
-    /// `outline` is in pixels of `image`. A box is an outline too, only a poorer one: the background's
-    /// edges inside it count as the part's.
+    /// `outline` is in pixels of `image`. A box is accepted as an outline, but a less exact one: the
+    /// background's edges inside it count as the part's.
     ///
     /// # Errors
-    /// [`ShapeError`] for an outline that is no area or outside the image, for a part without edges,
+    /// [`ShapeError`] for an outline without an area or outside the image, for a part without edges,
     /// and for a configuration out of range.
     pub fn new(image: &RgbImage, outline: &Polygon, config: &ShapeConfig) -> Result<Self, ShapeError> {
         Self::with_inner_edges(image, outline, config, 1.0)
     }
 
-    /// The same of the edges along the outline alone.
+    /// The same for the edges along the outline only.
     ///
     /// # Errors
     /// As there.
@@ -107,7 +107,7 @@ impl ShapeTemplate {
                 if levels.is_empty() {
                     return Err(ShapeError::TooFewEdges { expected: MIN_POINTS, found: points.len() });
                 }
-                // Coarser levels only help to start from further away.
+                // Coarser levels only help starts with larger errors.
                 break;
             }
             let lanes = PointLanes::new(&points);
@@ -124,10 +124,11 @@ impl ShapeTemplate {
         self.levels[0].radius_px
     }
 
-    /// How well the part's edges at this pose agree with the image's, in `[0, 1]`.
+    /// The agreement of the part's edges at this pose with the image's, in `[0, 1]`.
     ///
-    /// 1: every edge of the demonstration lies on an edge of the same direction. Random directions give
-    /// 0, as do areas without edges. Points outside the image do not count, unless they are too many.
+    /// At 1, every edge of the demonstration lies on an edge of the same direction. Random directions
+    /// and areas without edges give 0. Points outside the image do not count, unless there are too
+    /// many.
     ///
     /// # Units and frames
     /// The pose maps demonstration pixels to pixels of the image the field was computed from.
@@ -143,14 +144,14 @@ impl ShapeTemplate {
     }
 }
 
-/// How a level is read: fast while searching, exact while climbing.
+/// How a level is read: fast during the search, exact during the climb.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum LevelSampling {
     Nearest,
     Bilinear,
 }
 
-/// One template level over the image level that shows edges at the same size.
+/// One template level over the image level of the same resolution.
 pub(crate) struct MatchedLevel<'a> {
     pub(crate) image_level: &'a GradientLevel,
     /// Image pixels per pixel of `image_level`.
@@ -158,8 +159,8 @@ pub(crate) struct MatchedLevel<'a> {
 }
 
 impl TemplateLevel {
-    /// The level of the picture that shows edges at the size that they have at a pose, to be read at all poses that differ by at most
-    /// `limits` (px, px, rad, ln scale).
+    /// The level of the picture with the resolution of a pose, readable at all poses that differ by at most `limits`
+    /// (px, px, rad, ln scale).
     pub(crate) fn matched_level<'a>(
         &self,
         field: &'a GradientField,
@@ -201,7 +202,7 @@ impl MatchedLevel<'_> {
     }
 }
 
-/// The outline, or why it cannot be used.
+/// The outline, or the reason why it cannot be used.
 fn checked_outline(image: &RgbImage, outline: &Polygon) -> Result<Polygon, ShapeError> {
     if outline.vertices.len() < 3 {
         return Err(ShapeError::OutlineDegenerate { found: format!("{} vertices", outline.vertices.len()) });

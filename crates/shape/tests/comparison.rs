@@ -1,4 +1,4 @@
-//! Edges and surface together: poses that the edges refined poorly are refined again.
+//! Edges and surface together: poses that were refined poorly by edges are refined again.
 
 use crate::scenes;
 use image::{Rgb, RgbImage};
@@ -8,10 +8,10 @@ use rand_pcg::Pcg64Mcg;
 use sdg_geometry::{Angle, BoundingBox, PlanarSimilarity, Polygon};
 use sdg_shape::{CloseLook, GradientField, Picture, SearchConfig, ShapeSearch, TableColors};
 
-/// Farther than this beside the part, in pixels, nothing is grasped.
+/// Largest error of a grasp beside the part, in pixels.
 const BESIDE_PX: f64 = 3.0;
 
-/// What came of a start some pixels and degrees off.
+/// The results from a start with errors of some pixels and degrees.
 struct Outcome {
     refined_px: f64,
     final_px: f64,
@@ -61,7 +61,7 @@ fn refined_outcome(part_idx: usize, seed: u64) -> Outcome {
 
 #[test]
 fn refine_pose_lowers_no_agreement_and_fewer_poses_lie_beside() {
-    // Long shadows: edges of the part's own direction right beside it.
+    // Long shadows: edges of the part's own direction directly beside it.
     let all: Vec<Outcome> = (0..24).map(|seed| refined_outcome(seed as usize % 6, seed)).collect();
     for one in &all {
         assert!(one.last >= one.refined.max(one.start) - 0.0051, "{} {} {}", one.start, one.refined, one.last);
@@ -108,7 +108,7 @@ fn plate(shift: f64, bar: f64, hole: f64, length: f64) -> RgbImage {
         let on_plate = (60.0..60.0 + length).contains(&x) && (80.0..150.0).contains(&y);
         let on_bar = (bar..bar + 14.0).contains(&x) && (90.0..125.0).contains(&y);
         let in_hole = (x - hole).hypot(y - 135.0) < 9.0;
-        // A grain, so that nothing is without noise.
+        // Texture, so that no area is free of noise.
         let grain = ((x * 12.989 + y * 78.233).sin() * 43_758.545).fract().abs() * 6.0;
         let color = if !on_plate || in_hole {
             [40.0, 60.0, 130.0]
@@ -142,7 +142,7 @@ fn table_where_the_part_should_be_is_bare_and_has_no_rim() {
     // A plate of half the length: the other half of the outline lies on the table.
     let look = plate_look(&plate(0.0, 75.0, 110.0, 75.0), &PlanarSimilarity::IDENTITY);
     assert!((0.3..0.6).contains(&look.bare) && look.no_rim > 0.3, "{look:?}");
-    // A thing that covers a part of it is no table.
+    // An object that covers a part of it is not table.
     let mut covered = plate(0.0, 75.0, 180.0, 140.0);
     for (x, y) in (150..205).flat_map(|x| (100..156).map(move |y| (x, y))) {
         covered.put_pixel(x, y, Rgb([224, 172, 140]));

@@ -1,4 +1,4 @@
-//! Templates laid over images: numbers a reader can check by hand, and rendered scenes with known poses.
+//! Templates laid over images: numbers that can be checked by hand, and rendered scenes with known poses.
 
 use crate::scenes;
 use image::{Rgb, RgbImage};
@@ -150,8 +150,8 @@ fn a_part_partly_out_of_the_image_is_found() {
     );
 }
 
-/// Errors allowed with another table, light, exposure, blur and noise under a high lamp; the sharp edge of
-/// even a short shadow moves the visible outline by a third of a pixel.
+/// Tolerances for another table, light, exposure, blur and noise under a high lamp; the sharp edge of even
+/// a short shadow moves the visible outline by a third of a pixel.
 const SCENE_TOLERANCE_PX: f64 = 2.0;
 const SCENE_TOLERANCE_DEG: f64 = 1.5;
 
@@ -163,7 +163,7 @@ proptest! {
     fn refinement_recovers_the_pose_on_another_table(seed in 0u64..1_000_000) {
         let parts = scenes::parts();
         let mut rng = Pcg64Mcg::seed_from_u64(seed);
-        // Not the bearing: its angle cannot be known; not the thin fuel line.
+        // Not the bearing, whose angle is undetermined, and not the thin fuel line.
         let part = &parts[[0, 2, 4, 5][rng.random_range(0..4)]];
         let (image, outline, demonstration_from_part) = scenes::demonstration(part, 1, 0.05);
         let template = ShapeTemplate::new(&image, &outline, &ShapeConfig::default()).expect("a part with edges");

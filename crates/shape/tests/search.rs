@@ -1,4 +1,4 @@
-//! Parts looked for in whole images: rendered scenes with known poses, several parts, none, and odd images.
+//! Searches of whole images: rendered scenes with known poses, several parts, no part, and unusual images.
 
 use crate::scenes;
 use image::{Rgb, RgbImage};
@@ -9,7 +9,7 @@ use rand_pcg::Pcg64Mcg;
 use sdg_geometry::{BoundingBox, PlanarSimilarity, Polygon};
 use sdg_shape::{SearchConfig, ShapeError, ShapeSearch};
 
-/// Errors allowed on another table under another light, as for refinement from a near start.
+/// Tolerances on another table under another light, as for refinement from a near start.
 const TOLERANCE_PX: f64 = 2.0;
 const TOLERANCE_DEG: f64 = 1.5;
 
@@ -53,7 +53,7 @@ proptest! {
     #[test]
     fn a_part_is_found_anywhere_turned_and_scaled(seed in 0u64..1_000_000) {
         let mut rng = Pcg64Mcg::seed_from_u64(seed);
-        // Not the bearing: its angle cannot be known; not the thin fuel line.
+        // Not the bearing, whose angle is undetermined, and not the thin fuel line.
         let taught = taught([0, 2, 4, 5][rng.random_range(0..4)], &SearchConfig::default());
         let image_from_part = scenes::pose(
             rng.random_range(150.0..490.0),

@@ -1,4 +1,4 @@
-//! Detects and describes the PNG pictures of a folder and writes what was found beside them, for comparison with
+//! Detects and describes the PNG pictures of a folder and writes the features beside them, for comparison with
 //! other implementations (`compare/side_by_side.py` reads it).
 //!
 //! `cargo run --release -p sdg-sift --example describe -- FOLDER [--repeats N] [--clipped]`

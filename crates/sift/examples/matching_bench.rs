@@ -1,4 +1,5 @@
-//! Brute force beside a kd-tree on SIFT descriptors: time, and how often the tree finds the same nearest one.
+//! Compares brute force with a kd-tree on SIFT descriptors: the time, and how often the tree finds the same nearest
+//! one.
 //!
 //! `cargo run --release -p sdg-sift --example matching_bench -- QUERY.png TRAIN.png`
 

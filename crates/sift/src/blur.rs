@@ -1,8 +1,8 @@
-//! Gaussian blur, resizing by two: what a scale space is made of.
+//! Gaussian blur and resizing by two, the operations of a scale space.
 //!
-//! Rows are worked on in bands, so that the cores share the work and a band's rows stay in the cache. A row is blurred
-//! down its columns into a padded buffer and from there along itself; both are the same symmetric fold.
-//! Products and sums are never fused, so every machine gives the same bits.
+//! Rows are processed in bands, so that the cores share the work and a band's rows stay in the cache. A row is blurred
+//! down its columns into a padded buffer, and from there along itself, by the same symmetric fold. Products and sums
+//! are never fused, so that every machine gives the same bits.
 
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
@@ -150,7 +150,7 @@ fn fold_blocks<'a, const N: usize>(
     x
 }
 
-/// `i` mirrored into `0..n` about the outermost pixels' centres, as often as it takes.
+/// `i` mirrored into `0..n` about the outermost pixels' centres, repeatedly if necessary.
 fn mirrored(i: isize, n: usize) -> usize {
     if n == 1 {
         return 0;
@@ -212,7 +212,7 @@ mod tests {
         let source = wavy(80, 60);
         let (twice, once) = (blurred(&blurred(&source, 1.5), 2.0), blurred(&source, 2.5));
         let worst = twice.data().iter().zip(once.data()).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
-        // The kernels are cut off at four sigma and sampled: parts in ten thousand remain.
+        // The kernels are cut off at four sigma and sampled: an error of a few parts in ten thousand remains.
         assert!(worst < 1e-3, "{worst}");
     }
 
@@ -221,7 +221,7 @@ mod tests {
         let ramp = Plane::from_fn(8, 4, |x, _| x as f32 + 0.5);
         let mut doubled = Plane::recycled(16, 8, Vec::new());
         double(&ramp, &mut doubled);
-        // Away from the border, the value at a pixel is its centre's place in the image.
+        // Away from the border, the value at a pixel is its centre's position in the image.
         for j in 1..15 {
             assert!((doubled.at(j, 3) - (j as f32 + 0.5) / 2.0).abs() < ROUNDING);
         }

@@ -2,20 +2,20 @@
 
 use crate::SiftError;
 
-/// Settings of [`Sift`](crate::Sift). The defaults are Lowe's, where he names them.
+/// Settings of [`Sift`](crate::Sift). The defaults are Lowe's, if he gives one.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct SiftConfig {
     /// Whether the scale space begins at twice the image's size, which finds the smallest blobs: about four times
     /// the keypoints for four times the work.
     pub double_first_octave: bool,
-    /// Scales per octave at which extrema are looked for.
+    /// Scales per octave at which extrema are searched.
     pub intervals: usize,
     /// Blur of the first level of each octave, σ in pixels of that octave.
     pub base_sigma: f64,
-    /// Blur that the camera is assumed to have made already, σ in pixels of the image.
+    /// Blur assumed to be present in the camera's image, σ in pixels of the image.
     pub input_sigma: f64,
-    /// Least contrast |D| of an extremum times `intervals`, as a fraction of the range from black to white.
+    /// Minimum contrast |D| of an extremum times `intervals`, as a fraction of the range from black to white.
     pub contrast_threshold: f64,
     /// Largest ratio of the principal curvatures; above it, an extremum is an edge.
     pub edge_ratio: f64,

@@ -1,4 +1,4 @@
-//! The descriptor of a keypoint: gradient directions on a 4 × 4 grid that turns and grows with it.
+//! The descriptor of a keypoint: gradient directions on a 4 × 4 grid that rotates and scales with it.
 //!
 //! ```text
 //! pixel ─► gradient, turned by the keypoint's direction ─► shared among 2 rows × 2 columns × 2 directions of the
@@ -22,14 +22,14 @@ const NUM_DIRECTIONS: usize = 8;
 pub const DESCRIPTOR_LENGTH: usize = GRID * GRID * NUM_DIRECTIONS;
 /// Side of a cell, in units of the keypoint's σ.
 const CELL_SIZE: f64 = 3.0;
-/// No number is larger than this before the last normalisation, so that one strong edge does not decide.
+/// Upper bound of a number before the last normalisation, so that one strong edge does not dominate.
 const CLIP: f32 = 0.2;
-/// A sample further than this from the centre, in cells, reaches no cell of the grid; a hair inside, for rounding.
+/// A sample further than this from the centre, in cells, reaches no cell of the grid; slightly inside, for rounding.
 const REACH: f64 = 0.5 * (GRID as f64 + 1.0) - 1e-4;
-/// Cells along a side of the grid with the rim that takes what falls outside.
+/// Cells along a side of the grid including the rim that collects samples outside.
 const RIMMED: usize = GRID + 2;
 
-/// What describing needs besides the octave; reused from keypoint to keypoint.
+/// Buffers for describing keypoints besides the octave; reused from keypoint to keypoint.
 #[derive(Default)]
 pub(crate) struct Scratch {
     pub gradients: GradientRow,
@@ -48,7 +48,7 @@ struct Samples {
     weight: Vec<f32>,
 }
 
-/// Describes one keypoint of direction `angle`, in radians. `None` where nothing but flatness is in reach.
+/// Describes one keypoint of direction `angle`, in radians. `None` if the area is flat.
 ///
 /// # Source
 /// Lowe 2004, section 6. The grid's centre is the keypoint itself, not the pixel nearest to it.
@@ -119,7 +119,7 @@ fn span(slope: f64, start: f64, reach: f64) -> (f64, f64) {
     (a.min(b), a.max(b))
 }
 
-/// A row of the image as it crosses the grid, in cells from the grid's centre.
+/// A row of the image where it crosses the grid, in cells from the grid's centre.
 struct RowInGrid {
     column_start: f64,
     column_step: f64,
@@ -162,7 +162,7 @@ impl Samples {
 /// A cell of the grid.
 type Cell = [f32; NUM_DIRECTIONS];
 
-/// The grid with its rim, row by row; padded to a power of two, which spares the bounds checks.
+/// The grid with its rim, row by row; padded to a power of two, which makes bounds checks unnecessary.
 struct Histogram([Cell; 64]);
 
 impl Histogram {
@@ -176,7 +176,7 @@ impl Histogram {
         let (rows, columns) = (&samples.row[..n], &samples.column[..n]);
         let (directions, weights) = (&samples.direction[..n], &samples.weight[..n]);
         for i in 0..n {
-            // A tent of half-width one around the sample's direction, closed to a ring.
+            // A triangular weight of half-width one around the sample's direction, cyclic.
             let mut tent = [0.0f32; NUM_DIRECTIONS];
             for (k, tent) in tent.iter_mut().enumerate() {
                 let apart = (k as f32 - directions[i]).abs();
@@ -240,7 +240,7 @@ mod tests {
     #[test]
     fn a_sample_is_shared_among_eight() {
         let mut histogram = Histogram::new();
-        // A quarter past row 2, half past column 3, three quarters past direction 7: the ring closes at 0.
+        // A quarter past row 2, half past column 3, three quarters past direction 7: direction 8 is 0.
         histogram.add(&one_sample(2.25, 3.5, 7.75, 16.0), 1);
         let at = |row: usize, column: usize| histogram.0[row * RIMMED + column];
         assert_eq!((at(2, 3)[7], at(2, 3)[0]), (1.5, 4.5));
@@ -264,7 +264,7 @@ mod tests {
             let descriptor = normalized(&histogram, normalization).unwrap();
             let length: f32 = descriptor.iter().map(|v| v * v).sum();
             assert!((length - 1.0).abs() < 1e-5);
-            // 100 of a length of some 101 is clipped to 0.2: the rest is no longer dwarfed fifty times.
+            // 100 in a vector of length about 101 is clipped to 0.2: it no longer exceeds the rest fifty times.
             let ratio = descriptor[5] / descriptor[2];
             assert!(ratio < 15.0, "{ratio}");
         }

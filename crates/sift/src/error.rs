@@ -1,4 +1,4 @@
-//! What can be wrong with the input of SIFT.
+//! Errors of the input of SIFT.
 
 /// Why features could not be computed or a rotation not be estimated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -9,7 +9,7 @@ pub enum SiftError {
     #[error("expected {name} {expected}, found {found}")]
     BadSetting {
         name: &'static str,
-        /// The range it must lie in.
+        /// The range in which it must lie.
         expected: &'static str,
         found: f64,
     },

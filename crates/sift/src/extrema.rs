@@ -14,7 +14,7 @@ use crate::scale_space::{BORDER, Octave};
 
 /// Rows that one core takes at a time.
 const BAND: usize = 32;
-/// Steps to a neighbouring sample before the fit is given up.
+/// Steps to a neighbouring sample before the fit is abandoned.
 const MAX_STEPS: usize = 5;
 /// Samples weaker than this part of the contrast threshold are not fitted: the fit seldom doubles the contrast.
 const CANDIDATE_CONTRAST: f64 = 0.5;
@@ -49,7 +49,7 @@ pub(crate) fn find(octave: &Octave, config: &SiftConfig) -> Vec<Extremum> {
             candidates.into_iter().filter_map(|at| refine_extremum(octave, at, config.intervals)).collect()
         })
         .collect();
-    // Neighbouring candidates can settle on the same sample.
+    // Neighbouring candidates can converge to the same sample.
     let mut samples: Vec<Sample> = found.into_iter().flatten().collect();
     samples.sort_unstable_by_key(|at| (at.y, at.x, at.level));
     samples.dedup();
@@ -64,7 +64,7 @@ struct Sample {
     level: usize,
 }
 
-/// Looks for samples that are at least as large, or as small, as their 26 neighbours.
+/// Searches for samples that are at least as large, or as small, as their 26 neighbours.
 struct ScanBand<'a> {
     octave: &'a Octave,
     rows: std::ops::Range<usize>,
@@ -78,7 +78,7 @@ impl WithSimd for ScanBand<'_> {
     fn with_simd<S: Simd>(self, _: S) -> Vec<Sample> {
         let width = self.octave.width();
         let num_differences = self.octave.levels.len() - 1;
-        // Row y of the differences stands at y % 3.
+        // Row y of the differences is stored at y % 3.
         let mut differences: [Vec<Vec<f32>>; 3] = std::array::from_fn(|_| vec![vec![0.0; width]; num_differences]);
         let mut largest = vec![vec![0.0f32; width]; num_differences];
         let mut smallest = vec![vec![0.0f32; width]; num_differences];
@@ -135,7 +135,7 @@ impl WithSimd for ScanBand<'_> {
     }
 }
 
-/// Each element with its two neighbours; the outermost elements have no say in what follows and stay as they are.
+/// Each element with its two neighbours; the outermost elements are not used later and stay unchanged.
 #[inline(always)]
 fn spread(from: &[f32], to: &mut [f32], pick: impl Fn(f32, f32) -> f32) {
     let inner = from.len() - 2;
@@ -145,7 +145,7 @@ fn spread(from: &[f32], to: &mut [f32], pick: impl Fn(f32, f32) -> f32) {
     }
 }
 
-/// As `f32::max` for numbers, in one instruction: NaN does not occur.
+/// As `f32::max` for numbers, in one instruction, because NaN does not occur.
 #[inline(always)]
 fn larger(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
@@ -156,7 +156,7 @@ fn smaller(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
-/// Steps to the neighbouring sample as long as the fitted extremum lies nearer to it. `None` when it runs away.
+/// Steps to the neighbouring sample as long as the fitted extremum lies nearer to it. `None` if it diverges.
 fn refine_extremum(octave: &Octave, mut at: Sample, intervals: usize) -> Option<Sample> {
     for _ in 0..MAX_STEPS {
         let offset = Derivatives::at(octave, at).offset()?;
@@ -164,7 +164,7 @@ fn refine_extremum(octave: &Octave, mut at: Sample, intervals: usize) -> Option<
             return Some(at);
         }
         let step = |index: usize, offset: f64, low: usize, high: usize| {
-            // An offset of many pixels means a saddle or a plain, and no extremum.
+            // An offset of many pixels means a saddle or a flat area, and no extremum.
             let moved = index as f64 + offset.round();
             (moved >= low as f64 && moved < high as f64).then_some(moved as usize)
         };

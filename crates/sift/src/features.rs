@@ -8,9 +8,9 @@ use crate::DESCRIPTOR_LENGTH;
 /// A blob of the image, with its size and a direction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SiftKeypoint {
-    /// Place in pixels; the centre of the first pixel is at (0.5, 0.5).
+    /// Position in pixels; the centre of the first pixel is at (0.5, 0.5).
     pub position: Point2<f64>,
-    /// Scale: σ of the Gaussian at which the blob answers most strongly, in pixels of the image.
+    /// Scale: σ of the Gaussian with the strongest response to the blob, in pixels of the image.
     pub sigma: f64,
     /// Direction of the strongest gradients around it; positive is clockwise as seen, because y points down.
     pub angle: Angle,
@@ -24,7 +24,7 @@ pub type Descriptor = [f32; DESCRIPTOR_LENGTH];
 /// The features of an image: keypoint `i` has descriptor `i`.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Features {
-    /// The place, size and orientation of each.
+    /// The position, size and orientation of each.
     pub keypoints: Vec<SiftKeypoint>,
     /// Descriptor of each keypoint.
     pub descriptors: Vec<Descriptor>,

@@ -1,6 +1,6 @@
-//! Gradients of a level of the scale space, many at a time.
+//! Gradients of a level of the scale space, computed for many pixels at a time.
 
-/// Gradients of consecutive pixels of a row; the vectors grow to the longest row asked for.
+/// Gradients of consecutive pixels of a row; the vectors grow to the longest requested row.
 #[derive(Default)]
 pub(crate) struct GradientRow {
     /// Length of the gradient.
@@ -34,13 +34,13 @@ impl GradientRow {
 /// computed at a time.
 ///
 /// # Source
-/// An odd polynomial of degree 11 for the arctangent on [0, 1], its coefficients a least-maximum-error fit.
+/// An odd polynomial of degree 11 for the arctangent on [0, 1], with coefficients of a minimax fit.
 #[inline(always)]
 pub(crate) fn direction_of(dx: f32, dy: f32) -> f32 {
     use std::f32::consts::{FRAC_PI_2, PI, TAU};
     let (width, height) = (dx.abs(), dy.abs());
     let (short, long) = if width < height { (width, height) } else { (height, width) };
-    // The smallest normal number keeps 0 / 0 away and vanishes in any other sum.
+    // The smallest normal number avoids 0 / 0 and has no effect in any other sum.
     let t = short / (long + f32::MIN_POSITIVE);
     let s = t * t;
     let tail = 0.193_543_46 + s * (-0.116_432_87 + s * (0.052_653_32 + s * -0.011_721_2));

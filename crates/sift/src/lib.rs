@@ -1,5 +1,5 @@
 //! SIFT: keypoints invariant to rotation, scale and light, their descriptors, matching, and the turn of a part
-//! against its demonstration.
+//! relative to its demonstration.
 //!
 //! ```text
 //! image ─► scale space ─► extrema of differences ─► directions ─► descriptors = Features
@@ -15,9 +15,9 @@
 //!
 //! **Speed and determinism.** Rows and keypoints are shared among rayon's threads, and plain loops run in the widest
 //! registers that the processor has. Products and sums are never fused and never reordered, so results do not depend
-//! on threads or processor. Figures beside OpenCV's stand in the crate's README.
+//! on threads or processor. The crate's README compares it with OpenCV.
 //!
-//! What this crate leaves out: colour, affine shape, databases of many images; it knows no grasp and no camera.
+//! This crate has no colour, affine shape or databases of many images, and knows no grasp and no camera.
 //!
 //! # Source
 //! D. Lowe, *Distinctive image features from scale-invariant keypoints*, IJCV 2004.

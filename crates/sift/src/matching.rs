@@ -1,7 +1,7 @@
-//! Pairs of features that look alike, by comparing each with each.
+//! Pairs of similar features, found by comparing each with each.
 //!
-//! A kd-tree does not help in 128 dimensions: a query visits nearly every leaf. Measured against it in the crate's
-//! README; `examples/matching_bench.rs` makes the figures.
+//! A kd-tree does not help in 128 dimensions: a query visits nearly every leaf. The crate's README compares both;
+//! `examples/matching_bench.rs` makes the figures.
 
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
@@ -14,7 +14,7 @@ use crate::{DESCRIPTOR_LENGTH, Features};
 const TILE: usize = 4;
 const LANES: usize = 16;
 
-/// A feature of one image and the feature of another that looks most like it.
+/// A feature of one image and the most similar feature of another.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FeatureMatch {
     /// Index in the first set of features.
@@ -23,17 +23,17 @@ pub struct FeatureMatch {
     pub train_idx: usize,
     /// Euclidean distance of the two descriptors, from 0 to √2.
     pub distance: f32,
-    /// `distance` over the distance to the second nearest descriptor; 0 where the two agree exactly.
+    /// `distance` over the distance to the second nearest descriptor; 0 if the two agree exactly.
     pub ratio: f32,
 }
 
-/// For each feature of `query` the nearest of `train`, where that is nearer than `ratio` times the second nearest.
+/// For each feature of `query` the nearest of `train`, if it is nearer than `ratio` times the second nearest.
 ///
-/// In the order of `query`. Several queries may share a feature of `train`. Where `train` has fewer than two features
+/// In the order of `query`. Several queries may share a feature of `train`. If `train` has fewer than two features,
 /// nothing can be compared and nothing is matched.
 ///
 /// # Source
-/// Lowe 2004, section 7.1, who takes a ratio of 0.8.
+/// Lowe 2004, section 7.1, with a ratio of 0.8.
 pub fn match_features(query: &Features, train: &Features, ratio: f32) -> Vec<FeatureMatch> {
     if train.len() < 2 {
         return Vec::new();
@@ -55,7 +55,7 @@ pub fn match_features(query: &Features, train: &Features, ratio: f32) -> Vec<Fea
                         query_idx: tile * TILE + i,
                         train_idx: first,
                         distance: near,
-                        // Two descriptors like the query's own tell nothing: that ratio is one.
+                        // Two descriptors equal to the query's own are ambiguous: that ratio is one.
                         ratio: if far > 0.0 { near / far } else { 1.0 },
                     }
                 })
@@ -124,7 +124,7 @@ impl WithSimd for NearestTwo<'_> {
 /// The dot products of each query with each descriptor of a panel.
 #[inline(always)]
 fn products(queries: [&Descriptor; TILE], panel: &Panel) -> [[f32; LANES]; TILE] {
-    // Four names for four arrays: as one array of arrays they would live in memory.
+    // Four variables for four arrays: as one array of arrays they would be kept in memory.
     let [mut a, mut b, mut c, mut d] = [[0.0f32; LANES]; TILE];
     for (k, row) in panel.iter().enumerate() {
         let [qa, qb, qc, qd] = queries.map(|query| query[k]);

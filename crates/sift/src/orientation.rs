@@ -10,12 +10,12 @@ use crate::scale_space::Octave;
 const NUM_BINS: usize = 36;
 /// σ of the window, in units of the keypoint's own σ.
 const WINDOW_SIGMA: f64 = 1.5;
-/// Where the window ends, in units of its σ.
+/// Radius of the window, in units of its σ.
 const WINDOW_RADIUS: f64 = 3.0;
-/// A peak of this part of the highest gives a direction of its own.
+/// A peak of at least this share of the highest gives a direction of its own.
 const PEAK_RATIO: f32 = 0.8;
 
-/// A keypoint in its octave: place and σ in pixels of the octave, and the level nearest to its scale.
+/// A keypoint in its octave: position and σ in pixels of the octave, and the level nearest to its scale.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Place {
     pub x: f64,
@@ -24,10 +24,10 @@ pub(crate) struct Place {
     pub level: usize,
 }
 
-/// Finds the directions, in radians, of one keypoint; strongest bins are not sorted.
+/// Finds the directions, in radians, of one keypoint; they are not sorted by strength.
 ///
 /// # Source
-/// Lowe 2004, section 5. Samples share themselves between the two nearest bins, which the paper leaves open.
+/// Lowe 2004, section 5. Each sample is distributed over the two nearest bins; the paper does not specify this.
 pub(crate) struct FindOrientations<'a> {
     pub octave: &'a Octave,
     pub place: Place,
@@ -78,7 +78,7 @@ impl WithSimd for FindOrientations<'_> {
     }
 }
 
-/// The histogram under a binomial of five bins.
+/// The histogram smoothed by a binomial of five bins.
 fn smoothed(histogram: &[f32; NUM_BINS]) -> [f32; NUM_BINS] {
     let at = |i: usize, shift: usize| histogram[(i + shift) % NUM_BINS];
     std::array::from_fn(|i| {
@@ -86,7 +86,7 @@ fn smoothed(histogram: &[f32; NUM_BINS]) -> [f32; NUM_BINS] {
     })
 }
 
-/// The directions of the peaks, each at the top of a parabola through three bins.
+/// The directions of the peaks, each at the vertex of a parabola through three bins.
 fn peaks(histogram: &[f32; NUM_BINS]) -> Vec<f64> {
     let highest = histogram.iter().copied().fold(0.0, f32::max);
     let mut found = Vec::new();
@@ -108,7 +108,7 @@ mod tests {
     #[test]
     fn a_peak_lies_between_its_bins() {
         let mut histogram = [0.0; NUM_BINS];
-        // A parabola with its top at bin 0.25, and a lower peak at bin 18 that passes, at 20 that does not.
+        // A parabola with its vertex at bin 0.25, and a lower peak at bin 18 that passes, at 20 that does not.
         (histogram[35], histogram[0], histogram[1]) = (0.4375, 0.9375, 0.4375 + 0.5 * 0.9375 - 0.03125);
         histogram[18] = 0.8;
         histogram[20] = 0.7;

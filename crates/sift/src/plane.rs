@@ -48,7 +48,7 @@ impl Plane {
         Self { width: image.width() as usize, height: image.height() as usize, data }
     }
 
-    /// The luma of a colour image, rounded to 8 bits as most libraries give it.
+    /// The luma of a colour image, rounded to 8 bits, as in most libraries.
     ///
     /// # Source
     /// ITU-R BT.601: 0.299 R + 0.587 G + 0.114 B.
@@ -90,7 +90,7 @@ impl Plane {
         self.data[y * self.width + x]
     }
 
-    /// Black, in memory that earlier planes have used: fresh pages cost as much as a blur.
+    /// Black, in memory of earlier planes, because new pages take as much time as a blur.
     pub(crate) fn recycled(width: usize, height: usize, mut data: Vec<f32>) -> Self {
         data.resize(width * height, 0.0);
         Self { width, height, data }

@@ -1,8 +1,8 @@
 //! The similarity with the most inliers among matches.
 //!
-//! Every match already says how the part turned and grew, so a pair of matches is tried only where both say the same
-//! as the line between them; and each match must agree in place, turn and scale to count. Whether as many agree as
-//! chance would bring is asked of the number of false alarms, not of a fixed count.
+//! Every match already gives the part's turn and scale, so that a pair of matches is tried only if both agree with
+//! the line between them, and a match counts only if it agrees in place, turn and scale. The number of false alarms
+//! decides whether the agreement exceeds chance, not a fixed count.
 
 use nalgebra::Point2;
 use rand_pcg::Pcg64Mcg;
@@ -17,17 +17,17 @@ use crate::{SiftError, SiftKeypoint};
 pub struct RansacConfig {
     /// Seed of the draws.
     pub seed: u64,
-    /// Pairs of matches drawn at most; fewer matches than need that many are tried pair by pair.
+    /// Maximum number of drawn pairs of matches; with fewer possible pairs all are tried.
     pub max_draws: usize,
-    /// Distance within which a keypoint meets its match, in pixels; a keypoint's own σ where that is larger.
+    /// Tolerance between a keypoint and its match, in pixels; a keypoint's own σ if that is larger.
     pub tolerance_px: f64,
-    /// Difference between a match's own turn and the similarity's, at most, in radians.
+    /// Tolerance between a match's own turn and the similarity's, in radians.
     pub max_turn_difference: f64,
-    /// Factor between a match's own scale and the similarity's, at most.
+    /// Largest factor between a match's own scale and the similarity's.
     pub max_scale_factor: f64,
-    /// Smallest and largest scale of the part against its template.
+    /// Smallest and largest scale of the part relative to its template.
     pub scale_range: (f64, f64),
-    /// Agreements as good as the one found that chance may bring, at most.
+    /// Largest expected number of equally good agreements by chance.
     pub max_false_alarms: f64,
 }
 
@@ -77,22 +77,22 @@ impl RansacConfig {
 /// A similarity and the matches that agree with it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SimilarityFit {
-    /// Where the template lies in the image, by least squares over the inliers.
+    /// The pose of the template in the image, by least squares over the inliers.
     pub image_from_template: PlanarSimilarity,
     /// Indices of the matches that agree.
     pub inliers: Vec<usize>,
     /// The root mean square of the inliers' distances, in pixels.
     pub residual_px: f64,
-    /// Decimal logarithm of how many agreements as good chance would bring.
+    /// Decimal logarithm of the expected number of equally good agreements by chance.
     pub log10_false_alarms: f64,
 }
 
-/// Keypoints that look alike: in the template, in the image.
+/// Similar keypoints: in the template, in the image.
 pub type KeypointPair = (SiftKeypoint, SiftKeypoint);
 
-/// Finds the similarity, or `None` where no more matches agree than chance would bring.
+/// Finds the similarity, or `None` if no more matches agree than by chance.
 ///
-/// `search_area` is the area in which the image's keypoints lie, in square pixels.
+/// `search_area` is the area that contains the image's keypoints, in square pixels.
 ///
 /// # Source
 /// Fischler and Bolles 1981 for the draws, Chum, Matas and Kittler 2003 for refining each best one, Moisan and Stival
@@ -104,7 +104,8 @@ pub fn fit_similarity(pairs: &[KeypointPair], search_area: f64, config: &RansacC
         let Some(drawn) = search.hypothesis(i, j) else { return };
         let mut candidate = search.evaluate(drawn);
         if best.as_ref().is_none_or(|best| candidate.cost < best.cost) {
-            // Two matches fix a similarity badly when they are close; all that agree with it fix it well.
+            // Two matches that are close together determine a similarity poorly; all that agree with it determine it
+            // well.
             for _ in 0..4 {
                 let Some(refined) = search.least_squares(&candidate.inliers) else { break };
                 let refined = search.evaluate(refined);
@@ -142,7 +143,7 @@ pub fn fit_similarity(pairs: &[KeypointPair], search_area: f64, config: &RansacC
     Some(SimilarityFit { image_from_template, inliers: best.inliers, residual_px, log10_false_alarms })
 }
 
-/// A similarity with those that agree and the sum of their squared distances, in tolerances and cut off at one.
+/// A similarity with the matches that agree and the sum of their squared distances, in tolerances and clipped at one.
 struct Hypothesis {
     inliers: Vec<usize>,
     cost: f64,
@@ -154,7 +155,7 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// The similarity that two matches fix, where it is a plausible one.
+    /// The similarity determined by two matches, if it is plausible.
     fn hypothesis(&self, i: usize, j: usize) -> Option<PlanarSimilarity> {
         let (from, to) = ([self.pairs[i].0, self.pairs[j].0], [self.pairs[i].1, self.pairs[j].1]);
         let drawn = PlanarSimilarity::fit(&from.map(|k| k.position), &to.map(|k| k.position))?;
@@ -186,7 +187,7 @@ impl Search<'_> {
         (least..=most).contains(&fitted.scale).then_some(fitted)
     }
 
-    /// Whether a match's own turn and scale are those of the pose.
+    /// Whether a match's own turn and scale agree with the pose.
     fn poses_agree(&self, pose: &PlanarSimilarity, k: usize) -> bool {
         let (from, to) = &self.pairs[k];
         let factor = to.sigma / (from.sigma * pose.scale);
@@ -203,7 +204,7 @@ impl Search<'_> {
         self.config.tolerance_px.max(self.pairs[k].1.sigma)
     }
 
-    /// Number of subsets of this size times the chance that all of one agree.
+    /// Number of subsets of this size times the probability that all of one agree.
     fn log10_false_alarms(&self, inliers: &[usize], search_area: f64) -> f64 {
         // Matches of one keypoint with several directions, or of one blob at two scales, count once.
         let mut distinct: Vec<usize> = Vec::new();
@@ -228,7 +229,7 @@ impl Search<'_> {
             (area / search_area.max(area) * turn * scale).log10()
         };
         let log10_choose = |n: usize, k: usize| (0..k).map(|i| ((n - i) as f64 / (i + 1) as f64).log10()).sum::<f64>();
-        // Two of the matches fixed the pose, so their agreement in place is no surprise.
+        // Two of the matches determined the pose, so that their agreement in place carries no information.
         let surprising: f64 = distinct[2..].iter().map(|&i| chance(i)).sum();
         (n as f64 - 2.0).log10() + log10_choose(n, k) + log10_choose(k, 2) + surprising
     }
@@ -244,7 +245,7 @@ mod tests {
         SiftKeypoint { position: Point2::new(x, y), sigma, angle: Angle::from_degrees(degrees), contrast: 0.1 }
     }
 
-    /// `right` matches under `pose`, each off by up to half a pixel, and `wrong` ones anywhere.
+    /// `right` matches under `pose`, each with an error of up to half a pixel, and `wrong` ones anywhere.
     fn pairs(pose: &PlanarSimilarity, right: usize, wrong: usize, seed: u64) -> Vec<KeypointPair> {
         let mut rng = Pcg64Mcg::seed_from_u64(seed);
         let mut uniform = |low: f64, high: f64| low + (high - low) * (rng.next_u64() as f64 / u64::MAX as f64);

@@ -1,4 +1,4 @@
-//! The turn of a part against its template: from its texture, or from its outline where texture is poor.
+//! The turn of a part relative to its template: from its texture, or from its outline if texture is poor.
 
 use nalgebra::Point2;
 use sdg_geometry::{Angle, Mask, PlanarSimilarity};
@@ -15,11 +15,11 @@ use crate::{Features, Plane, Sift, SiftError, match_features};
 pub struct RotationConfig {
     /// Largest ratio of a match; see [`match_features`].
     pub ratio: f32,
-    /// Agreement of the matches.
+    /// Settings of the matches' agreement.
     pub ransac: RansacConfig,
-    /// Pixels by which a mask is widened for keypoints: the corners of a part answer just outside its outline.
+    /// Pixels by which a mask is widened for keypoints: keypoints of a part's corners are just outside its outline.
     pub mask_margin_px: u32,
-    /// Least overlap of the outlines, from 0 to 1, at which a turn is read from them.
+    /// Minimum overlap of the outlines, from 0 to 1, for reading a turn from them.
     pub min_overlap: f64,
 }
 
@@ -29,7 +29,7 @@ impl Default for RotationConfig {
     }
 }
 
-/// Estimates how a part is turned, scaled and shifted against a template of it.
+/// Estimates the turn, scale and shift of a part relative to a template of it.
 #[derive(Default)]
 pub struct RotationEstimator {
     sift: Sift,
@@ -49,20 +49,20 @@ impl RotationTemplate {
     }
 }
 
-/// Where a part lies against its template, and how that was found.
+/// The pose of a part relative to its template, and the source of that pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RotationEstimate {
     /// The turn from the template to the image; positive is clockwise as seen.
     pub angle: Angle,
     /// The whole pose, in pixels.
     pub image_from_template: PlanarSimilarity,
-    /// What the turn was read from.
+    /// The source of the turn.
     pub method: RotationMethod,
-    /// Intersection over union of the two masks at this pose, where both were given.
+    /// Intersection over union of the two masks at this pose, if both were given.
     pub overlap: Option<f64>,
 }
 
-/// What a turn was read from, and how sure it is.
+/// The source of a turn, and its reliability.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum RotationMethod {
@@ -72,23 +72,23 @@ pub enum RotationMethod {
         matches: usize,
         /// Matches that agree with the pose.
         inliers: usize,
-        /// Keypoints of the template found at the pose, repeated texture included: these fixed it.
+        /// Keypoints of the template found at the pose, including repeated texture; they determined the pose.
         guided_matches: usize,
-        /// Root mean square distance of the matches that fixed the pose, in pixels.
+        /// Root mean square distance of the matches that determined the pose, in pixels.
         residual_px: f64,
-        /// Decimal logarithm of how many agreements as good chance would bring.
+        /// Decimal logarithm of the expected number of equally good agreements by chance.
         log10_false_alarms: f64,
     },
     /// The outlines of the two masks: too few keypoints agreed.
     Silhouette {
-        /// Intersection over union at the second best turn. Close to the estimate's overlap, the outline looks alike
-        /// at both turns and the turn is not to be trusted.
+        /// Intersection over union at the second best turn. If it is close to the estimate's overlap, the outline is
+        /// similar at both turns and the turn is unreliable.
         runner_up_overlap: f64,
     },
 }
 
 impl RotationEstimate {
-    /// Whether another turn explains the outlines within 0.03 as well; never so for matched keypoints.
+    /// Whether another turn explains the outlines equally well within 0.03; never true for matched keypoints.
     pub fn is_ambiguous(&self) -> bool {
         match self.method {
             RotationMethod::Features { .. } => false,
@@ -114,8 +114,8 @@ impl RotationEstimator {
         Ok(Self { sift, config })
     }
 
-    /// Reads a template: an image of the part, and the part's mask if there is one. Without a mask, all that the
-    /// image shows is taken for the part.
+    /// Reads a template: an image of the part, and the part's mask if there is one. Without a mask, the whole
+    /// image is mistaken for the part.
     ///
     /// # Errors
     /// A mask of another size than the image; a template with neither keypoints nor a mask.
@@ -128,11 +128,11 @@ impl RotationEstimator {
         Ok(RotationTemplate { features, silhouette })
     }
 
-    /// Finds the part in an image, looking inside the mask if there is one. `None` where neither texture nor outline
-    /// tells a turn.
+    /// Finds the part in an image, looking inside the mask if there is one. `None` if neither texture nor outline
+    /// determines a turn.
     ///
-    /// Keypoints decide where more of them agree than chance would bring; the outlines otherwise, if both masks were
-    /// given. The same input gives the same answer.
+    /// Keypoints decide if more of them agree than by chance; otherwise the outlines, if both masks were given.
+    /// Deterministic.
     ///
     /// # Errors
     /// A mask of another size than the image.
@@ -180,7 +180,7 @@ impl RotationEstimator {
         let guided = matches_at_pose(template, image, &fit.image_from_template, &self.config.ransac);
         let from: Vec<Point2<f64>> = guided.iter().map(|&(i, _)| template.keypoints[i].position).collect();
         let to: Vec<Point2<f64>> = guided.iter().map(|&(_, j)| image.keypoints[j].position).collect();
-        // Fewer matches than agreed before cannot fix the pose better.
+        // Fewer matches than agreed before cannot improve the pose.
         let refined = PlanarSimilarity::fit(&from, &to).filter(|_| guided.len() >= fit.inliers.len());
         let (pose, residual_px) = match refined {
             Some(pose) => {
@@ -200,7 +200,7 @@ impl RotationEstimator {
     }
 }
 
-/// Keypoints without which no agreement could stand out from chance.
+/// Minimum number of keypoints for an agreement beyond chance.
 const MIN_KEYPOINTS: usize = 3;
 
 /// The mask and all pixels within `margin` of it, along rows and columns.

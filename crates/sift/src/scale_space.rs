@@ -1,17 +1,17 @@
-//! The scale space: the image under ever more blur, an octave for each halving.
+//! The scale space: the image at increasing blur, with an octave for each halving.
 //!
 //! ```text
 //! octave o, S intervals:   level 0 ─ 1 ─ … ─ S ─ S+1 ─ S+2      σ = base · 2^(level / S), in the octave's own pixels
 //!                                            └─ every second pixel ─► level 0 of octave o + 1
 //! ```
 //!
-//! Differences of neighbouring levels are formed where they are read: storing them would move more memory than forming
-//! them twice costs.
+//! Differences of neighbouring levels are computed where they are read: storing them would take more time than
+//! computing them twice.
 
 use crate::blur::{GaussianKernel, blur, double, halve};
 use crate::{Plane, SiftConfig};
 
-/// Extrema are looked for this far from the border, where the mirrored image has no say in their derivatives.
+/// Minimum distance of extrema from the border, so that the mirrored image does not affect their derivatives.
 pub(crate) const BORDER: usize = 5;
 
 /// The levels of one octave.
@@ -20,12 +20,12 @@ pub(crate) struct Octave {
     pub levels: Vec<Plane>,
     /// Pixels of the image per pixel of the octave.
     pub pixel_size: f64,
-    /// What is added to a pixel's index times `pixel_size` for the place of its centre in the image.
+    /// Added to a pixel's index times `pixel_size`, it gives the position of the pixel's centre in the image.
     pub center: f64,
 }
 
 impl Octave {
-    /// The place in the image of a point of the octave, given as a pixel index that may have a fraction.
+    /// The position in the image of a point of the octave, given as a pixel index that may have a fraction.
     pub(crate) fn to_image(&self, index: f64) -> f64 {
         index * self.pixel_size + self.center
     }
@@ -38,20 +38,20 @@ impl Octave {
         self.levels[0].height()
     }
 
-    /// Level `s` + 1 less level `s`.
+    /// Level `s` + 1 minus level `s`.
     #[inline(always)]
     pub(crate) fn difference(&self, s: usize, x: usize, y: usize) -> f32 {
         self.levels[s + 1].at(x, y) - self.levels[s].at(x, y)
     }
 }
 
-/// Memory of scale spaces that are done with.
+/// Memory of finished scale spaces.
 #[derive(Default)]
 pub(crate) struct PlanePool(Vec<Vec<f32>>);
 
 impl PlanePool {
     fn plane(&mut self, width: usize, height: usize) -> Plane {
-        // Planes come back in the order they were made, so the fitting one is usually at this end.
+        // Planes are returned in the order in which they were made, so that the matching one is usually at this end.
         Plane::recycled(width, height, self.0.pop().unwrap_or_default())
     }
 
@@ -64,10 +64,10 @@ impl PlanePool {
     }
 }
 
-/// All octaves of an image, as long as extrema have room in them.
+/// All octaves of an image, as long as extrema fit in them.
 pub(crate) fn build(image: &Plane, config: &SiftConfig, pool: &mut PlanePool) -> Vec<Octave> {
     let num_levels = config.intervals + 3;
-    // One kernel a level, the same in each octave: the blur that leads from the level before to this one.
+    // One kernel per level, the same in each octave: the blur from the previous level to this one.
     let step = |level: usize| {
         let (to, from) = (config.sigma_of_level(level as f64), config.sigma_of_level(level as f64 - 1.0));
         GaussianKernel::new((to * to - from * from).sqrt())
@@ -102,20 +102,20 @@ pub(crate) fn build(image: &Plane, config: &SiftConfig, pool: &mut PlanePool) ->
     }
 }
 
-/// The image, doubled if so configured, brought from the camera's blur to `base_sigma`.
+/// The image, doubled if so configured, blurred from the camera's blur to `base_sigma`.
 fn first_level(image: &Plane, config: &SiftConfig, pool: &mut PlanePool) -> Plane {
     let factor = if config.double_first_octave { 2 } else { 1 };
     let (width, height) = (factor * image.width(), factor * image.height());
     let mut level = pool.plane(width, height);
     let has_sigma = factor as f64 * config.input_sigma;
     let missing = config.base_sigma.powi(2) - has_sigma.powi(2);
-    // An image that is blurrier than the base already stays as it is.
+    // An image with more blur than the base is not changed.
     let kernel = GaussianKernel::new(missing.max(0.0).sqrt());
     if config.double_first_octave {
         let mut doubled = pool.plane(width, height);
         double(image, &mut doubled);
         blur(&doubled, &mut level, &kernel);
-        // The next level has the same size and takes this memory.
+        // The next level has the same size and reuses this memory.
         pool.0.push(doubled.into_data());
     } else {
         blur(image, &mut level, &kernel);

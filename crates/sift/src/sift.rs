@@ -41,7 +41,7 @@ impl Sift {
     /// Does not depend on the number of threads, nor on the processor.
     ///
     /// # Errors
-    /// A mask of another size than the image. An image too small for any keypoint has no features, which is no error.
+    /// A mask of another size than the image. An image too small for any keypoint has no features, without an error.
     pub fn detect_and_describe(&self, image: &Plane, mask: Option<&Mask>) -> Result<Features, SiftError> {
         check_mask(image, mask)?;
         let mut pool = std::mem::take(&mut *self.pool.lock().unwrap_or_else(PoisonError::into_inner));

@@ -5,7 +5,8 @@
 //!                                                    └─► outlines laid on each other from each of these ─► best overlap
 //! ```
 //!
-//! An outline that looks alike at several turns cannot tell them apart; the overlap at the second best turn says so.
+//! An outline that is similar at several turns does not distinguish them; the overlap at the second best turn shows
+//! this.
 
 use std::f64::consts::TAU;
 
@@ -15,30 +16,31 @@ use sdg_geometry::{Angle, Mask, PlanarSimilarity};
 
 /// Directions of a profile.
 const NUM_DIRECTIONS: usize = 180;
-/// A mask of fewer pixels has no outline to speak of.
+/// Minimum number of pixels of a mask with a usable outline.
 const MIN_AREA: usize = 25;
-/// Outline points that are laid on the other outline.
+/// Number of outline points that are compared with the other outline.
 const NUM_QUERIES: usize = 256;
-/// Points of the part's area at which an overlap is measured.
+/// Number of points of the part's area at which an overlap is measured.
 const NUM_AREA_POINTS: usize = 4000;
-/// Peaks of the correlation from which outlines are laid on each other.
+/// Number of correlation peaks from which outlines are aligned.
 const NUM_STARTS: usize = 4;
 const MAX_ITERATIONS: usize = 12;
-/// Pixels around an outline point whose balance gives its normal: wide enough to see through the staircase of pixels.
+/// Radius in pixels around an outline point in which the balance of the mask gives its normal: large enough to smooth
+/// the pixel steps.
 const NORMAL_WINDOW: i64 = 4;
-/// The part of the nearest points that counts; the rest may belong to specks, shadows or what covers the part.
+/// Share of the nearest points that is used; the rest may belong to specks, shadows or objects that cover the part.
 const TRIM: f64 = 0.85;
 /// Turns closer than this are one.
 const DISTINCT_TURN: f64 = 20.0 * TAU / 360.0;
 
-/// A part's outline, ready to be laid on another.
+/// A part's outline, prepared for alignment with another.
 pub(crate) struct Silhouette {
     mask: Mask,
     area: f64,
     centroid: Point2<f64>,
-    /// Centres of the mask's pixels, or some of them, evenly spread.
+    /// Centres of the mask's pixels, or of an evenly distributed sample.
     area_points: Vec<Point2<f64>>,
-    /// Middles of the sides between a pixel inside and one outside.
+    /// Centres of the edges between a pixel inside and one outside.
     outline: Vec<OutlinePoint>,
     tree: ImmutableKdTree<f64, 2>,
     profile: Vec<f64>,
@@ -51,13 +53,13 @@ struct OutlinePoint {
     normal: Vector2<f64>,
 }
 
-/// One outline laid on another.
+/// One outline aligned with another.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct SilhouetteFit {
     pub image_from_template: PlanarSimilarity,
     /// Intersection over union of the two areas.
     pub overlap: f64,
-    /// The same at the best turn that is another one.
+    /// The same at the best distinct other turn.
     pub runner_up_overlap: f64,
 }
 
@@ -113,7 +115,7 @@ impl Silhouette {
         (intersection / (template_area + image.area - intersection)).clamp(0.0, 1.0)
     }
 
-    /// Lays this outline, the template's, on the image's.
+    /// Aligns this outline, the template's, with the image's.
     ///
     /// # Source
     /// Chen and Medioni 1991 (iterated closest points, distances along the normal), in both directions and trimmed
@@ -147,7 +149,7 @@ impl Silhouette {
             pairs.truncate((TRIM * pairs.len() as f64).ceil() as usize);
             let Some(step) = normal_step(&pairs, &pose.apply(&self.centroid)) else { return pose };
             let next = step.compose(&pose);
-            // What one more step moves at the outline's far end, about one radius from the centre.
+            // The effect of one more step at the outline's far end, about one radius from the centre.
             let radius = self.area.sqrt() * next.scale;
             let moved = next.apply(&self.centroid) - pose.apply(&self.centroid);
             let converged = moved.norm() < 0.01 && next.angle.distance(pose.angle) * radius < 0.01;
@@ -166,23 +168,23 @@ impl Silhouette {
 }
 
 /// The small similarity about `center` that brings the points closest to the lines through their partners, by least
-/// squares. `None` where the lines leave it open, as those of a circle do.
+/// squares. `None` if the lines do not determine it, as for a circle.
 fn normal_step(pairs: &[(Point2<f64>, OutlinePoint)], center: &Point2<f64>) -> Option<PlanarSimilarity> {
     let (mut normal_matrix, mut right) = (Matrix4::zeros(), Vector4::zeros());
     let radius = pairs.iter().map(|(from, _)| (from - center).norm()).fold(1.0, f64::max);
     for (from, to) in pairs {
-        // Turn and growth in units of what they move at the far end, so that all four unknowns are pixels.
+        // Turn and scale in units of their effect at the far end, so that all four unknowns are in pixels.
         let arm = (from - center) / radius;
         let n = to.normal;
         let row = Vector4::new(arm.perp(&n), arm.dot(&n), n.x, n.y);
         normal_matrix += row * row.transpose();
         right += row * n.dot(&(to.at - from));
     }
-    // A hair of inertia: an outline that looks alike at any turn stays where it started.
+    // A slight damping: an outline that is similar at any turn stays at its start.
     normal_matrix += Matrix4::identity() * (1e-4 * pairs.len() as f64);
     let found = normal_matrix.cholesky()?.solve(&right);
     let (turn, growth) = (found.x / radius, found.y / radius);
-    // A step far beyond the small is a sign of nothing in common.
+    // A very large step means that the outlines do not match.
     if !(turn.abs() < 0.5 && growth.abs() < 0.5) {
         return None;
     }
@@ -190,7 +192,7 @@ fn normal_step(pairs: &[(Point2<f64>, OutlinePoint)], center: &Point2<f64>) -> O
     Some(PlanarSimilarity::about(*center, target, Angle::from_radians(turn), 1.0 + growth))
 }
 
-/// Away from where the part's pixels lie around pixel (x, y).
+/// Direction away from the part's pixels around pixel (x, y).
 fn normal(mask: &Mask, x: u32, y: u32) -> Vector2<f64> {
     let mut balance = Vector2::zeros();
     for dy in -NORMAL_WINDOW..=NORMAL_WINDOW {
@@ -203,16 +205,16 @@ fn normal(mask: &Mask, x: u32, y: u32) -> Vector2<f64> {
             }
         }
     }
-    // A thin line balances itself; its normals then say nothing.
+    // A thin line is balanced on both sides; its normals then carry no information.
     balance.try_normalize(1e-9).unwrap_or_else(Vector2::zeros)
 }
 
-/// About `count` of the points, evenly spread over their order.
+/// About `count` of the points, evenly distributed over their order.
 fn thinned<T: Copy>(points: &[T], count: usize) -> Vec<T> {
     points.iter().step_by(points.len().div_ceil(count)).copied().collect()
 }
 
-/// How far the part reaches in each direction: the sum of the distances of its pixels, less the mean, of unit length.
+/// The extent of the part in each direction: the sum of the distances of its pixels, minus the mean, of unit length.
 fn profile(pixels: &[Point2<f64>], centroid: &Point2<f64>) -> Vec<f64> {
     let mut profile = vec![0.0; NUM_DIRECTIONS];
     for pixel in pixels {
@@ -229,8 +231,8 @@ fn profile(pixels: &[Point2<f64>], centroid: &Point2<f64>) -> Vec<f64> {
     profile
 }
 
-/// The turns at which the profiles correlate best, and the best one turned by a quarter and a half: an outline that
-/// fits these as well is to be found out.
+/// The turns of the highest profile correlation, and the best one turned by a quarter and by a half, which detects
+/// an outline that fits these equally well.
 fn starts(template: &[f64], image: &[f64]) -> Vec<Angle> {
     let correlation = |shift: usize| -> f64 {
         template.iter().enumerate().map(|(i, v)| v * image[(i + shift) % NUM_DIRECTIONS]).sum()
@@ -274,14 +276,14 @@ mod tests {
                 let truth = at(f64::from(degrees), scale);
                 let fit = template.lay_on(&Silhouette::new(&mask(&HOOK, &truth)).unwrap()).unwrap();
                 let expected = truth.compose(&at(0.0, 1.0).inverse());
-                // Its far ends are 36 from the middle.
+                // Its far ends are 36 from the centre.
                 let error = fit.image_from_template.angle.distance(expected.angle);
                 worst_px = worst_px.max(error * 36.0 * scale);
                 assert!((fit.image_from_template.scale / scale - 1.0).abs() < 0.03, "{fit:?}");
                 assert!(fit.overlap > 0.9 && fit.runner_up_overlap < 0.8, "{fit:?}");
             }
         }
-        // Outlines of whole pixels do not tell less than about half a pixel.
+        // Outlines of whole pixels have an accuracy of about half a pixel.
         assert!(worst_px < 0.6, "{worst_px} pixels off at the far ends");
     }
 
@@ -319,7 +321,7 @@ mod tests {
         assert!(Silhouette::new(&Mask::empty(0, 0)).is_none());
         assert!(Silhouette::new(&Mask::empty(40, 40)).is_none());
         assert!(Silhouette::new(&Mask::from_fn(40, 40, |x, y| x < 2 && y < 2)).is_none());
-        // The whole image is a rectangle like any other, however many outline points share a coordinate.
+        // The whole image is a rectangle like any other, with many outline points that share a coordinate.
         assert!(Silhouette::new(&Mask::from_fn(500, 300, |_, _| true)).is_some());
     }
 }

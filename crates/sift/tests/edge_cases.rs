@@ -1,4 +1,4 @@
-//! Pictures with nothing in them, settings out of range, and the same answer every time.
+//! Empty pictures, settings out of range, and repeatable results.
 
 use crate::support;
 use sdg_geometry::Mask;

@@ -1,4 +1,4 @@
-//! What turning, scaling and relighting leave as it was, in numbers, on the repository's pictures.
+//! Measures the invariance to turning, scaling and relighting on the repository's pictures.
 
 use crate::support::{PARTS, picture, relit, warped, with};
 use nalgebra::Point2;
@@ -9,7 +9,7 @@ fn describe(image: &Plane) -> Features {
     Sift::new(SiftConfig::default()).unwrap().detect_and_describe(image, None).unwrap()
 }
 
-/// Turned and scaled about its middle, on a canvas of its own size.
+/// Turned and scaled about its centre, on a canvas of its own size.
 fn view(image: &Plane, degrees: f64, scale: f64) -> (Plane, PlanarSimilarity) {
     let middle = Point2::new(image.width() as f64 / 2.0, image.height() as f64 / 2.0);
     let truth = PlanarSimilarity::about(middle, middle, Angle::from_degrees(degrees), scale);
@@ -17,7 +17,7 @@ fn view(image: &Plane, degrees: f64, scale: f64) -> (Plane, PlanarSimilarity) {
 }
 
 /// The share of the keypoints of `a` that have one of `b` at the same place and size, and the share that the ratio test
-/// matches rightly; of those that should lie in `b`.
+/// matches correctly; both relative to the keypoints that should lie in `b`.
 fn repeated_and_matched(a: &Features, b: &Features, truth: &PlanarSimilarity, size: (f64, f64)) -> (f64, f64) {
     let expected: Vec<Point2<f64>> = a.keypoints.iter().map(|k| truth.apply(&k.position)).collect();
     let visible = |p: &Point2<f64>| p.x > 8.0 && p.y > 8.0 && p.x < size.0 - 8.0 && p.y < size.1 - 8.0;
@@ -39,8 +39,8 @@ fn repeated_and_matched(a: &Features, b: &Features, truth: &PlanarSimilarity, si
 
 #[test]
 fn keypoints_return_and_match_after_known_warps() {
-    // Degrees, scale, least share repeated, least share matched rightly, over the three parts together: some five
-    // points below what was measured.
+    // Degrees, scale, minimum share repeated, minimum share matched correctly, over the three parts together:
+    // about five points below the measured values.
     for (degrees, scale, min_repeated, min_matched) in
         [(90.0, 1.0, 0.88, 0.88), (37.0, 1.0, 0.64, 0.64), (-140.0, 0.8, 0.39, 0.39), (12.0, 1.3, 0.45, 0.45)]
     {
@@ -61,8 +61,9 @@ fn keypoints_return_and_match_after_known_warps() {
 
 #[test]
 fn a_quarter_turn_turns_directions_and_keeps_descriptors() {
-    // Octaves keep every second pixel from the first on. These sides are one more than a multiple of 64, so that the last
-    // pixel is kept as well, octave after octave, and the turned picture keeps the same ones; doubling would spoil that.
+    // Octaves keep every second pixel from the first on. These sides are one more than a multiple of 64, so that the
+    // last pixel is kept as well, octave after octave, and the turned picture keeps the same ones; doubling would break
+    // this.
     let (width, height) = (449, 321);
     let image = Plane::from_rgb(&image::imageops::crop_imm(&picture("rod_end"), 90, 80, width, height).to_image());
     // Pixel by pixel, so nothing is resampled: (x, y) goes to (height - y, x).

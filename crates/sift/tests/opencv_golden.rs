@@ -32,7 +32,7 @@ fn golden() -> Vec<Golden> {
     bytes.chunks_exact(144).map(record).collect()
 }
 
-/// OpenCV's y points up where directions are concerned, so its eight directions run the other way around.
+/// OpenCV's y points up for directions, so that its eight directions have the opposite order.
 fn cosine_with_opencv(ours: &[f32], theirs: &[f32]) -> f32 {
     let mirrored = |i: usize| i - i % 8 + (8 - i % 8) % 8;
     let dot: f32 = (0..ours.len()).map(|i| ours[i] * theirs[mirrored(i)]).sum();
@@ -53,7 +53,7 @@ fn keypoints_and_descriptors_are_those_of_opencv() {
     let mut cosines = Vec::new();
     for expected in &golden {
         let at_place = features.keypoints.iter().enumerate().filter(|(_, k)| {
-            // Both compute in 32 bits, in another order.
+            // Both compute in 32 bits, in a different order.
             let apart =
                 (k.position.x - f64::from(expected.place[0])).hypot(k.position.y - f64::from(expected.place[1]));
             apart < 0.01 && (k.sigma / f64::from(expected.sigma) - 1.0).abs() < 0.005
@@ -72,7 +72,7 @@ fn keypoints_and_descriptors_are_those_of_opencv() {
         golden.len(),
         cosines.len()
     );
-    // One may lie so close to a threshold that rounding decides.
+    // One may be so close to a threshold that rounding decides.
     assert!(same_place + 1 >= golden.len(), "{same_place} of {} places", golden.len());
     assert!(cosines.len() * 10 >= golden.len() * 9, "{} of {} directions", cosines.len(), golden.len());
     // OpenCV centres its grid on the nearest pixel, this crate on the keypoint.

@@ -1,4 +1,4 @@
-//! The turn of the repository's parts against their demonstrations.
+//! The turn of the repository's parts relative to their demonstrations.
 
 use crate::support;
 use nalgebra::Point2;
@@ -14,7 +14,7 @@ fn pose(outline: &Polygon, degrees: f64, scale: f64, x: f64, y: f64) -> PlanarSi
     PlanarSimilarity::about(outline.centroid(), Point2::new(x, y), Angle::from_degrees(degrees), scale)
 }
 
-/// Noise of the size of the table's own, so that the view is not the template resampled.
+/// Noise as strong as the table's own, so that the view is not only the resampled template.
 fn grainy(image: &Plane) -> Plane {
     Plane::from_fn(image.width() as u32, image.height() as u32, |x, y| {
         let mixed = (u64::from(x) << 20 | u64::from(y)).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40;
@@ -82,7 +82,7 @@ fn outlines_tell_the_turn_where_texture_is_missing() {
             assert!(matches!(found.method, RotationMethod::Silhouette { .. }), "{found:?}");
             let error = found.angle.distance(truth.angle).to_degrees();
             println!("{part} {degrees}: {error:.2} degrees off, {found:?}");
-            // The rod end looks nearly alike turned by half; it must say so where it is not sure.
+            // The rod end looks nearly the same after half a turn; an unreliable estimate must say so.
             assert!(error < 1.0 || found.is_ambiguous(), "{part} at {degrees}: {error} degrees off, {found:?}");
             assert!(found.overlap.unwrap() > 0.9);
         }
@@ -118,7 +118,7 @@ fn what_is_not_there_is_not_found() {
     let dot = Plane::from_fn(1, 1, |_, _| 0.6);
     assert_eq!(estimator.estimate(&template, &dot, None).unwrap(), None);
     for other in ["fuel_line", "rod_end"] {
-        // Only the other part itself: the table and the arm's shadow are the same in all pictures.
+        // Only the other part itself, because the table and the arm's shadow are the same in all pictures.
         let (seen, outline) = (Plane::from_rgb(&picture(other)), support::outline(other));
         let found = estimator.estimate(&template, &seen, Some(&mask(&outline, &seen))).unwrap();
         let by_features = found.filter(|f| matches!(f.method, RotationMethod::Features { .. }));

@@ -1,8 +1,9 @@
-//! Whole grasps over TCP and UDP beside the same attempts in one process, part by part.
+//! Compares whole grasps over TCP and UDP with the same attempts in one process, part by part.
 //!
 //! `cargo run --release -p sdg-simulation --example network_grasps [lockstep|realtime] [ATTEMPTS] [PART]…`
 //!
-//! Ends with an error where other attempts hold in lockstep than in one process, or in real time more than 5 of 240 fewer.
+//! Ends with an error if other attempts hold in lockstep than in one process, or if in real time more than 5 of 240
+//! fewer hold.
 
 use sdg_fci::server::Pace;
 use sdg_robot::{GraspConfig, GraspOutcome, Robot, Watch, grasp};
@@ -22,7 +23,7 @@ fn cell(spec: &ObjectSpec, seed: u64) -> sdg_simulation::Result<Workcell> {
     Ok(cell)
 }
 
-/// Over the network: whether the part is held by the hand's word, and by the truth, and why not.
+/// Over the network: whether the part is held according to the hand and in truth, and the reason if not.
 fn over_network(cell: Workcell, pace: Pace) -> Result<(bool, bool, String), Box<dyn std::error::Error>> {
     let (server, positions) = network::serve(&cell, pace);
     let mount = cell.wrist_camera();

@@ -1,4 +1,4 @@
-//! Grasps parts whose true pose is known, to see what the robot alone can do, and how long it takes.
+//! Grasps parts whose true pose is known, to measure the success rate and the time of the robot alone.
 //!
 //! `cargo run --release -p sdg-simulation --example oracle [OBJECT] [ATTEMPTS] [FIRST_SEED] [FOLDER]`
 //! writes the pictures of the first attempt into FOLDER.
@@ -31,7 +31,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             successes += 1;
         }
         for (step, why) in &report.hand_verdicts {
-            // The last verdict is right where it says what became of the grasp, those before where the part was held.
+            // The last verdict is right if it agrees with the outcome of the grasp; the earlier ones are right if the
+            // part was held.
             let is_last = Some(step) == report.hand_verdicts.last().map(|(step, _)| step);
             if why.is_none() != (!is_last || report.outcome.is_held()) {
                 println!("{name} seed {seed}: after {step} the hand says {why:?}, the truth {:?}", report.outcome);

@@ -1,4 +1,4 @@
-//! Renders the arm in its ready pose from outside and through the wrist camera, to look at.
+//! Renders the arm in its ready pose from outside and through the wrist camera.
 //!
 //! `cargo run --release -p sdg-simulation --example panda FOLDER`
 

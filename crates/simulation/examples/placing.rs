@@ -1,12 +1,13 @@
-//! Parts placed in a tray, and grasps from a table that is higher than told; true poses in place of pictures, 1 Nm of friction a joint.
+//! Places parts in a tray, and grasps from a table that is higher than the given height, with true poses instead of
+//! pictures and 1 Nm of friction per joint.
 //!
 //! ```text
 //! placing tray process|lockstep [PART [CELLS [X Y]]]      spring_clip 20 100 55: a part into each cell, X by Y mm from one to the next;
 //!                                                         those that lie stay in the scene
 //! placing heights process|lockstep [ATTEMPTS [SEED [PART]…]]   10 101: each part softly and in joint positions, the table 5 mm higher
 //! ```
-//! Ends with an error where a part is dropped, lies more than 3 mm or 3° beside its cell, or moves another; where fewer than 8 of 10 soft
-//! grasps hold, or press with more than 10 N at rest or 25 N at first.
+//! Ends with an error if a part is dropped, lies more than 3 mm or 3° beside its cell, or moves another; or if fewer
+//! than 8 of 10 soft grasps hold, or press with more than 10 N at rest or 25 N at first.
 
 use std::error::Error;
 
@@ -21,7 +22,7 @@ mod placing;
 
 use placing::{Where, beside, cell, config, grasp_on_other_table, place, tray, tray_of};
 
-/// How much higher the table is than told.
+/// Height of the table above the given height.
 const HIGHER_M: f64 = 0.005;
 const MAX_BESIDE_M: f64 = 0.003;
 const MAX_TURNED_DEG: f64 = 3.0;
@@ -29,7 +30,7 @@ const MAX_MOVED_M: f64 = 0.5e-3;
 const MAX_OVER_REST_M: f64 = 0.005;
 const MAX_STATIC_N: f64 = 10.0;
 const MAX_PEAK_N: f64 = 25.0;
-/// Parts of the paper's that a hand 5 mm too high still holds.
+/// Parts of the paper that a hand 5 mm too high can still hold.
 const PARTS: [&str; 4] = ["pendulum", "fuel_line", "rod_end", "common_line"];
 
 fn main() -> Result<(), Box<dyn Error>> {

@@ -1,20 +1,23 @@
-//! Planning on random problems, measured: `planning rate`, `planning proof [COUNT] [FIRST_SEED]`, `planning checks [COUNT] [FIRST_SEED]`,
-//! `planning length [COUNT] [FIRST_SEED] [SECONDS]`, `planning serve`.
+//! Measures planning on random problems: `planning rate`, `planning proof [COUNT] [FIRST_SEED]`, `planning checks
+//! [COUNT] [FIRST_SEED]`, `planning length [COUNT] [FIRST_SEED] [SECONDS]`, `planning serve`.
 //!
-//! - `rate`: configurations that the collision model checks in a second on one core.
-//! - `proof`: plans COUNT problems, times each plan at Franka's full limits, and follows the motion in MuJoCo at steps of 1 ms: collisions; velocity,
-//!   acceleration, jerk by differences, and torque by MuJoCo's inverse dynamics, as shares of the limits; the tcp's speed and acceleration; how much longer
-//!   it takes with a stop at every waypoint, and how much less without a limit of the jerk.
+//! - `rate`: configurations that the collision model checks per second on one core.
+//! - `proof`: plans COUNT problems, times each plan at Franka's full limits, and follows the motion in MuJoCo at steps
+//!   of 1 ms: collisions; velocity, acceleration, jerk by differences, and torque by MuJoCo's inverse dynamics, as
+//!   shares of the limits; the tcp's speed and acceleration; the additional time with a stop at every waypoint, and the
+//!   time saved without a jerk limit.
 //!
-//! - `checks`: configurations that the search checks on its way to one given configuration of the goal, before shortening, as planners of
-//!   others are asked it (benches/peers/ompl_planning.py).
-//! - `length`: how long a plan takes to follow against the best that SECONDS (60) of optimising find: the same planner again and again with other
-//!   seeds, more searches, and a hundred times the attempts to shorten. COUNT (50) problems whose goal no straight motion reaches.
+//! - `checks`: configurations that the search checks before it reaches one given configuration of the goal, before
+//!   shortening; other planners are measured in the same way (benches/peers/ompl_planning.py).
+//! - `length`: the duration of a plan compared with the best found in SECONDS (60) of optimisation: the same planner
+//!   repeated with other seeds, more searches, and a hundred times the attempts to shorten. COUNT (50) problems whose
+//!   goal no straight motion reaches.
 //!
-//!   The first two are timed by the clock and by the time that Linux gave the thread, which other programs on the machine do not change.
-//! - `serve`: answers collision checks on standard input, for planners of others (benches/peers/ompl_planning.py): a problem's seed as u64
-//!   (u64::MAX ends), answered by start and goal configuration (14 f64); then any number of configurations (7 f64), each answered by a byte (1 free),
-//!   until seven NaN. Little-endian.
+//!   The first two are timed by the clock and by the thread's processor time from Linux, which other programs on the
+//!   machine do not change.
+//! - `serve`: answers collision checks on standard input, for other planners (benches/peers/ompl_planning.py): a
+//!   problem's seed as u64 (u64::MAX ends), answered by start and goal configuration (14 f64); then any number of
+//!   configurations (7 f64), each answered by a byte (1 free), until seven NaN. Little-endian.
 
 use std::error::Error;
 use std::io::{Read, Write};
@@ -60,7 +63,7 @@ impl Stopwatch {
     }
 }
 
-/// What this thread has had of a processor, ms; NaN where Linux does not tell.
+/// Processor time of this thread, ms; NaN if Linux does not report it.
 fn processor_ms() -> f64 {
     std::fs::read_to_string("/proc/thread-self/schedstat")
         .ok()
@@ -99,7 +102,7 @@ impl Shares {
     const NAMES: [&str; 7] =
         ["velocity", "acceleration", "jerk", "torque", "tcp velocity", "tcp acceleration", "tcp jerk"];
 
-    /// Looks at every millisecond of a motion.
+    /// Checks every millisecond of a motion.
     fn look_at(&mut self, motion: &Trajectory, mujoco: &mut InverseDynamics) -> Result<(), Box<dyn Error>> {
         let (panda, joints, tcp) = (ArmGeometry::panda(), JointLimits::panda(), CartesianLimits::panda());
         let share = |values: &JointVector, limits: &JointVector| values.abs().component_div(limits).max();
@@ -136,18 +139,19 @@ impl Shares {
     }
 }
 
-/// Times of the plans that are not straight.
+/// Durations of the plans that are not straight.
 #[derive(Debug, Default)]
 struct Bent {
     num_corners: usize,
     num_stops: usize,
     secs: Vec<f64>,
-    /// The motion's time over that with a stop at every waypoint, and over that without a limit of the jerk.
+    /// The motion's duration divided by that with a stop at every waypoint, and by that without a jerk limit.
     over_stopping: Vec<f64>,
     over_jerkless: Vec<f64>,
-    /// Over the largest corners that there is room for on the straight parts, whatever they touch.
+    /// Divided by the duration with the largest corners that fit on the straight parts, even if they collide.
     over_largest_corners: Vec<f64>,
-    /// Over a stop at every waypoint within the joints' velocities, accelerations and jerks alone.
+    /// Divided by the duration with a stop at every waypoint within only the joints' velocities, accelerations and
+    /// jerks.
     over_point_to_point: Vec<f64>,
 }
 
@@ -234,7 +238,7 @@ fn proof(count: u64, first_seed: u64) -> Result<(), Box<dyn Error>> {
         all_checks.push(plan.num_checks as f64);
         let watch = Stopwatch::start();
         let motions = plan.trajectories(&limits, &CartesianLimits::panda(), &dynamics)?;
-        // Linux may count the processor's time in steps that are longer than this takes: its sum is right.
+        // Linux may count processor time in steps longer than this; the sum is right.
         let [clock_ms, processor_ms] = watch.elapsed_ms();
         timing_millis.push(clock_ms);
         timing_processor_ms += processor_ms;
@@ -284,7 +288,7 @@ fn proof(count: u64, first_seed: u64) -> Result<(), Box<dyn Error>> {
 
 fn checks(count: u64, first_seed: u64) -> Result<(), Box<dyn Error>> {
     let panda = ArmGeometry::panda();
-    // One search: further ones look for shorter ways, after the count has ended.
+    // One search: further ones look for shorter paths after the count has ended.
     let mut options = PlanOptions::default();
     options.num_searches = 1;
     let mut checks = Vec::new();
@@ -309,7 +313,7 @@ fn checks(count: u64, first_seed: u64) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Limits that are broken by a larger share are told.
+/// Limits violated by a larger share are reported.
 const MAX_EXCESS: f64 = 1e-3;
 
 fn length(count: u64, first_seed: u64, seconds: u64) -> Result<(), Box<dyn Error>> {

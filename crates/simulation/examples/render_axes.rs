@@ -1,9 +1,9 @@
-//! Draws pictures of all axes of some parts, with the truth on them, onto one sheet a part, to be looked at.
+//! Draws pictures of all axes of some parts, with the truth marked, onto one sheet per part, for inspection.
 //!
 //! `cargo run --release -p sdg-simulation --example render_axes FOLDER [SEED [PART …]]`
 //!
-//! Writes `PART.png` into FOLDER, a row an axis, mild to hard from left to right, and prints each picture's parameter and
-//! how much of each instance shows, and the time that pictures take.
+//! Writes `PART.png` into FOLDER, with a row per axis, mild to hard from left to right, and prints each picture's
+//! parameter, the visible share of each instance, and the drawing time.
 
 use std::fs;
 use std::path::PathBuf;
@@ -35,7 +35,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         for (row, axis) in Axis::ALL.into_iter().enumerate() {
             let started = Instant::now();
             for column in 0..COLUMNS {
-                // Odd and even numbers in turn.
+                // Odd and even numbers alternate.
                 let number = (column * (PICTURES_PER_AXIS - 1) / (COLUMNS - 1)).min(PICTURES_PER_AXIS - 1);
                 let shown = axis_view(&spec, axis, number, seed)?;
                 let shares: Vec<String> =

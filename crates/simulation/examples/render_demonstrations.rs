@@ -2,8 +2,8 @@
 //!
 //! `cargo run --release -p sdg-simulation --example render_demonstrations [FOLDER [CHECK_FOLDER]]`
 //!
-//! The pendulum is annotated in LabelMe's format, the others in COCO's, so that users try both.
-//! With a second folder, the annotations are also drawn over enlarged pictures there, to be checked by eye.
+//! The pendulum is annotated in LabelMe's format, the others in COCO's, so that both formats are used. With
+//! a second folder, the annotations are also drawn over enlarged pictures there, to be checked by eye.
 
 use std::fs;
 use std::path::{Path, PathBuf};

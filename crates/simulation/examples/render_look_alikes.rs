@@ -1,10 +1,10 @@
-//! Makes the look-alikes of every shipped part: a folder each, and one sheet that shows all of them beside their part.
+//! Makes the look-alikes of every shipped part: a folder for each, and one sheet with all of them beside their part.
 //!
 //! `cargo run --release -p sdg-simulation --example render_look_alikes [FOLDER [PART …]]`
 //!
-//! FOLDER (`look_alikes` by default) gets `PART/KIND/` with what `ObjectSpec::from_folder` reads, and `look_alikes.png`: a
-//! row a part; from left to right the part, its mirror image (empty where that equals the part), three with a feature
-//! moved, and the sizes 0.8, 0.9, 1.1 and 1.25.
+//! FOLDER (`look_alikes` by default) gets `PART/KIND/` with files for `ObjectSpec::from_folder`, and `look_alikes.png`
+//! with a row per part: from left to right the part, its mirror image (empty where that equals the part), three with a
+//! feature moved, and the sizes 0.8, 0.9, 1.1 and 1.25.
 
 use std::path::PathBuf;
 
@@ -19,7 +19,7 @@ use sdg_simulation::{RenderConfig, Workcell, WorkcellConfig};
 /// Side of a picture on the sheet in pixels.
 const SIDE: u32 = 250;
 
-/// Where the parts lie: x, y in metres, yaw in radians.
+/// Position of the parts: x, y in metres, yaw in radians.
 const PLACE: (f64, f64, f64) = (0.48, 0.0, 0.6);
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -57,8 +57,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// The part alone in even light, seen by the wrist camera in a fine picture and cut out around it; `scale_m` is what the
-/// side of the cut shows.
+/// The part alone in even light, seen by the wrist camera at high resolution and cropped; `scale_m` is the side of the
+/// crop.
 fn picture(spec: &ObjectSpec, scale_m: f64) -> Result<RgbImage, Box<dyn std::error::Error>> {
     let (x, y, yaw_rad) = PLACE;
     let scene = SceneVariation::nominal(Some((spec, spec.base_from_object(x, y, yaw_rad))));
@@ -78,7 +78,7 @@ fn picture(spec: &ObjectSpec, scale_m: f64) -> Result<RgbImage, Box<dyn std::err
     Ok(resize(&cut, SIDE, SIDE, FilterType::CatmullRom))
 }
 
-/// What the side of a part's pictures shows, in metres: the largest look-alike fits.
+/// Side of a part's pictures, in metres, so that the largest look-alike fits.
 fn scale_m(spec: &ObjectSpec) -> f64 {
     let distances = spec.footprint.iter().flat_map(|a| spec.footprint.iter().map(move |b| (a - b).norm()));
     1.3 * distances.fold(0.0, f64::max)

@@ -1,4 +1,4 @@
-//! The simulated Panda as an arm that the grasp sequence moves.
+//! The simulated Panda as an arm for the grasp sequence.
 
 use sdg_kinematics::ArmGeometry;
 use sdg_robot::{
@@ -14,21 +14,21 @@ use crate::workcell::Workcell;
 
 type Result<T> = sdg_robot::Result<T>;
 
-/// A joint that is this far from its reference is held up by something, in radians.
+/// Minimum distance of a joint from its reference that means a blocked arm, in radians.
 const BLOCKED_RAD: f64 = 0.03;
-/// How often a closing hand is looked at, in seconds.
+/// Interval of checks of a closing hand, in seconds.
 const HAND_PERIOD_SECS: f64 = 0.05;
-/// Fingers that stand still for so long have closed, in seconds.
+/// Fingers that do not move for this time have closed, in seconds.
 const HAND_STILL_SECS: f64 = 0.2;
-/// Fingers that move by less between two looks stand still, in metres.
+/// Movement between two checks below which fingers count as not moving, in metres.
 const HAND_STILL_M: f64 = 1e-4;
 /// Up to 0.04 m of each finger at 0.05 m/s, and time for the force to build up.
 const MAX_HAND_SECS: f64 = 1.6;
-/// A hand this near to its opening is there, in metres.
+/// Tolerance of the hand's opening, in metres.
 const HAND_THERE_M: f64 = 1e-3;
-/// Share of the force that a hand that presses reaches.
+/// Minimum share of the force of a pressing hand.
 const PRESSING_SHARE: f64 = 0.8;
-/// How far a state is wrong that jumps, in radians.
+/// Error of the state in a jump fault, in radians.
 const JUMP_RAD: f64 = 1.0;
 
 impl From<SimulationError> for RobotError {
@@ -61,7 +61,7 @@ impl Workcell {
         }
     }
 
-    /// One cycle of a motion or of standing still; the arm may stop itself in it.
+    /// One cycle of a motion or of standing still, in which the arm may stop itself.
     fn cycle(&mut self, watch: &mut Watch) -> Result<Option<StopReason>> {
         self.tick()?;
         self.observe_moving(watch)
@@ -171,19 +171,20 @@ impl Arm for Workcell {
             if (found_m - told_m).abs() >= HAND_THERE_M {
                 let (told_mm, found_mm) = (told_m * 1e3, found_m * 1e3);
                 return Err(RobotError::Hand(format!(
-                    "it was to open to {told_mm:.0} mm and stands at {found_mm:.0} mm"
+                    "the opening should be {told_mm:.0} mm, but is {found_mm:.0} mm"
                 )));
             }
         }
         self.hand()
     }
 
-    /// The simulated arm stops at what blocks it, whatever the sensitivity.
+    /// The simulated arm stops at every obstacle, at any sensitivity.
     fn set_contact_sensitivity(&mut self, _sensitivity: ContactSensitivity) -> Result<()> {
         Ok(())
     }
 
-    /// Control of joint positions does without: at its stiffness a part costs a fraction of a millimetre. Torques do not.
+    /// Control of joint positions needs no load: at its stiffness a part costs a fraction of a millimetre. Torque
+    /// control needs it.
     fn set_load(&mut self, load: Load) -> Result<()> {
         self.load = load;
         Ok(())
@@ -196,7 +197,7 @@ impl Arm for Workcell {
 
     fn recover(&mut self) -> Result<()> {
         if self.fault() == Some(ArmFaultKind::Reflex) {
-            return Err(RobotError::Reflex("what caused it is still there".to_owned()));
+            return Err(RobotError::Reflex("its cause is still present".to_owned()));
         }
         self.is_in_reflex = false;
         Ok(())

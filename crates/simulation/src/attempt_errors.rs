@@ -1,4 +1,4 @@
-//! What can be wrong in a workcell while it grasps: where the camera is believed to be, what the pads hold, a shaken hand.
+//! Errors of a workcell during grasps: a wrong camera pose, worn pads, a shaken hand.
 
 use std::f64::consts::TAU;
 
@@ -6,22 +6,22 @@ use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
-/// How far beside its true place the camera is believed to be, in metres, and how far it is turned, in degrees.
+/// Error of the assumed camera position, in metres, and of its orientation, in degrees.
 const HAND_EYE_SHIFT_M: f64 = 0.002;
 const HAND_EYE_TURN_DEG: f64 = 0.5;
 
 /// Sliding friction of worn or dusty pads.
 const PAD_FRICTIONS: std::ops::Range<f64> = 0.6..0.8;
 
-/// How far the hand swings to either side, in metres, how often in a second, and for how long, in seconds.
+/// Amplitude of the hand's swing, in metres, its frequency, in Hz, and its duration, in seconds.
 const SHAKE_AMPLITUDES_M: std::ops::Range<f64> = 0.020..0.030;
 const SHAKE_FREQUENCIES_HZ: std::ops::Range<f64> = 2.0..3.0;
 const SHAKE_SECS: f64 = 1.0;
 
-/// A hand that swings to and fro along a horizontal line.
+/// A hand that swings along a horizontal line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shake {
-    /// The farthest from the middle, in metres; less where the arm's limits ask for it.
+    /// Amplitude, in metres; less if the arm's limits require it.
     pub amplitude_m: f64,
     /// Frequency, Hz.
     pub frequency_hz: f64,
@@ -31,45 +31,46 @@ pub struct Shake {
     pub direction_rad: f64,
 }
 
-/// What goes wrong with the arm or its hand.
+/// A fault of the arm or its hand.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ArmFaultKind {
-    /// A joint's position is reported as no number.
+    /// A joint's position is reported as NaN.
     NotANumber,
-    /// A joint's position is reported a radian beside.
+    /// A joint's position is reported with an error of a radian.
     Jump,
     /// The arm stops itself, as after a contact.
     Reflex,
-    /// The hand does not follow commands any more.
+    /// The hand no longer follows commands.
     HandStuck,
 }
 
-/// A fault of the arm from a time on.
+/// A fault of the arm from a given time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ArmFault {
-    /// From when on, in seconds of simulated time.
+    /// Its start, in seconds of simulated time.
     pub at_secs: f64,
     /// Kind of the fault.
     pub kind: ArmFaultKind,
 }
 
-/// Errors of a workcell; by default there is none, and nothing changes.
+/// Errors of a workcell; none by default.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct AttemptErrors {
-    /// The error of the pose that perception is given for the camera, in the camera's own frame.
+    /// The error of the camera pose given to perception, in the camera's own frame.
     pub camera_from_assumed: Option<Isometry3<f64>>,
     /// Sliding friction of the pads. They then lose their priority: MuJoCo takes the larger of the pad's and the part's.
     pub pad_friction: Option<f64>,
-    /// What the arm does between lifting and holding.
+    /// The arm's motion between lifting and holding.
     pub shake: Option<Shake>,
-    /// What goes wrong with the arm.
+    /// The arm's fault.
     pub arm_fault: Option<ArmFault>,
-    /// What dry friction takes in every joint while the arm is driven by torques, N·m. Its control of joint positions makes up for it.
+    /// Dry friction in every joint while the arm is driven by torques, N·m. Its control of joint positions compensates
+    /// it.
     pub joint_friction_nm: f64,
 }
 
 impl AttemptErrors {
-    /// A hand-eye calibration that is wrong by 2 mm and 0.5 degrees, in directions of the seed.
+    /// A hand-eye calibration with an error of 2 mm and 0.5 degrees, in directions drawn from the seed.
     pub fn hand_eye(seed: u64) -> Self {
         let rng = &mut Pcg64Mcg::seed_from_u64(seed ^ 0x4841_4e44_5f45_5945);
         let shift = direction(rng).into_inner() * HAND_EYE_SHIFT_M;
@@ -77,13 +78,13 @@ impl AttemptErrors {
         Self { camera_from_assumed: Some(Isometry3::from_parts(Translation3::from(shift), turn)), ..Self::default() }
     }
 
-    /// Pads with a friction of 0.6 to 0.8 by the seed, without priority.
+    /// Pads with a friction of 0.6 to 0.8, drawn from the seed, without priority.
     pub fn friction(seed: u64) -> Self {
         let rng = &mut Pcg64Mcg::seed_from_u64(seed ^ 0x4652_4943_5449_4f4e);
         Self { pad_friction: Some(rng.random_range(PAD_FRICTIONS)), ..Self::default() }
     }
 
-    /// A hand that is shaken for a second after lifting: 20 to 30 mm to either side, two to three times a second.
+    /// A hand shaken for a second after lifting: 20 to 30 mm to either side, at 2 to 3 Hz.
     pub fn shake(seed: u64) -> Self {
         let rng = &mut Pcg64Mcg::seed_from_u64(seed ^ 0x5348_414b_4531_3233);
         let shake = Shake {
@@ -96,7 +97,7 @@ impl AttemptErrors {
     }
 }
 
-/// A direction, all equally likely.
+/// A uniformly distributed direction.
 fn direction(rng: &mut Pcg64Mcg) -> Unit<Vector3<f64>> {
     let (z, around) = (rng.random_range(-1.0..1.0f64), rng.random_range(0.0..TAU));
     let across = (1.0 - z * z).sqrt();

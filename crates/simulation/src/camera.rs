@@ -1,4 +1,4 @@
-//! A camera of the model as the rest of the project sees it: a picture with its place in the world.
+//! A camera of the model in the project's conventions: a picture with the camera's pose in the world.
 //!
 //! MuJoCo's camera frame has x right, y up and looks along -z; the optical frame used everywhere
 //! else has x right, y down and looks along z. The two differ by half a turn about x.
@@ -14,7 +14,7 @@ use crate::error::Result;
 use crate::model::{Camera, Id};
 use crate::render::Renderer;
 
-/// Focal length of the wrist camera in pixels, as the paper has it.
+/// Focal length of the wrist camera in pixels, as in the paper.
 pub const WRIST_FOCAL_LENGTH_PX: f64 = 550.0;
 
 /// A picture and the camera that took it, posed in the world (the robot's base frame).
@@ -27,7 +27,7 @@ pub struct CameraView {
 }
 
 impl CameraView {
-    /// Takes a picture with a camera of the model, as it stands in `data` now.
+    /// Takes a picture with a camera of the model, in the present state of `data`.
     ///
     /// # Errors
     /// As [`Renderer::image`].
@@ -47,7 +47,7 @@ pub fn posed_camera(renderer: &Renderer, data: &Data, camera: Id<Camera>) -> Pos
     }
 }
 
-/// The vertical field of view, in radians, at which a picture has a focal length.
+/// The vertical field of view, in radians, for which a picture has a focal length.
 pub fn vertical_field_of_view_rad(focal_px: f64, height_px: u32) -> f64 {
     2.0 * (0.5 * f64::from(height_px) / focal_px).atan()
 }
@@ -67,7 +67,7 @@ mod tests {
     use crate::model::{Geom, Model};
     use crate::render::RenderConfig;
 
-    /// Three balls that tell right from left and up from down, seen from the side by a tilted camera.
+    /// Three balls that distinguish right from left and up from down, seen from the side by a tilted camera.
     fn scene() -> (Data, Renderer) {
         let fovy = vertical_field_of_view_rad(WRIST_FOCAL_LENGTH_PX, 480).to_degrees();
         let xml = format!(
@@ -110,7 +110,7 @@ mod tests {
             };
             let found = (mean(|p| p.0), mean(|p| p.1));
             // A ball's outline is an ellipse around nearly its centre; a tenth of a pixel is the
-            // raster's own error on its mean.
+            // raster's own error of its mean.
             assert!(
                 (found.0 - expected.x).hypot(found.1 - expected.y) < 0.25,
                 "{name}: found {found:?}, expected {expected:?}"

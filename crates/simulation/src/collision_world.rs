@@ -1,5 +1,5 @@
-//! MuJoCo's own collisions of every shape of the arm with itself and with obstacles: what the collision model of
-//! `sdg-kinematics` is compared with.
+//! MuJoCo's own collisions of every shape of the arm with itself and with obstacles: the reference for the
+//! collision model of `sdg-kinematics`.
 
 use std::sync::Arc;
 
@@ -12,26 +12,27 @@ use crate::model::{Asset, Geom, Id, Model};
 use crate::obstacles::obstacles_mjcf;
 use crate::panda::{PANDA_FILE, PandaIds, panda_asset};
 
-/// Two things of the world that overlap.
+/// Two overlapping bodies.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Overlap {
     /// Bodies of the arm, or an obstacle's name.
     pub between: [String; 2],
-    /// How deep, m.
+    /// Depth, m.
     pub depth_m: f64,
 }
 
 /// The simulated Panda among obstacles, without time.
 ///
-/// All visible shapes of the arm meet each other and the obstacles; the simpler ones that touch in attempts meet the obstacles.
+/// All visible shapes of the arm collide with each other and with the obstacles; the simpler collision shapes of
+/// attempts collide with the obstacles.
 pub struct CollisionWorld {
     data: Data,
     ids: PandaIds,
     names: Vec<String>,
 }
 
-/// Bodies that touch by construction: neighbours, and the fingers when closed. MuJoCo leaves out parents and children by
-/// itself, except beside the world.
+/// Bodies that touch by construction: neighbours, and the fingers when closed. MuJoCo itself excludes pairs of parent
+/// and child, except for children of the world.
 const EXCLUDED: &str = "<contact><exclude body1=\"link0\" body2=\"link1\"/>\
                         <exclude body1=\"left_finger\" body2=\"right_finger\"/></contact>";
 
@@ -41,7 +42,7 @@ impl CollisionWorld {
     /// # Errors
     /// As [`Model::from_xml`].
     pub fn new(obstacles: &[Obstacle], opening_m: f64) -> Result<Self> {
-        // Bits: obstacles 1, what is seen of the arm 2.
+        // Bits: obstacles 1, visible shapes of the arm 2.
         let text = String::from_utf8_lossy(&panda_asset().bytes)
             .replace("contype=\"2\" conaffinity=\"1\"", "contype=\"0\" conaffinity=\"1\"")
             .replace("contype=\"0\" conaffinity=\"0\"", "contype=\"2\" conaffinity=\"3\"");
@@ -65,7 +66,7 @@ impl CollisionWorld {
         Ok(Self { data, ids, names })
     }
 
-    /// Everything that overlaps at a configuration.
+    /// All overlaps at a configuration.
     ///
     /// # Errors
     /// [`crate::SimulationError::Unstable`] for positions that are not finite.

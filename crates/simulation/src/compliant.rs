@@ -1,4 +1,4 @@
-//! The simulated Panda driven by torques, and what it feels: for coming down softly.
+//! The simulated Panda driven by torques, and its force measurement: for compliant descents.
 
 use nalgebra::{SMatrix, Vector3, Vector6};
 use sdg_kinematics::dynamics::GRAVITY_M_S2;
@@ -11,14 +11,14 @@ use crate::error::Result;
 use crate::panda::{NUM_ARM_JOINTS, PandaIds};
 use crate::workcell::Workcell;
 
-/// From this velocity on most of the friction acts, rad/s: slower, the simulation's step would be too long for it.
+/// Velocity above which most of the friction acts, rad/s: for a lower one the simulation's step would be too long.
 const FULL_FRICTION_RAD_S: f64 = 0.02;
-/// Cut-off of what is felt, Hz: a robot's own estimate is filtered.
+/// Cut-off of the measured force, Hz: a robot's own estimate is filtered.
 const CUTOFF_HZ: f64 = 30.0;
 /// Keeps the least squares bounded at singular poses.
 const DAMPING: f64 = 1e-4;
 
-/// What dry friction takes of a joint's torque at a velocity (rad/s), N·m.
+/// Dry friction of a joint's torque at a velocity (rad/s), N·m.
 pub(crate) fn friction_torque_nm(friction_nm: f64, velocity_rad_s: f64) -> f64 {
     friction_nm * (velocity_rad_s / FULL_FRICTION_RAD_S).tanh()
 }
@@ -35,7 +35,7 @@ fn load_torque(panda: &ArmGeometry, q: &JointVector, load: &Load) -> JointVector
     })
 }
 
-/// The vertical force on the hand from outside, upwards, N: least squares over what contacts exert on the joints.
+/// The vertical external force on the hand, upwards, N: by least squares from the contact torques of the joints.
 fn felt_n(panda: &ArmGeometry, ids: &PandaIds, data: &Data) -> f64 {
     let joints = ids.qvel_indices();
     let torque = JointVector::from_fn(|joint, _| data.qfrc_constraint()[joints[joint]]);
@@ -48,19 +48,19 @@ fn felt_n(panda: &ArmGeometry, ids: &PandaIds, data: &Data) -> f64 {
 }
 
 impl Workcell {
-    /// Notes what the hand feels now.
+    /// Records the present force on the hand.
     pub(crate) fn feel(&mut self) {
         let gain = PERIOD_SECS / (PERIOD_SECS + 1.0 / (std::f64::consts::TAU * CUTOFF_HZ));
         self.felt_n += (felt_n(&self.panda, &self.panda_ids, &self.data) - self.felt_n) * gain;
         self.peak_felt_n = self.peak_felt_n.max(self.felt_n.abs());
     }
 
-    /// The largest vertical force on the hand since this was asked last, as a robot estimates it, N: what it carries counts, too.
+    /// The largest vertical force on the hand since the last call, as a robot estimates it, N, including its load.
     pub fn take_peak_felt_n(&mut self) -> f64 {
         std::mem::take(&mut self.peak_felt_n)
     }
 
-    /// One period under torques that come to those that hold the arm and its load, less friction.
+    /// One period under torques in addition to those that hold the arm and its load, minus friction.
     fn torque_tick(&mut self, torque: &JointVector) -> Result<()> {
         let q = self.panda_ids.position(&self.data);
         let dq = self.panda_ids.velocity(&self.data);
@@ -89,7 +89,7 @@ impl CompliantArm for Workcell {
             let (q, dq) = (self.panda_ids.position(&self.data), self.panda_ids.velocity(&self.data));
             let (torque, is_last) = descent.next(&panda, &q, &dq, self.felt_n);
             self.torque_tick(&torque)?;
-            // The controller of joint positions takes over where the arm is.
+            // The controller of joint positions takes over at the arm's position.
             self.set_reference(ArmReference::at_rest(self.panda_ids.position(&self.data)));
             if let Some(reason) = self.observe_moving(watch)? {
                 return Err(RobotError::Stopped(reason));

@@ -1,9 +1,9 @@
-//! Computed torque: the arm follows a reference in joint space.
+//! Computed torque control: the arm follows a reference in joint space.
 //!
-//! `tau = M(q) (qdd_ref + Kp (q_ref - q) + Kd (qd_ref - qd)) + bias(q, qd) - passive(q, qd)`, cut off at
+//! `tau = M(q) (qdd_ref + Kp (q_ref - q) + Kd (qd_ref - qd)) + bias(q, qd) - passive(q, qd)`, clamped at
 //! the motors' limits. With the model's own mass matrix the error of every joint then decays like a
-//! critically damped oscillator, whatever the posture. A grasped part is not in the bias; at the
-//! stiffness used it costs a fraction of a millimetre.
+//! critically damped oscillator in any posture. A grasped part is not in the bias; at this stiffness it
+//! causes an error of a fraction of a millimetre.
 
 use crate::data::Data;
 use crate::panda::{ArmVector, NUM_ARM_JOINTS, PandaIds};
@@ -51,7 +51,7 @@ impl Default for ArmController {
 impl ArmController {
     /// The torques for this instant, in N·m, within the limits.
     ///
-    /// `data` must hold the positions' and velocities' consequences (after [`Data::step1`]).
+    /// `data` must contain the values that follow from positions and velocities (after [`Data::step1`]).
     pub fn torque_nm(&self, data: &Data, panda: &PandaIds, reference: &ArmReference) -> ArmVector {
         let kp = self.frequency_rad_s * self.frequency_rad_s;
         let kd = 2.0 * self.damping_ratio * self.frequency_rad_s;

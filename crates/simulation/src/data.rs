@@ -1,4 +1,4 @@
-//! The state of a model at one instant, and its way through time.
+//! The state of a model at one instant, and its integration in time.
 
 use std::sync::Arc;
 
@@ -24,7 +24,7 @@ unsafe impl Send for Data {}
 /// Two geoms that touch.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Contact {
-    /// One of the two geoms; MuJoCo decides which.
+    /// One of the two geoms; MuJoCo defines the order.
     pub geom1: Id<Geom>,
     /// The other.
     pub geom2: Id<Geom>,
@@ -40,7 +40,7 @@ impl Data {
     /// The initial state of a model, positions of all things computed.
     ///
     /// # Errors
-    /// [`SimulationError::MuJoCo`] where memory runs out.
+    /// [`SimulationError::MuJoCo`] if memory runs out.
     pub fn new(model: Arc<Model>) -> Result<Self> {
         // SAFETY: the model is live.
         let ptr = guarded("mj_makeData", || unsafe { mj::mj_makeData(model.as_ptr()) })?;
@@ -52,7 +52,7 @@ impl Data {
         Ok(data)
     }
 
-    /// The model that this is a state of.
+    /// The model of this state.
     pub fn model(&self) -> &Arc<Model> {
         &self.model
     }
@@ -66,7 +66,7 @@ impl Data {
         self.ptr
     }
 
-    /// Puts the initial state back.
+    /// Restores the initial state.
     pub fn reset(&mut self) {
         // SAFETY: model and data are live and belong together.
         unsafe { mj::mj_resetData(self.model.as_ptr(), self.ptr) };
@@ -82,7 +82,7 @@ impl Data {
         self.check()
     }
 
-    /// Computes where everything is and what overlaps, and nothing else: no forces, no time.
+    /// Computes only positions and overlaps: no forces, no time step.
     ///
     /// # Errors
     /// [`SimulationError::MuJoCo`] or [`SimulationError::Unstable`].
@@ -95,7 +95,7 @@ impl Data {
         self.check()
     }
 
-    /// Pairs of geoms that overlap, and how deep (m), after [`Data::collide`].
+    /// Pairs of overlapping geoms, and the depths (m), after [`Data::collide`].
     pub(crate) fn overlaps(&self) -> impl Iterator<Item = (Id<Geom>, Id<Geom>, f64)> + '_ {
         let raw = self.raw();
         // SAFETY: the array has `ncon` valid entries and lives as long as the data.
@@ -106,7 +106,7 @@ impl Data {
             .map(|contact| (Id::new(contact.geom1 as usize), Id::new(contact.geom2 as usize), -contact.dist))
     }
 
-    /// Moves one timestep on.
+    /// Advances by one timestep.
     ///
     /// # Errors
     /// [`SimulationError::MuJoCo`] or [`SimulationError::Unstable`].
@@ -137,8 +137,8 @@ impl Data {
         self.check()
     }
 
-    /// MuJoCo answers bad numbers and a full contact list with a warning and, for the former, a
-    /// silent reset; neither may pass for physics.
+    /// MuJoCo reports invalid numbers and a full contact list by a warning and, for the former, a
+    /// silent reset; both must become errors.
     fn check(&self) -> Result<()> {
         let bad = [
             mj::mjWARN_BADQPOS,
@@ -184,20 +184,20 @@ impl Data {
         unsafe { std::slice::from_raw_parts_mut(self.raw().qvel, self.model.raw().nv as usize) }
     }
 
-    /// What the motors are set to, in the units of the actuators.
+    /// The controls of the motors, in the units of the actuators.
     pub fn ctrl(&self) -> &[f64] {
         // SAFETY: the array has `nu` entries and lives as long as the data.
         unsafe { std::slice::from_raw_parts(self.raw().ctrl, self.model.raw().nu as usize) }
     }
 
-    /// Controls, one an actuator, to be set (N·m and N for motors).
+    /// Controls, one per actuator, to be set (N·m and N for motors).
     pub fn ctrl_mut(&mut self) -> &mut [f64] {
         // SAFETY: the array has `nu` entries, lives as long as the data, and `self` is borrowed
         // mutably.
         unsafe { std::slice::from_raw_parts_mut(self.raw().ctrl, self.model.raw().nu as usize) }
     }
 
-    /// Gravity, Coriolis and centrifugal forces as the joints have to balance them (N·m, N).
+    /// Gravity, Coriolis and centrifugal forces that the joints have to balance (N·m, N).
     pub fn qfrc_bias(&self) -> &[f64] {
         // SAFETY: the array has `nv` entries and lives as long as the data.
         unsafe { std::slice::from_raw_parts(self.raw().qfrc_bias, self.model.raw().nv as usize) }
@@ -209,7 +209,7 @@ impl Data {
         unsafe { std::slice::from_raw_parts(self.raw().qfrc_passive, self.model.raw().nv as usize) }
     }
 
-    /// What contacts and joint limits exerted on the joints in the last step (N·m, N).
+    /// Forces of contacts and joint limits on the joints in the last step (N·m, N).
     pub fn qfrc_constraint(&self) -> &[f64] {
         // SAFETY: the array has `nv` entries and lives as long as the data.
         unsafe { std::slice::from_raw_parts(self.raw().qfrc_constraint, self.model.raw().nv as usize) }
@@ -228,7 +228,7 @@ impl Data {
     /// Pose of a body in the world.
     pub fn world_from_body(&self, body: Id<Body>) -> Isometry3<f64> {
         assert!(body.index() < Body::count(&self.model), "{body:?} is not of this model");
-        // SAFETY: the arrays have 3 and 4 entries a body.
+        // SAFETY: the arrays have 3 and 4 entries per body.
         let (position, quaternion) = unsafe {
             (
                 *self.raw().xpos.add(3 * body.index()).cast::<[f64; 3]>(),
@@ -241,25 +241,25 @@ impl Data {
     /// Pose of a site in the world.
     pub fn world_from_site(&self, site: Id<Site>) -> Isometry3<f64> {
         assert!(site.index() < Site::count(&self.model), "{site:?} is not of this model");
-        // SAFETY: the arrays have 3 and 9 entries a site.
+        // SAFETY: the arrays have 3 and 9 entries per site.
         unsafe { isometry_at(self.raw().site_xpos, self.raw().site_xmat, site.index()) }
     }
 
-    /// Where a camera stands, in MuJoCo's camera frame (x right, y up, looking along -z).
+    /// The pose of a camera, in MuJoCo's camera frame (x right, y up, looking along -z).
     pub fn world_from_mujoco_camera(&self, camera: Id<Camera>) -> Isometry3<f64> {
         assert!(camera.index() < Camera::count(&self.model), "{camera:?} is not of this model");
-        // SAFETY: the arrays have 3 and 9 entries a camera.
+        // SAFETY: the arrays have 3 and 9 entries per camera.
         unsafe { isometry_at(self.raw().cam_xpos, self.raw().cam_xmat, camera.index()) }
     }
 
-    /// Where a geom's centre stands.
+    /// The centre of a geom.
     pub fn world_from_geom(&self, geom: Id<Geom>) -> Isometry3<f64> {
         assert!(geom.index() < Geom::count(&self.model), "{geom:?} is not of this model");
-        // SAFETY: the arrays have 3 and 9 entries a geom.
+        // SAFETY: the arrays have 3 and 9 entries per geom.
         unsafe { isometry_at(self.raw().geom_xpos, self.raw().geom_xmat, geom.index()) }
     }
 
-    /// Sets the pose of a free joint (its body's pose in the world) and stops it.
+    /// Sets the pose of a free joint (its body's pose in the world) and sets its velocity to zero.
     pub fn place(&mut self, free_joint: Id<Joint>, world_from_body: &Isometry3<f64>) {
         let (position, velocity) = (self.model.qpos_index(free_joint), self.model.qvel_index(free_joint));
         let (p, q) = (world_from_body.translation.vector, world_from_body.rotation);
@@ -274,7 +274,7 @@ impl Data {
         let contacts = unsafe { std::slice::from_raw_parts(raw.contact, raw.ncon as usize) };
         contacts.iter().enumerate().filter(|(_, contact)| contact.efc_address >= 0).map(|(index, contact)| {
             let mut force = [0.0; 6];
-            // SAFETY: the index is below `ncon` and the output has the six entries asked for.
+            // SAFETY: the index is below `ncon` and the output has the six requested entries.
             unsafe { mj::mj_contactForce(self.model.as_ptr(), self.ptr, index as i32, force.as_mut_ptr()) };
             Contact {
                 geom1: Id::new(contact.geom1 as usize),

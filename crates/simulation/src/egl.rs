@@ -11,7 +11,7 @@ const PLATFORM_SURFACELESS_MESA: egl::Enum = 0x31DD;
 
 type Egl = egl::DynamicInstance<egl::EGL1_5>;
 
-/// EGL and its display: opened once a process and left open, since MuJoCo keeps pointers to
+/// EGL and its display: opened once per process and never closed, because MuJoCo keeps pointers to
 /// functions of the driver.
 struct Surfaceless {
     egl: Egl,
@@ -30,7 +30,7 @@ fn surfaceless() -> Result<&'static Surfaceless> {
     SURFACELESS.get_or_init(open).as_ref().map_err(|reason| SimulationError::Rendering { reason: reason.clone() })
 }
 
-/// Opens EGL and its display, once a process.
+/// Opens EGL and its display, once per process.
 pub(crate) fn load() -> Result<()> {
     surfaceless().map(|_| ())
 }
@@ -38,7 +38,7 @@ pub(crate) fn load() -> Result<()> {
 fn open() -> std::result::Result<Surfaceless, String> {
     // SAFETY: loading libEGL runs its initialisers only; Debian's has no precondition.
     let egl = unsafe { Egl::load_required() }.map_err(|error| format!("libEGL.so.1 could not be loaded ({error})"))?;
-    // SAFETY: the default display is what the surfaceless platform expects, with an empty list of
+    // SAFETY: the surfaceless platform expects the default display, with an empty list of
     // attributes.
     let display =
         unsafe { egl.get_platform_display(PLATFORM_SURFACELESS_MESA, egl::DEFAULT_DISPLAY, &[egl::ATTRIB_NONE]) }
@@ -59,11 +59,11 @@ struct Unused(egl::Context);
 // SAFETY: an EGL context may be made current on any thread as long as it is current on no other (EGL 1.5, section 3.7.3).
 unsafe impl Send for Unused {}
 
-/// Contexts not in use. The driver compiles its shaders anew for each new context, which takes longer than a
-/// picture; one that was used before has them.
+/// Unused contexts. The driver compiles its shaders for each new context, which takes longer than a picture;
+/// a used one already has them.
 static UNUSED: Mutex<Vec<Unused>> = Mutex::new(Vec::new());
 
-/// An OpenGL context of its own, current on no thread except while a [`Current`] lives.
+/// A separate OpenGL context, current on no thread except while a [`Current`] lives.
 pub(crate) struct OffscreenContext {
     egl: &'static Surfaceless,
     context: egl::Context,
@@ -76,7 +76,7 @@ impl OffscreenContext {
             return Ok(Self { egl: surfaceless, context });
         }
         let failed = |error| SimulationError::Rendering { reason: format!("no OpenGL context ({error})") };
-        // The bound API is a thread's own state.
+        // The bound API is a property of each thread.
         surfaceless.egl.bind_api(egl::OPENGL_API).map_err(failed)?;
         let context = surfaceless
             .egl
@@ -108,7 +108,7 @@ pub(crate) struct Current {
 
 impl Drop for Current {
     fn drop(&mut self) {
-        // On failure the context stays current here and the next `make_current` says so.
+        // On failure the context stays current here and the next `make_current` reports it.
         let _ = self.egl.egl.make_current(self.egl.display, None, None, None);
     }
 }

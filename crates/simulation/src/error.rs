@@ -1,35 +1,35 @@
-//! What can go wrong in the simulation.
+//! Errors of the simulation.
 
 use std::path::PathBuf;
 
 use sdg_robot::RobotError;
 
-/// An error of the simulation; a grasp that fails is not one of them (see `sdg_robot::GraspOutcome`).
+/// An error of the simulation; a failed grasp is not one (see `sdg_robot::GraspOutcome`).
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum SimulationError {
-    /// There is no libmujoco, or not the version that the bindings describe.
+    /// libmujoco is missing, or its version differs from that of the bindings.
     #[error(transparent)]
     Library(#[from] sdg_mujoco_sys::LibraryError),
 
     /// MuJoCo refused an MJCF model.
     #[error("MuJoCo could not load the model: {message}")]
     Model {
-        /// MuJoCo's own words, with the line of the XML where it gives one.
+        /// MuJoCo's own message, with the line of the XML if it gives one.
         message: String,
     },
 
-    /// A file of the model could not be handed to MuJoCo.
+    /// A file of the model could not be passed to MuJoCo.
     #[error("asset {name:?} of the model: {reason}")]
     Asset {
-        /// File name under which the MJCF asks for it.
+        /// File name in the MJCF.
         name: String,
-        /// What is wrong with it.
+        /// Its error.
         reason: String,
     },
 
-    /// MuJoCo stopped in the middle of a computation.
+    /// MuJoCo stopped during a computation.
     #[error("MuJoCo stopped in {call}: {message}")]
     MuJoCo {
         /// The function that was called.
@@ -50,7 +50,7 @@ pub enum SimulationError {
     UnknownName {
         /// Body, joint, geom, site, camera or actuator.
         kind: &'static str,
-        /// The name that was asked for.
+        /// The requested name.
         name: String,
         existing: Vec<String>,
     },
@@ -58,7 +58,7 @@ pub enum SimulationError {
     /// No OpenGL context could be made without a display.
     #[error("offscreen OpenGL through EGL failed: {reason}. On Debian 12: `apt-get install libegl1 libgl1-mesa-dri`")]
     Rendering {
-        /// The step that failed and EGL's or MuJoCo's own words.
+        /// The step that failed and the message of EGL or MuJoCo.
         reason: String,
     },
 
@@ -66,22 +66,22 @@ pub enum SimulationError {
     #[error("{}: {reason}", path.display())]
     File {
         path: PathBuf,
-        /// What is wrong with it: expected and found.
+        /// Its error: expected and found.
         reason: String,
     },
 
-    /// A number of a configuration is out of its range.
+    /// A number of a configuration is out of range.
     #[error("{field}: expected {expected}, found {found}")]
     Configuration {
         /// Name of the configuration's field.
         field: &'static str,
-        /// The range that is allowed.
+        /// The allowed range.
         expected: String,
-        /// The value that was given.
+        /// The given value.
         found: String,
     },
 
-    /// Perception itself failed (which is not the same as seeing nothing).
+    /// Perception itself failed (which differs from finding nothing).
     #[error("perception failed: {0}")]
     Perception(String),
 

@@ -1,4 +1,4 @@
-//! How low a body reaches.
+//! The lowest point of a body.
 
 use nalgebra::Vector3;
 use sdg_mujoco_sys as mj;
@@ -8,8 +8,8 @@ use crate::model::{Body, Geom, Id};
 
 /// Height of the lowest point of a body's solid shapes in the world, in metres.
 ///
-/// Solid are the shapes that can touch something; what is only seen does not count. Bodies without
-/// any have their origin's height.
+/// Solid shapes are those that can touch something; shapes that are only visible do not count. A
+/// body without solid shapes has its origin's height.
 pub fn lowest_point_m(data: &Data, body: Id<Body>) -> f64 {
     let model = data.model();
     let raw = model.raw();
@@ -30,7 +30,7 @@ pub fn lowest_point_m(data: &Data, body: Id<Body>) -> f64 {
         .unwrap_or_else(|| data.world_from_body(body).translation.z)
 }
 
-/// How far a geom reaches from its centre in a direction of its own frame (its support function).
+/// The extent of a geom from its centre in a direction of its own frame (its support function).
 fn reach(raw: &mj::mjModel, geom: usize, direction: &Vector3<f64>) -> f64 {
     // SAFETY: `geom_type` and `geom_dataid` have `ngeom` entries, `geom_size` three times as many.
     let (kind, size, mesh) = unsafe {
@@ -91,14 +91,15 @@ mod tests {
         }
     }
 
-    /// Every visible shape of the arm lies within one capsule of its link, so that links whose capsules are apart are apart.
+    /// Every visible shape of the arm lies within one capsule of its link, so that links with separate capsules are
+    /// separate.
     #[test]
     fn the_capsules_of_the_robot_hold_the_simulated_arm() {
         use crate::panda::{FINGER_TRAVEL_M, PandaIds, panda_asset};
         use sdg_kinematics::ArmGeometry;
         use sdg_kinematics::collision::Capsule;
 
-        // Directions on a spiral over the sphere, some three degrees apart.
+        // Directions on a spiral over the sphere, about three degrees apart.
         let directions: Vec<Vector3<f64>> = (0..4000)
             .map(|i| {
                 let z = 1.0 - (2 * i + 1) as f64 / 4000.0;
@@ -141,11 +142,11 @@ mod tests {
                 num_held += 1;
             }
         }
-        assert!(num_held > 100, "{num_held} shapes were looked at");
+        assert!(num_held > 100, "{num_held} shapes were examined");
     }
 
-    /// How the planner's capsules fit: no visible shape of a link stands out of them, and they stand out of the link's shapes, visible and touching
-    /// ones, by no more than is said.
+    /// Tests the fit of the planner's capsules: they contain all visible shapes of a link, and extend beyond the link's
+    /// shapes, visible and colliding ones, by at most the given distance.
     #[test]
     fn the_capsules_of_the_planner_fit_the_simulated_arm() {
         use crate::panda::{PandaIds, panda_asset};
@@ -154,7 +155,8 @@ mod tests {
 
         /// The joints' blunt ends are flat, those of capsules round.
         const MAX_EXCESS_M: f64 = 0.045;
-        /// Surface points are found from directions two degrees apart, which puts those of large flat faces that much too far out.
+        /// Surface points are computed from directions two degrees apart, which moves those of large flat faces
+        /// outwards by this distance.
         const ROUNDING_M: f64 = 0.0015;
         const OPENING_M: f64 = 0.05;
         let directions = |count: usize| -> Vec<Vector3<f64>> {
@@ -216,7 +218,7 @@ mod tests {
                         .map(|(n, h)| h / n.dot(ray))
                         .fold(f64::INFINITY, f64::min);
                     let p = centre + ray * to_surface;
-                    // The foot's underside stands on the table.
+                    // The foot's underside is on the table.
                     if body > 0 || p.z > 0.02 {
                         uncovered_m = uncovered_m.max(to_capsules(&p));
                     }

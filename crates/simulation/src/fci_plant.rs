@@ -16,7 +16,7 @@ use crate::panda::{FINGER_TRAVEL_M, NUM_ARM_JOINTS, PANDA_FILE, PandaIds, panda_
 use crate::self_distance::LinkCapsules;
 use crate::workcell::{WorkcellConfig, build_model};
 
-/// The generalised positions of a plant, for others to look at while a server owns it; see [`PandaPlant::positions`].
+/// The generalised positions of a plant, for readers while a server owns it; see [`PandaPlant::positions`].
 #[derive(Debug, Clone, Default)]
 pub struct SharedPositions(Arc<Mutex<Vec<f64>>>);
 
@@ -40,10 +40,10 @@ pub struct PandaPlant {
     panda: ArmGeometry,
     gripper: Gripper,
     capsules: LinkCapsules,
-    /// Arm and hand alone, at rest: what gravity takes.
+    /// Arm and hand alone, at rest: the torques of gravity.
     standing: (Data, PandaIds),
     positions: SharedPositions,
-    /// What each joint takes of its motor's torque while it moves, N·m.
+    /// Friction of each joint's motor torque during motion, N·m.
     friction_nm: f64,
 }
 
@@ -51,7 +51,7 @@ impl PandaPlant {
     /// A scene at its start: the arm at rest in its ready pose, the hand open.
     ///
     /// # Errors
-    /// `Model` where MuJoCo refuses the scene, `Library` for the wrong libmujoco, `Unstable` for an impossible scene.
+    /// `Model` if MuJoCo refuses the scene, `Library` for the wrong libmujoco, `Unstable` for an impossible scene.
     pub fn new(config: &WorkcellConfig) -> Result<Self> {
         let model = build_model(config, "")?;
         let ids = PandaIds::find(&model)?;
@@ -61,7 +61,8 @@ impl PandaPlant {
         Self::from_data(data, ids)
     }
 
-    /// As [`PandaPlant::new`] with all things where a workcell of the same configuration has them ([`Data::qpos`]), at rest.
+    /// As [`PandaPlant::new`] with everything at its position in a workcell of the same configuration ([`Data::qpos`]),
+    /// at rest.
     ///
     /// # Errors
     /// As [`PandaPlant::new`].
@@ -95,13 +96,13 @@ impl PandaPlant {
         })
     }
 
-    /// The same with dry friction in every joint that the robot does not make up for, N·m.
+    /// The same with dry friction in every joint that the robot does not compensate, N·m.
     #[must_use]
     pub fn with_friction_nm(self, friction_nm: f64) -> Self {
         Self { friction_nm, ..self }
     }
 
-    /// The positions of all things, kept up to date while the plant moves.
+    /// The positions of everything, updated while the plant moves.
     pub fn positions(&self) -> SharedPositions {
         self.positions.clone()
     }
@@ -152,7 +153,7 @@ impl Plant for PandaPlant {
         let joints = *self.ids.qvel_indices();
         let dq = self.ids.velocity(&self.data);
         for joint in 0..NUM_ARM_JOINTS {
-            // A robot's torque sensors sit behind the gears, whose friction its own control makes up for.
+            // A robot's torque sensors are behind the gears, whose friction its own control compensates.
             let compensated = self.data.qfrc_passive()[joints[joint]];
             let friction = friction_torque_nm(self.friction_nm, dq[joint]);
             self.data.ctrl_mut()[self.ids.motors[joint].index()] = torque[joint] - compensated - friction;
@@ -165,8 +166,8 @@ impl Plant for PandaPlant {
     }
 
     fn move_hand(&mut self, width_m: f64, speed_m_s: f64, force_n: f64) {
-        // The fingers set out from where they are: the reference of what pressed before stands up to 14 mm beyond them, and
-        // would have to come back first.
+        // The fingers start from their present position: the reference of earlier pressing is up to 14 mm beyond it,
+        // and would have to return first.
         self.gripper = Gripper::at_opening_m(self.hand_width().0);
         self.gripper.drive(width_m, speed_m_s, force_n);
     }

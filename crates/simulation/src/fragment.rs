@@ -1,4 +1,4 @@
-//! A piece of an MJCF model with the files that it names.
+//! A fragment of an MJCF model with its files.
 
 use std::fmt::Write as _;
 
@@ -8,12 +8,12 @@ use crate::model::Asset;
 use crate::shapes::mesh::TriangleMesh;
 use crate::shapes::texture::Texture;
 
-/// Complete top-level sections (`<visual>`, `<asset>`, `<worldbody>`) to paste into a `<mujoco>` element.
+/// Complete top-level sections (`<visual>`, `<asset>`, `<worldbody>`) for insertion into a `<mujoco>` element.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct MjcfFragment {
     /// The MJCF text.
     pub sections: String,
-    /// The files that the text names: meshes and textures.
+    /// The files named by the text: meshes and textures.
     pub files: Vec<Asset>,
 }
 
@@ -24,7 +24,7 @@ impl MjcfFragment {
         self.files.extend(other.files);
     }
 
-    /// Wraps the fragment alone into a model, as a viewer or a test needs it.
+    /// Wraps the fragment alone into a model, for a viewer or a test.
     pub fn to_standalone_mjcf(&self) -> String {
         format!("<mujoco>\n{}</mujoco>\n", self.sections)
     }

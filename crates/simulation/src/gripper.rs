@@ -1,13 +1,13 @@
-//! The hand: its opening is controlled, and the force with which it presses is limited.
+//! The hand: its opening is controlled, and its pressing force is limited.
 //!
 //! Each finger follows a reference that moves at a limited speed towards the wanted opening, held by
-//! a stiff spring and a damper whose sum is cut off at the allowed force. In free space that is
+//! a stiff spring and a damper whose sum is clamped at the allowed force. In free space that is
 //! position control; against a part the spring saturates and it is force control.
 
 use crate::data::Data;
 use crate::panda::{FINGER_TRAVEL_M, PandaIds};
 
-/// Force that the hand can hold for long, each finger, in newtons.
+/// Force that the hand can hold permanently, each finger, in newtons.
 pub const MAX_FINGER_FORCE_N: f64 = 70.0;
 
 /// Stiffness of a finger in N/m, and its damping in N·s/m: 22 Hz and nearly critical with the
@@ -15,12 +15,12 @@ pub const MAX_FINGER_FORCE_N: f64 = 70.0;
 const STIFFNESS_N_M: f64 = 5000.0;
 const DAMPING_N_S_M: f64 = 65.0;
 
-/// What the hand is doing.
+/// The present action of the hand.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gripper {
     /// Wanted position of each finger in metres.
     target_m: f64,
-    /// Where the reference stands now, in metres.
+    /// The present reference, in metres.
     reference_m: f64,
     /// Speed of each finger in m/s.
     speed_m_s: f64,
@@ -40,16 +40,16 @@ impl Gripper {
         *self = Self { target_m: finger_position_m(opening_m), speed_m_s: 0.1, max_force_n: 30.0, ..*self };
     }
 
-    /// Starts to close until something resists with `force_n` newtons on each finger.
+    /// Starts to close until it meets a resistance of `force_n` newtons on each finger.
     pub fn grasp(&mut self, force_n: f64) {
-        // The reference may run into the part by what the spring needs to reach the force.
+        // The reference may move into the part as far as the spring needs to reach the force.
         let beyond = MAX_FINGER_FORCE_N / STIFFNESS_N_M;
         *self =
             Self { target_m: -beyond, speed_m_s: 0.05, max_force_n: force_n.clamp(0.0, MAX_FINGER_FORCE_N), ..*self };
     }
 
     /// Starts to move to an opening (m) at a speed of the opening (m/s), each finger pressing with `force_n` at most; openings
-    /// below zero press on what is between the fingers.
+    /// below zero press on an object between the fingers.
     pub fn drive(&mut self, opening_m: f64, speed_m_s: f64, force_n: f64) {
         let beyond = MAX_FINGER_FORCE_N / STIFFNESS_N_M;
         *self = Self {
@@ -60,14 +60,14 @@ impl Gripper {
         };
     }
 
-    /// Sets the fingers' motors for this instant and moves the reference on by `period_secs`.
+    /// Sets the fingers' motors for this instant and advances the reference by `period_secs`.
     pub fn apply(&mut self, data: &mut Data, panda: &PandaIds, period_secs: f64) {
         let step = self.speed_m_s * period_secs;
         let velocity = (self.target_m - self.reference_m).clamp(-step, step) / period_secs;
         self.reference_m += velocity * period_secs;
         let (position, speed) = (panda.finger_position_m(data), panda.finger_velocity_m_s(data));
-        // The reference waits for a finger that is held up, so that the force does not outlast the
-        // obstacle.
+        // The reference waits for a blocked finger, so that the force does not remain after the
+        // obstacle is gone.
         let lead = self.max_force_n / STIFFNESS_N_M;
         let mean = 0.5 * (position[0] + position[1]);
         self.reference_m = self.reference_m.clamp(mean - lead, mean + lead);

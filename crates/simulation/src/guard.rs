@@ -2,9 +2,9 @@
 //!
 //! By default MuJoCo writes its errors to a file and ends the process. Here an error unwinds from
 //! the handler through MuJoCo (which is built with unwind tables, and whose functions are bound as
-//! `C-unwind`) to [`guarded`], which turns it into a [`SimulationError::MuJoCo`]. Whatever MuJoCo
-//! had allocated in between is leaked, and the data it worked on is left half-computed; callers
-//! return the error and do not go on with that data.
+//! `C-unwind`) to [`guarded`], which turns it into a [`SimulationError::MuJoCo`]. Memory that
+//! MuJoCo allocated in between is leaked, and its data stays half-computed; callers return the
+//! error and do not use that data again.
 
 use std::any::Any;
 use std::cell::RefCell;
@@ -16,18 +16,18 @@ use sdg_mujoco_sys as mj;
 
 use crate::error::{Result, SimulationError};
 
-/// What the error handler throws.
+/// The payload thrown by the error handler.
 struct MuJoCoError(String);
 
 thread_local! {
-    /// Warnings that MuJoCo gave on this thread since they were last taken.
+    /// MuJoCo's warnings on this thread since they were last taken.
     static WARNINGS: RefCell<Vec<String>> = const { RefCell::new(Vec::new()) };
 }
 
-/// Loads the library and installs the handlers, once a process.
+/// Loads the library and installs the handlers, once per process.
 ///
 /// # Errors
-/// [`SimulationError::Library`] where there is no libmujoco, or of another version than the bindings.
+/// [`SimulationError::Library`] if libmujoco is missing, or of another version than the bindings.
 pub(crate) fn initialise() -> Result<()> {
     static INITIALISED: OnceLock<std::result::Result<(), mj::LibraryError>> = OnceLock::new();
     INITIALISED
@@ -44,7 +44,7 @@ pub(crate) fn initialise() -> Result<()> {
 
 /// Runs a call of MuJoCo and turns its error handler's unwinding into an error.
 pub(crate) fn guarded<T>(call: &'static str, body: impl FnOnce() -> T) -> Result<T> {
-    // Unwind safety: what the closure leaves behind is C memory that the caller gives up on error.
+    // Unwind safety: after an error the closure leaves only C memory, which the caller no longer uses.
     catch_unwind(AssertUnwindSafe(body)).map_err(|payload: Box<dyn Any + Send>| {
         match payload.downcast::<MuJoCoError>() {
             Ok(error) => SimulationError::MuJoCo { call, message: error.0 },
@@ -53,7 +53,7 @@ pub(crate) fn guarded<T>(call: &'static str, body: impl FnOnce() -> T) -> Result
     })
 }
 
-/// Takes the warnings that MuJoCo gave on this thread.
+/// Takes MuJoCo's warnings on this thread.
 pub(crate) fn take_warnings() -> Vec<String> {
     WARNINGS.with_borrow_mut(std::mem::take)
 }

@@ -1,4 +1,4 @@
-//! MuJoCo's own inverse dynamics of the arm: what the torques of `sdg-kinematics` are compared with.
+//! MuJoCo's own inverse dynamics of the arm: the reference for the torques of `sdg-kinematics`.
 
 use std::sync::Arc;
 
@@ -22,7 +22,7 @@ impl InverseDynamics {
         Self::with_load(opening_m, 0.0, [0.0; 3])
     }
 
-    /// The same with a load as a point: its mass (kg) and its place in the flange's frame (m).
+    /// The same with a load as a point: its mass (kg) and its position in the flange's frame (m).
     ///
     /// # Errors
     /// As [`Model::from_xml`].
@@ -30,7 +30,7 @@ impl InverseDynamics {
         let mut text = String::from_utf8_lossy(&panda_asset().bytes).into_owned();
         if mass_kg > 0.0 {
             let [x, y, z] = center_in_flange_m;
-            // The smallest inertia that MuJoCo takes does not show beside the mass.
+            // The smallest inertia that MuJoCo accepts is negligible beside the mass.
             let load = format!(
                 "<body name=\"load\" pos=\"0 0 {}\"><inertial mass=\"{mass_kg}\" pos=\"{x} {y} {z}\" diaginertia=\"1e-12 1e-12 1e-12\"/></body>",
                 sdg_kinematics::ArmGeometry::panda().flange_offset_m
@@ -51,7 +51,7 @@ impl InverseDynamics {
         Ok(Self { data, ids })
     }
 
-    /// The torques (N·m) that give the arm its motion: positions in rad, velocities in rad/s, accelerations in rad/s².
+    /// The torques (N·m) of a motion: positions in rad, velocities in rad/s, accelerations in rad/s².
     ///
     /// # Errors
     /// [`crate::SimulationError::Unstable`] for numbers that are not finite.
@@ -83,7 +83,7 @@ mod tests {
 
     #[test]
     fn torques_are_mujocos() {
-        // Rounding of seven links: MuJoCo keeps quaternions, and turns of its XML have 16 digits.
+        // Rounding of seven links: MuJoCo stores quaternions, and rotations in its XML have 16 digits.
         const TOLERANCE: f64 = 1e-9;
         let mut rng = Pcg64::seed_from_u64(71);
         for load in [None, Some((0.7, [0.02, -0.01, 0.15])), Some((3.0, [0.0, 0.0, 0.1034]))] {

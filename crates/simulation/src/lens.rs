@@ -1,4 +1,4 @@
-//! Pictures of cameras that MuJoCo cannot draw: with distortion, and with the optical axis beside the middle.
+//! Pictures of cameras that MuJoCo cannot draw: with distortion, or with the optical axis away from the centre.
 //!
 //! ```text
 //! PinholeCamera with its lens ─ Frustum: a symmetric pinhole picture that holds all of it, finer ─ drawn ─ resampled
@@ -12,12 +12,12 @@ use crate::camera::vertical_field_of_view_rad;
 use crate::error::{Result, SimulationError};
 use crate::render::RenderConfig;
 
-/// How much finer the drawn picture is: resampling then costs no sharpness.
+/// Resolution of the drawn picture relative to the result, so that resampling keeps the sharpness.
 const FINENESS: f64 = 1.5;
-/// Samples a side for each pixel.
+/// Samples per side for each pixel.
 const SAMPLES: u32 = 2;
 
-/// What MuJoCo draws: a picture with its axis in the middle and no distortion.
+/// MuJoCo's picture: its axis is in the centre, and it has no distortion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Frustum {
     /// Pixels in a row.
@@ -29,10 +29,10 @@ pub(crate) struct Frustum {
 }
 
 impl Frustum {
-    /// The frustum that holds all that a camera sees.
+    /// The frustum that contains the camera's whole view.
     ///
     /// # Errors
-    /// [`SimulationError::Configuration`] for a lens that does not reach its own picture's corners.
+    /// [`SimulationError::Configuration`] for a lens that does not reach the corners of its own picture.
     pub(crate) fn around(camera: &PinholeCamera) -> Result<Self> {
         Self::holding(camera).ok_or_else(|| SimulationError::Configuration {
             field: "camera.lens",
@@ -58,17 +58,17 @@ impl Frustum {
         Some(Self { width: side(half.x), height: side(half.y), focal_px })
     }
 
-    /// What MuJoCo's camera needs to draw it.
+    /// The settings of MuJoCo's camera for drawing it.
     pub(crate) fn vertical_field_of_view_rad(&self) -> f64 {
         vertical_field_of_view_rad(self.focal_px, self.height)
     }
 
-    /// How it is drawn, otherwise as `like` is.
+    /// The drawing settings, otherwise as `like`.
     pub(crate) fn render_config(&self, like: &RenderConfig) -> RenderConfig {
         RenderConfig { width: self.width, height: self.height, ..*like }
     }
 
-    /// The camera's picture from the drawn one.
+    /// Converts the drawn picture to the camera's picture.
     pub(crate) fn resample(&self, drawn: &RgbImage, camera: &PinholeCamera) -> RgbImage {
         let middle = Vector2::new(f64::from(self.width), f64::from(self.height)) * 0.5;
         let color = |at: Point2<f64>| -> [f32; 3] {
@@ -94,7 +94,7 @@ mod tests {
     use super::*;
     use sdg_geometry::PlumbBob;
 
-    /// What is drawn of a bright disc lies where the camera's own projection puts it.
+    /// A drawn bright disc is at the position given by the camera's own projection.
     #[test]
     fn a_disc_appears_where_the_camera_projects_it() {
         let lens = PlumbBob { k1: -0.25, k2: 0.07, p1: 0.002, p2: -0.001, k3: 0.0 };

@@ -83,7 +83,8 @@ pub use record::RecordConfig;
 pub use render::{RenderConfig, Renderer, Segmentation};
 pub use workcell::{Workcell, WorkcellConfig};
 
-/// Loads MuJoCo and EGL, which the simulator and its pictures need: asked before long work, what is missing is told at once.
+/// Loads MuJoCo and EGL, which the simulator and its pictures need. Called before long work, it reports missing
+/// libraries at once.
 ///
 /// # Errors
 /// [`SimulationError::Library`] without MuJoCo 2.2.2, [`SimulationError::Rendering`] without EGL or its surfaceless platform.

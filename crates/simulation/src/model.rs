@@ -1,4 +1,4 @@
-//! A compiled MuJoCo model: what does not change while time passes.
+//! A compiled MuJoCo model: the data that do not change during the simulation.
 
 use std::ffi::{CStr, CString, c_char, c_int};
 use std::marker::PhantomData;
@@ -9,22 +9,22 @@ use sdg_mujoco_sys as mj;
 use crate::error::{Result, SimulationError};
 use crate::guard::{guarded, initialise};
 
-/// A file that an MJCF model asks for by name, such as a texture's PNG.
+/// A file named by an MJCF model, such as a texture's PNG.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Asset {
-    /// File name as it stands in the MJCF, without folders.
+    /// File name in the MJCF, without folders.
     pub name: String,
     /// The file's bytes.
     pub bytes: Vec<u8>,
 }
 
-/// A kind of named thing in a model; implemented by the marker types [`Body`], [`Joint`], ….
+/// A kind of named objects in a model; implemented by the marker types [`Body`], [`Joint`], ….
 pub trait Kind {
     /// MuJoCo's number of the kind.
     const TYPE: u32;
     /// The kind in words.
     const NAME: &'static str;
-    /// How many of the kind the model has.
+    /// Number of objects of the kind in the model.
     fn count(model: &Model) -> usize;
 }
 
@@ -59,7 +59,7 @@ kinds! {
     Actuator = mjOBJ_ACTUATOR, "actuator", nu;
 }
 
-/// Index of a thing of kind `K` in the model that gave it out.
+/// Index of an object of kind `K` in the model that returned it.
 pub struct Id<K> {
     index: usize,
     kind: PhantomData<fn() -> K>,
@@ -100,7 +100,7 @@ impl<K: Kind> std::fmt::Debug for Id<K> {
 
 /// A model compiled from MJCF.
 ///
-/// It is never changed after it was made, so it may be shared between threads.
+/// It is never changed after construction, so that threads may share it.
 pub struct Model {
     ptr: *mut mj::mjModel,
 }
@@ -115,7 +115,7 @@ unsafe impl Sync for Model {}
 static XML_LOCK: Mutex<()> = Mutex::new(());
 
 impl Model {
-    /// Compiles an MJCF model, its files taken from `assets` and from nowhere else on purpose.
+    /// Compiles an MJCF model; its files come only from `assets`, on purpose.
     ///
     /// # Errors
     /// [`SimulationError::Model`] with MuJoCo's message, [`SimulationError::Asset`] for a repeated
@@ -159,7 +159,7 @@ impl Model {
         self.ptr
     }
 
-    /// The thing of that kind and name.
+    /// The object of that kind and name.
     ///
     /// # Errors
     /// [`SimulationError::UnknownName`] with the names that exist.
@@ -185,12 +185,12 @@ impl Model {
         usize::try_from(index).map(Id::new).map_err(|_| unknown())
     }
 
-    /// All things of a kind, in MuJoCo's order.
+    /// All objects of a kind, in MuJoCo's order.
     pub fn ids<K: Kind>(&self) -> impl Iterator<Item = Id<K>> + use<K> {
         (0..K::count(self)).map(Id::new)
     }
 
-    /// The name of a thing, if it has one.
+    /// The name of an object, if it has one.
     pub fn name<K: Kind>(&self, id: Id<K>) -> Option<String> {
         // SAFETY: the model is live; MuJoCo returns null for an index that it does not have.
         let name = unsafe { mj::mj_id2name(self.ptr, K::TYPE as c_int, id.index as c_int) };
@@ -202,14 +202,14 @@ impl Model {
         (!name.is_empty()).then_some(name)
     }
 
-    /// The body that a geom belongs to.
+    /// The body of a geom.
     pub fn body_of(&self, geom: Id<Geom>) -> Id<Body> {
         assert!(geom.index < Geom::count(self), "{geom:?} is not of this model");
         // SAFETY: the array has `ngeom` entries.
         Id::new(unsafe { *self.raw().geom_bodyid.add(geom.index) } as usize)
     }
 
-    /// Radius and half the length of a capsule in metres, its axis along the geom's z; `None` for other shapes.
+    /// Radius and half length of a capsule in metres, with its axis along the geom's z; `None` for other shapes.
     pub fn capsule_m(&self, geom: Id<Geom>) -> Option<(f64, f64)> {
         assert!(geom.index < Geom::count(self), "{geom:?} is not of this model");
         // SAFETY: the arrays have `ngeom` entries, and three for each.

@@ -1,4 +1,4 @@
-//! Obstacles of `sdg-kinematics` in MuJoCo, and random ones to test motions among.
+//! Obstacles of `sdg-kinematics` in MuJoCo, and random ones for testing motions.
 
 use std::fmt::Write;
 
@@ -9,7 +9,7 @@ use sdg_kinematics::collision::{Obstacle, Shape};
 
 use crate::scene::pose_attributes;
 
-/// Geoms of the world body for obstacles, named as they are, with further attributes for each.
+/// Geoms of the world body for obstacles, with the same names, and with further attributes for each.
 pub fn obstacles_mjcf(obstacles: &[Obstacle], attributes: &str) -> String {
     let mut geoms = String::new();
     for obstacle in obstacles {
@@ -36,10 +36,11 @@ fn escaped(name: &str) -> String {
     name.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;")
 }
 
-/// No obstacle comes nearer to the base's axis than this, m: the arm has to stand somewhere.
+/// Minimum distance of an obstacle from the base's axis, m, as space for the arm's base.
 const KEPT_FREE_M: f64 = 0.2;
 
-/// Boxes, cylinders, capsules and spheres of 4 to 40 cm at random places within the arm's reach; always the same for a seed.
+/// Boxes, cylinders, capsules and spheres of 4 to 40 cm at random places within the arm's reach; deterministic for a
+/// seed.
 pub fn random_obstacles(count: usize, seed: u64) -> Vec<Obstacle> {
     let mut rng = Pcg64Mcg::seed_from_u64(seed);
     let mut obstacles = Vec::with_capacity(count);

@@ -1,4 +1,4 @@
-//! Perception that gives the part's true pose, to measure the robot without a model.
+//! Perception that returns the part's true pose, for measuring the robot without a model.
 
 use nalgebra::{Isometry3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use sdg_robot::{GraspTarget, PartFinder, PartShape};
@@ -8,8 +8,8 @@ use crate::error::Result;
 use crate::objects::ObjectSpec;
 use crate::workcell::Workcell;
 
-/// The grasp that a part's marks ask for, with the part at a pose: x of the tcp along the marks, y
-/// across them, z down.
+/// The grasp of a part's marks, for the part at a pose: x of the tcp along the marks, y across
+/// them, z down.
 pub fn marked_grasp(spec: &ObjectSpec, base_from_object: &Isometry3<f64>) -> GraspTarget {
     let (point, direction_rad) = spec.grasp_in_base(base_from_object);
     let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
@@ -21,19 +21,19 @@ pub fn marked_grasp(spec: &ObjectSpec, base_from_object: &Isometry3<f64>) -> Gra
     }
 }
 
-/// The part's shape, as the sequence takes it.
+/// The part's shape in the sequence's form.
 ///
 /// # Errors
-/// Numbers that make no shape.
+/// Numbers that describe no shape.
 pub fn part_shape(spec: &ObjectSpec) -> Result<PartShape> {
     let part_from_object = marked_grasp(spec, &Isometry3::identity()).base_from_tcp.inverse();
     let outline = spec.footprint.iter().map(|p| (part_from_object * Point3::new(p.x, p.y, 0.0)).xy());
-    // Marks are in the middle of a round bar and on top of others.
+    // Marks are at the axis of a round bar and on top of others.
     let top_m = spec.mark_height_m.max(2.0 * spec.grasp_height_m);
     Ok(PartShape::new(outline, spec.jaw_width_m, top_m, spec.grasp_height_m)?)
 }
 
-/// Knows where the part is.
+/// Returns the part's true pose.
 struct Oracle;
 
 impl PartFinder<Workcell> for Oracle {
@@ -44,8 +44,8 @@ impl PartFinder<Workcell> for Oracle {
 }
 
 impl Workcell {
-    /// Tries once with the part's true pose instead of a picture's: the upper bound of what any
-    /// perception can reach.
+    /// Makes one attempt with the part's true pose instead of a picture's: the upper bound for any
+    /// perception.
     ///
     /// # Errors
     /// Errors of the simulation.

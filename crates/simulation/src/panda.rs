@@ -1,4 +1,4 @@
-//! The arm in the model: its MJCF and where its joints, motors and frames are.
+//! The arm in the model: its MJCF, and its joints, motors and frames.
 
 use nalgebra::{Isometry3, SVector};
 
@@ -13,22 +13,22 @@ pub const NUM_ARM_JOINTS: usize = 7;
 /// Joint positions, velocities or torques of the arm, joint 1 first.
 pub type ArmVector = SVector<f64, NUM_ARM_JOINTS>;
 
-/// File name under which a model includes the arm.
+/// File name with which a model includes the arm.
 pub const PANDA_FILE: &str = "panda.xml";
 
 /// Travel of each finger in metres; the hand opens twice as far.
 pub const FINGER_TRAVEL_M: f64 = 0.5 * sdg_kinematics::HAND_OPENING_MAX_M;
 
-/// How far the finger tips reach beyond the tcp, in metres.
+/// Distance of the finger tips beyond the tcp, in metres.
 pub const FINGERTIP_BEYOND_TCP_M: f64 = 0.004;
 
 /// The MJCF of the arm, to be included by a model: base frame = world frame, hand and wrist camera
-/// mounted, one motor a joint.
+/// mounted, one motor per joint.
 pub fn panda_asset() -> Asset {
     Asset { name: PANDA_FILE.to_owned(), bytes: include_bytes!("../assets/panda.xml").to_vec() }
 }
 
-/// The pads' priority and friction, and the wrist camera's field of view and place, as the MJCF has them.
+/// The pads' priority and friction, and the wrist camera's field of view and pose, as in the MJCF.
 const PAD_PRIORITY: &str = " priority=\"1\"";
 const PAD_FRICTION: &str = "friction=\"1.0 ";
 const WRIST_PLACE: &str = "pos=\"0.072 0 0.050\" xyaxes=\"0 1 0 1 0 0\"";
@@ -38,7 +38,7 @@ const WRIST_FOVY: &str = "fovy=\"47.149412403825\"";
 /// - `pad_friction`: pads of another sliding friction and without priority, so that MuJoCo combines it with the part's by its
 ///   usual rule, the larger of the two;
 /// - `wrist_fovy_deg`: another vertical field of view of the wrist camera;
-/// - `hand_from_camera`: another place of it, in MuJoCo's camera frame.
+/// - `hand_from_camera`: another pose of it, in MuJoCo's camera frame.
 pub(crate) fn changed_panda_asset(
     pad_friction: Option<f64>,
     wrist_fovy_deg: Option<f64>,
@@ -84,7 +84,7 @@ impl PandaIds {
     /// Finds the arm in a model that includes [`panda_asset`].
     ///
     /// # Errors
-    /// `UnknownName` where the model has no such arm.
+    /// `UnknownName` if the model has no such arm.
     pub fn find(model: &Model) -> Result<Self> {
         let names: [String; NUM_ARM_JOINTS] = std::array::from_fn(|joint| format!("joint{}", joint + 1));
         let mut joints = [Id::new(0); NUM_ARM_JOINTS];
@@ -119,7 +119,7 @@ impl PandaIds {
         ArmVector::from_fn(|joint, _| data.qvel()[self.qvel[joint]])
     }
 
-    /// Puts the arm somewhere at rest; only right before a simulation starts.
+    /// Sets the arm to a configuration at rest; only right before a simulation starts.
     pub fn set_position(&self, data: &mut Data, q: &ArmVector) {
         for joint in 0..NUM_ARM_JOINTS {
             data.qpos_mut()[self.qpos[joint]] = q[joint];
@@ -142,7 +142,7 @@ impl PandaIds {
         self.finger_qvel.map(|index| data.qvel()[index])
     }
 
-    /// Puts the fingers somewhere at rest; only right before a simulation starts.
+    /// Sets the fingers to a position at rest; only right before a simulation starts.
     pub fn set_finger_position_m(&self, data: &mut Data, position_m: f64) {
         for finger in 0..2 {
             data.qpos_mut()[self.finger_qpos[finger]] = position_m;
@@ -155,7 +155,7 @@ impl PandaIds {
         data.world_from_site(self.tcp)
     }
 
-    /// Which finger (0 left, 1 right) a geom belongs to.
+    /// The finger (0 left, 1 right) of a geom.
     pub fn finger_of(&self, model: &Model, geom: Id<Geom>) -> Option<usize> {
         let body = model.body_of(geom);
         self.fingers.iter().position(|&finger| finger == body)
@@ -180,7 +180,7 @@ mod tests {
         (Data::new(model).unwrap(), ids)
     }
 
-    /// `fci` sees no other crate and the MJCF no constant: all three say how far the hand opens.
+    /// `fci` sees no other crate and the MJCF no constant: all three contain the hand's opening.
     #[test]
     fn the_hand_opens_as_far_everywhere() {
         assert_eq!(sdg_fci::server::HAND_MAX_WIDTH_M, kinematics::HAND_OPENING_MAX_M);
@@ -218,7 +218,7 @@ mod tests {
         let limits = kinematics::JointLimits::panda();
         let raw = data.model().raw();
         for joint in 0..NUM_ARM_JOINTS {
-            // SAFETY: two numbers a joint and two an actuator.
+            // SAFETY: two numbers per joint and two per actuator.
             let (range, torque) = unsafe {
                 (
                     *raw.jnt_range.add(2 * ids.joints[joint].index()).cast::<[f64; 2]>(),
@@ -238,7 +238,7 @@ mod tests {
             let raw = model.raw();
             let mut found = Vec::new();
             for geom in model.ids::<Geom>().filter(|&geom| model.name(geom).is_some_and(|name| name.contains("pad"))) {
-                // SAFETY: one priority and three coefficients a geom.
+                // SAFETY: one priority and three coefficients per geom.
                 found.push(unsafe { (*raw.geom_priority.add(geom.index()), *raw.geom_friction.add(3 * geom.index())) });
             }
             found

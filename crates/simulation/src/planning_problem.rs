@@ -1,4 +1,4 @@
-//! Random problems of planning: a start and a goal among obstacles.
+//! Random planning problems: a start and a goal among obstacles.
 
 use nalgebra::Isometry3;
 use rand::{Rng, SeedableRng};
@@ -16,9 +16,9 @@ pub struct PlanningProblem {
     pub obstacles: Vec<Obstacle>,
     /// The same as a model, with the hand open.
     pub model: CollisionModel,
-    /// Where the arm is, rad.
+    /// The start configuration, rad.
     pub start: JointVector,
-    /// Where the tcp is to be, m.
+    /// The goal pose of the tcp, m.
     pub base_from_goal: Isometry3<f64>,
     /// A free configuration that reaches the goal, rad.
     pub goal: JointVector,
@@ -27,18 +27,18 @@ pub struct PlanningProblem {
 impl PlanningProblem {
     /// Distance of start and goal from everything, m: more than planners keep.
     const FREE_M: f64 = 0.01;
-    /// Obstacles that are added to a problem at most, and their size, m.
+    /// Maximum number of obstacles added to a problem, and their size, m.
     const MAX_ADDED: usize = 4;
     const BALL_RADIUS_M: f64 = 0.08;
     /// Distance of start and goal from the joints' limits, rad.
     const INSIDE_RAD: f64 = 0.05;
 
-    /// The problem of a seed, always the same. Start and goal are drawn from all of the joints' ranges.
+    /// The problem of a seed, deterministic. Start and goal are drawn from the joints' full ranges.
     pub fn random(seed: u64) -> Self {
         let mut rng = Pcg64Mcg::seed_from_u64(seed);
         let obstacles = random_obstacles(rng.random_range(1..=8), rng.random());
         let model = CollisionModel::new(&ArmGeometry::panda(), obstacles.clone(), HAND_OPENING_MAX_M)
-            .expect("random obstacles make sense");
+            .expect("random obstacles are valid");
         let limits = JointLimits::panda();
         let mut checker = Checker::new(&model, Self::FREE_M);
         let mut free = || loop {
@@ -53,15 +53,15 @@ impl PlanningProblem {
         Self { obstacles, base_from_goal: ArmGeometry::panda().forward(&goal), start, goal, model }
     }
 
-    /// The same with up to [`Self::MAX_ADDED`] more obstacles, each a ball in the middle of the tcp's way on the straight motion
-    /// that was found before: of random problems alone, nearly all are solved by a straight motion.
+    /// The same with up to [`Self::MAX_ADDED`] more obstacles, each a ball at the midpoint of the tcp's path during the
+    /// straight motion found before. Without them nearly all random problems are solved by a straight motion.
     pub fn obstructed(seed: u64) -> Self {
         let panda = ArmGeometry::panda();
         let mut problem = Self::random(seed);
         for number in 0..Self::MAX_ADDED {
             let options = PlanOptions::default();
             let plan = panda.plan(&problem.model, &problem.start, &[problem.base_from_goal], None, &options);
-            // What needs a bent way, or has none that is found, is hard enough.
+            // A problem that needs a curved path, or for which none is found, is hard enough.
             let Some([from, to]) = plan.ok().and_then(|plan| <[JointVector; 2]>::try_from(plan.waypoints).ok()) else {
                 break;
             };

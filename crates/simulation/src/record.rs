@@ -9,7 +9,7 @@ use crate::error::{Result, SimulationError};
 use crate::model::{Camera, Id, Model};
 use crate::render::{RenderConfig, Renderer};
 
-/// What is recorded.
+/// Settings of a recording.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RecordConfig {
     /// Simulated time between two pictures, in seconds.
@@ -19,7 +19,7 @@ pub struct RecordConfig {
 }
 
 impl Default for RecordConfig {
-    /// Eight pictures a second, small enough for an animation.
+    /// Eight pictures per second, small enough for an animation.
     fn default() -> Self {
         Self { period_secs: 0.125, render: RenderConfig { width: 400, height: 300, ..RenderConfig::default() } }
     }
@@ -47,7 +47,7 @@ impl Recorder {
         Ok(Self { renderer, camera, period_secs: config.period_secs, next_secs: 0.0, frames: Vec::new() })
     }
 
-    /// Takes a picture where one is due.
+    /// Takes a picture if one is due.
     pub(crate) fn look(&mut self, data: &mut Data) -> Result<()> {
         if data.time_secs() + 1e-9 >= self.next_secs {
             self.frames.push(self.renderer.image(data, self.camera)?);

@@ -1,4 +1,4 @@
-//! A workcell that is driven from outside, a millisecond at a time.
+//! A workcell driven from outside, millisecond by millisecond.
 
 use sdg_kinematics::JointVector;
 
@@ -7,7 +7,7 @@ use crate::error::Result;
 use crate::workcell::Workcell;
 
 impl Workcell {
-    /// One period on, with the controller's reference where positions (rad), velocities and accelerations say.
+    /// Advances by one period, with the controller's reference at these positions (rad), velocities and accelerations.
     ///
     /// # Errors
     /// [`SimulationError::Unstable`](crate::SimulationError::Unstable).

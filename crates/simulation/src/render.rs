@@ -6,8 +6,8 @@
 //!             Data ── mjv_updateScene ── mjvScene ── mjr_render ── mjr_readPixels ── RgbImage
 //! ```
 //!
-//! A renderer may be used from any thread. All drawing in the process happens one picture at a
-//! time, since MuJoCo keeps OpenGL's function table in globals.
+//! A renderer may be used from any thread. The process draws one picture at a time, because MuJoCo
+//! keeps OpenGL's function table in globals.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -20,21 +20,21 @@ use crate::error::{Result, SimulationError};
 use crate::guard::guarded;
 use crate::model::{Camera, Geom, Id, Model};
 
-/// How pictures are made.
+/// Settings of pictures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RenderConfig {
     /// Width in pixels.
     pub width: u32,
     /// Height in pixels.
     pub height: u32,
-    /// Samples a pixel against jagged edges; 0 for none.
+    /// Samples per pixel for antialiasing; 0 for none.
     pub samples: u32,
     /// Side of the shadow map in texels; 0 for no shadows.
     pub shadow_size: u32,
-    /// Whether reflective surfaces mirror the scene, which draws it once more.
+    /// Whether reflective surfaces mirror the scene, which draws it a second time.
     pub reflections: bool,
-    /// Geom groups to draw; MuJoCo's convention, which the workcell follows, puts what is seen
-    /// into groups 0 to 2 and collision shapes into group 3.
+    /// Geom groups to draw; MuJoCo's convention, which the workcell follows, has visible shapes in
+    /// groups 0 to 2 and collision shapes in group 3.
     pub geom_groups: [bool; 6],
 }
 
@@ -52,7 +52,7 @@ impl Default for RenderConfig {
     }
 }
 
-/// Which geom each pixel shows.
+/// The geom that each pixel shows.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Segmentation {
     width: u32,
@@ -67,7 +67,7 @@ impl Segmentation {
         (self.width, self.height)
     }
 
-    /// The geom at a pixel, `None` where there is only background.
+    /// The geom at a pixel, `None` for background.
     pub fn geom_at(&self, x: u32, y: u32) -> Option<Id<Geom>> {
         assert!(x < self.width && y < self.height, "({x}, {y}) is outside {}x{}", self.width, self.height);
         self.geoms[(y * self.width + x) as usize]
@@ -85,7 +85,7 @@ impl Segmentation {
 static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
 
 fn drawing_lock() -> MutexGuard<'static, ()> {
-    // The lock guards no data of ours, so that a panic elsewhere leaves nothing broken behind.
+    // The lock guards no data of ours, so that a panic elsewhere corrupts nothing.
     ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -108,7 +108,7 @@ impl Renderer {
     /// Makes an OpenGL context and uploads the model's textures and meshes.
     ///
     /// # Errors
-    /// [`SimulationError::Rendering`] where EGL or OpenGL is missing or refuses,
+    /// [`SimulationError::Rendering`] if EGL or OpenGL is missing or fails,
     /// [`SimulationError::Configuration`] for a picture without pixels or larger than 8192.
     pub fn new(model: &Arc<Model>, config: RenderConfig) -> Result<Self> {
         for (field, value) in [("render width", config.width), ("render height", config.height)] {
@@ -121,8 +121,8 @@ impl Renderer {
             }
         }
 
-        // A bitwise copy of the struct (its arrays stay the model's own) that differs in what the
-        // renderer decides.
+        // A bitwise copy of the struct (its arrays stay the model's own) that differs in the
+        // renderer's settings.
         let mut adjusted = *model.raw();
         adjusted.vis.global.offwidth = config.width as i32;
         adjusted.vis.global.offheight = config.height as i32;
@@ -163,14 +163,14 @@ impl Renderer {
             }
         })?;
         if gl.currentBuffer != mj::mjFB_OFFSCREEN as i32 {
-            return Err(SimulationError::Rendering { reason: "OpenGL made no offscreen framebuffer".into() });
+            return Err(SimulationError::Rendering { reason: "OpenGL created no offscreen framebuffer".into() });
         }
         scene.flags[mj::mjRND_SHADOW as usize] = u8::from(config.shadow_size > 0);
         scene.flags[mj::mjRND_REFLECTION as usize] = u8::from(config.reflections);
         Ok(Self { context, model: model.clone(), scene, option, perturb, gl, config })
     }
 
-    /// What the renderer was made with.
+    /// The settings of the renderer.
     pub fn config(&self) -> &RenderConfig {
         &self.config
     }
@@ -184,7 +184,7 @@ impl Renderer {
         Ok(RgbImage::from_raw(self.config.width, self.config.height, bytes).expect("three bytes a pixel"))
     }
 
-    /// Which geom each pixel of that picture shows.
+    /// The geom that each pixel of that picture shows.
     ///
     /// # Errors
     /// As [`Renderer::image`].
@@ -196,8 +196,8 @@ impl Renderer {
         self.scene.flags = flags;
         let bytes = drawn?;
 
-        // Colours are numbers of the scene's list plus one; the list says what it was made from.
-        // SAFETY: the scene's buffer has `ngeom` filled entries.
+        // Colours are indices of the scene's list plus one; the list contains the objects. SAFETY:
+        // the scene's buffer has `ngeom` filled entries.
         let shown = unsafe { std::slice::from_raw_parts(self.scene.geoms, self.scene.ngeom as usize) };
         let mut geom_of_color = vec![None; shown.len() + 1];
         for geom in shown {
@@ -216,7 +216,7 @@ impl Renderer {
         Ok(Segmentation { width: self.config.width, height: self.config.height, geoms })
     }
 
-    /// Draws with the present flags and reads the pixels back, rows from the top.
+    /// Draws with the present flags and reads the pixels, rows from the top.
     fn draw(&mut self, data: &mut Data, camera: Id<Camera>) -> Result<Vec<u8>> {
         let (width, height) = (self.config.width as usize, self.config.height as usize);
         let viewport = mj::mjrRect { left: 0, bottom: 0, width: width as i32, height: height as i32 };
@@ -263,7 +263,7 @@ impl Renderer {
 impl Drop for Renderer {
     fn drop(&mut self) {
         let _lock = drawing_lock();
-        // Without a current context OpenGL's objects go with the context itself.
+        // Without a current context OpenGL's objects are freed with the context itself.
         if let Ok(_current) = self.context.make_current() {
             // SAFETY: the context was made by `mjr_makeContext` and is freed once.
             unsafe { mj::mjr_freeContext(&raw mut *self.gl) };

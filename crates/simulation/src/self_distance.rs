@@ -1,4 +1,4 @@
-//! How near the arm's links are to each other: the capsules that they touch the world with.
+//! Distances between the arm's links, by the capsules of their collisions.
 
 use nalgebra::{Point3, Vector3};
 use sdg_kinematics::collision::Capsule;
@@ -8,9 +8,9 @@ use crate::model::{Geom, Id, Kind, Model};
 
 /// Bodies of the arm from the base on.
 const CHAIN: [&str; 9] = ["link0", "link1", "link2", "link3", "link4", "link5", "link6", "link7", "hand"];
-/// MuJoCo's group of the shapes that touch.
+/// MuJoCo's group of collision shapes.
 const COLLISION_GROUP: i32 = 3;
-/// Bodies fewer joints apart share an elbow or the wrist, where their capsules overlap in every posture.
+/// Bodies separated by fewer joints share an elbow or the wrist, where their capsules overlap in every posture.
 const MIN_JOINTS_APART: usize = 4;
 
 #[derive(Debug, Clone, Copy)]
@@ -26,7 +26,7 @@ struct LinkCapsule {
 pub(crate) struct LinkCapsules(Vec<LinkCapsule>);
 
 impl LinkCapsules {
-    /// Finds them in a model that includes the arm.
+    /// Finds them in a model with the arm.
     pub(crate) fn find(model: &Model) -> Self {
         let capsules = (0..Geom::count(model)).map(Id::<Geom>::new).filter_map(|geom| {
             let body = model.name(model.body_of(geom))?;
@@ -38,7 +38,7 @@ impl LinkCapsules {
         Self(capsules.collect())
     }
 
-    /// The smallest distance between two of them that no joint holds together, in metres; negative where they overlap.
+    /// The smallest distance between two of them that are not joined, in metres; negative if they overlap.
     pub(crate) fn distance_m(&self, data: &Data) -> f64 {
         let placed: Vec<Capsule> = self
             .0
@@ -84,7 +84,7 @@ mod tests {
             capsules.distance_m(&data)
         };
         assert!(at(ready_pose()) > 0.05);
-        // The forearm folded back, the hand turned in to the column.
+        // The forearm folded back, the hand turned towards the column.
         let folded = JointVector::from([0.0, 0.4, 0.0, -3.0, 0.0, 1.2, 0.785]);
         assert!(at(folded) < 0.0);
     }

@@ -1,4 +1,4 @@
-//! The arm shaken on purpose, about where it stands.
+//! Shakes the arm on purpose, around its position.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -11,21 +11,21 @@ use crate::controller::ArmReference;
 use crate::error::Result;
 use crate::workcell::Workcell;
 
-/// How long the swinging takes to build up and to end, in seconds.
+/// Rise and fall time of the swing, in seconds.
 const RAMP_SECS: f64 = 0.2;
 
-/// Share of the arm's velocity and acceleration limits that a shake may take.
+/// Largest share of the arm's velocity and acceleration limits used by a shake.
 const SHARE_OF_LIMITS: f64 = 0.9;
 
 /// Keeps the inverse of the Jacobian finite near singular postures, in square metres.
 const DAMPING: f64 = 1e-6;
 
 impl Shake {
-    /// How far along its line the hand is at a time, how fast, and with what acceleration, for an amplitude of one.
+    /// Position, velocity and acceleration of the hand along its line at a time, for an amplitude of one.
     fn at(&self, time_secs: f64) -> [f64; 3] {
         let omega = TAU * self.frequency_hz;
         let (sin, cos) = (omega * time_secs).sin_cos();
-        // A sine's square from rest to full swing, and back at the end.
+        // A squared sine from rest to full swing, and back at the end.
         let (since, sign) = match time_secs < 0.5 * self.duration_secs {
             true => (time_secs, 1.0),
             false => (self.duration_secs - time_secs, -1.0),
@@ -40,7 +40,7 @@ impl Shake {
 }
 
 impl Workcell {
-    /// Swings the hand to and fro without turning it, and ends where it began; the amplitude that the arm's limits
+    /// Swings the hand without turning it, and ends at the start; returns the amplitude that the arm's limits
     /// allowed, in metres.
     ///
     /// # Errors
@@ -48,8 +48,8 @@ impl Workcell {
     pub(crate) fn shake(&mut self, shake: &Shake) -> Result<f64> {
         let start = self.commanded();
         let along = Vector3::new(shake.direction_rad.cos(), shake.direction_rad.sin(), 0.0);
-        // Joint motion for a metre along the line, the hand's turn kept. Over some centimetres the arm's posture, and
-        // with it the Jacobian, hardly changes.
+        // Joint motion per metre along the line, with a constant orientation of the hand. Over some centimetres the
+        // arm's posture, and with it the Jacobian, hardly changes.
         let jacobian = self.panda.jacobian(&start);
         let damped = jacobian * jacobian.transpose() + nalgebra::Matrix6::identity() * DAMPING;
         let twist = Vector6::new(along.x, along.y, along.z, 0.0, 0.0, 0.0);
@@ -88,7 +88,7 @@ mod tests {
         const STEP: f64 = 1e-5;
         for time in [0.05, 0.1, 0.31, 0.55, 0.85, 0.95] {
             let [before, here, after] = [time - STEP, time, time + STEP].map(|time| SHAKE.at(time));
-            // The third derivative is below (2 pi 2.5)^3 and the ramp's own: central differences err by 1e-6.
+            // The third derivative is below (2 pi 2.5)^3 and the ramp's own: central differences have an error of 1e-6.
             assert!(((after[0] - before[0]) / (2.0 * STEP) - here[1]).abs() < 1e-4, "{time}");
             assert!(((after[1] - before[1]) / (2.0 * STEP) - here[2]).abs() < 1e-2, "{time}");
         }

@@ -1,6 +1,6 @@
-//! Whole grasp attempts: what the robot alone can do with the true pose, and every way to fail.
+//! Whole grasp attempts: the success of the robot alone with the true pose, and every kind of failure.
 //!
-//! Twenty attempts a part are run by `examples/oracle.rs`; here are few, for time.
+//! `examples/oracle.rs` runs twenty attempts per part; here are only a few, for time.
 
 use std::fs;
 
@@ -15,7 +15,7 @@ use sdg_simulation::{
     WorkcellConfig, marked_grasp,
 };
 
-/// Finds as the function says, and keeps where the camera was.
+/// Finds by the function, and stores the camera's poses.
 struct Looking<F> {
     find: F,
     views: Vec<CameraView>,
@@ -34,7 +34,7 @@ impl<F: FnMut() -> Option<GraspTarget>> PartFinder<Workcell> for Looking<F> {
     }
 }
 
-/// A square bar of 20 x 20 x 120 mm and 0.2 kg, written and read as a user would bring a part.
+/// A square bar of 20 x 20 x 120 mm and 0.2 kg, written and read as a user's own part.
 fn bar() -> ObjectSpec {
     bar_of(0.2)
 }
@@ -42,7 +42,7 @@ fn bar() -> ObjectSpec {
 /// The bar with another mass in kilograms.
 fn bar_of(mass_kg: f64) -> ObjectSpec {
     let with_mass = |text: &str| text.replace("MASS_KG", &mass_kg.to_string());
-    // Each test runs in a process or thread of its own.
+    // Each test runs in its own process or thread.
     let folder = std::env::temp_dir().join(format!("sdg-bar-{}-{:?}", std::process::id(), std::thread::current().id()));
     fs::create_dir_all(&folder).unwrap();
     fs::write(
@@ -103,10 +103,10 @@ fn a_bar_of_known_pose_is_lifted() {
         let mut looking = Looking::new(|| Some(target));
         let report = cell.run_attempt(&mut looking, &AttemptConfig::default(), seed).unwrap();
         assert_eq!(report.outcome, GraspOutcome::Held, "bar at ({x}, {y}) turned {yaw_rad}");
-        // Lifted by 0.45 m, or by the least allowed where the arm ends.
+        // Lifted by 0.45 m, or by the smallest allowed height if the arm's reach ends.
         assert!(report.object_height_m.unwrap() > 0.2, "{:?}", report.object_height_m);
         assert_eq!((looking.views.len(), report.targets.len()), (2, 2));
-        // At the second look the camera stands over the part.
+        // At the second look the camera is over the part.
         let camera = looking.views[1].camera.world_from_camera.translation;
         assert!((camera.x - x).hypot(camera.y - y) < 0.003 && (camera.z - LOOK_HEIGHT_M).abs() < 0.003, "{camera}");
     }
@@ -116,7 +116,7 @@ fn a_bar_of_known_pose_is_lifted() {
 fn every_part_of_known_pose_is_lifted() {
     for name in ObjectSpec::names() {
         let spec = ObjectSpec::by_name(name).unwrap();
-        // Light and table cost time and change nothing for who does not look.
+        // Light and table take time and change nothing for a finder without pictures.
         let config = VariationConfig { appearance: false, distractors: 0..=2, ..VariationConfig::default() };
         let scene = SceneVariation::sample(Some(&spec), &config, 101);
         let mut cell = unlit_cell(scene);
@@ -285,7 +285,7 @@ fn a_wrong_hand_eye_calibration_changes_the_told_place_of_the_camera_and_nothing
     let (with, views_with, told_place) = run(AttemptErrors::hand_eye(5));
     assert_eq!((without.outcome, without.looks), (GraspOutcome::Held, [1, 1]));
     assert_eq!(without.shake_amplitude_m, None);
-    // The robot itself does the same, to the bit.
+    // The robot itself does the same, bit for bit.
     assert_eq!(without.simulated_secs, with.simulated_secs);
     assert_eq!(without.object_height_m, with.object_height_m);
     assert_eq!(views, views_with);
@@ -306,7 +306,7 @@ fn worn_pads_and_a_shake_ask_for_more_force() {
     let worn = AttemptErrors { pad_friction: Some(0.6), ..AttemptErrors::default() };
     let held = run(AttemptErrors { shake: AttemptErrors::shake(1).shake, ..worn }, 0.2, 40.0);
     assert_eq!(held.outcome, GraspOutcome::Held);
-    // The arm's limits leave much of the 20 to 30 mm that were asked for.
+    // The arm's limits allow most of the requested 20 to 30 mm.
     let amplitude_m = held.shake_amplitude_m.unwrap();
     assert!((0.010..=0.030).contains(&amplitude_m), "{amplitude_m}");
     // A bar of 1.2 kg weighs 11.8 N. Two new pads pressed with 8 N hold 16 N; worn ones hold 2 * 0.6 * 8 N = 9.6 N.

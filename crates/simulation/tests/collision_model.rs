@@ -1,4 +1,4 @@
-//! The collision model of `sdg-kinematics` against MuJoCo's own collisions.
+//! The collision model of `sdg-kinematics` compared with MuJoCo's own collisions.
 
 use std::collections::BTreeMap;
 
@@ -8,9 +8,9 @@ use sdg_kinematics::collision::{Checker, CollisionModel};
 use sdg_kinematics::{ArmGeometry, JointLimits, JointVector};
 use sdg_simulation::{CollisionWorld, random_obstacles};
 
-/// An overlap that MuJoCo finds and the model does not may be this deep, m.
+/// Largest depth of an overlap that MuJoCo finds and the model does not, m.
 const MAX_MISSED_M: f64 = 0.003;
-/// Share of the configurations that MuJoCo finds free and the model may not.
+/// Largest share of the configurations that are free in MuJoCo but not in the model.
 const MAX_FALSE_COLLISIONS: f64 = 0.05;
 
 fn random_configurations(count: usize, rng: &mut Pcg64Mcg) -> Vec<JointVector> {

@@ -1,4 +1,5 @@
-//! Coming down with a soft tcp over the network, in lockstep: a table that is higher than told, and friction in every joint.
+//! Compliant descents over the network, in lockstep: onto a table that is higher than the given height, with friction
+//! in every joint.
 
 use crate::network::connect;
 use sdg_fci::server::{Pace, Server, ServerConfig};
@@ -9,16 +10,16 @@ use sdg_robot::{
 use sdg_simulation::scene::SceneVariation;
 use sdg_simulation::{FINGERTIP_BEYOND_TCP_M, PandaPlant, Workcell, WorkcellConfig};
 
-/// What each joint's gears take.
+/// Friction of each joint's gears.
 const FRICTION_NM: f64 = 1.0;
-/// The table is really so much higher than the limits say.
+/// Height of the table above the limits' table.
 const HIGHER_M: f64 = 0.005;
-/// From here the tcp comes down: some 20 mm over the table.
+/// Start of the tcp's descent: about 20 mm over the table.
 const ABOVE_M: [f64; 3] = [0.45, 0.0, 0.024];
-/// What a part and a table stand.
+/// Largest force that a part and a table withstand.
 const MAX_STATIC_N: f64 = 10.0;
 const MAX_PEAK_N: f64 = 25.0;
-/// In free air the tcp is no farther beside its reference.
+/// Largest deviation of the tcp from its reference in free air.
 const MAX_FREE_AIR_M: f64 = 1.5e-3;
 const MAX_FREE_AIR_DEG: f64 = 0.5;
 
@@ -33,7 +34,7 @@ fn limits() -> SafetyLimits {
     SafetyLimits { table_height_m: -HIGHER_M, ..Workcell::safety_limits() }
 }
 
-/// A straight motion of the tcp to a place.
+/// A straight motion of the tcp to a position.
 fn line_to(robot: &mut Robot<'_, FrankaArm>, to_m: [f64; 3]) -> Trajectory {
     let (panda, start) = (ArmGeometry::panda(), robot.commanded().unwrap());
     let mut base_from_tcp = panda.forward(&start);
@@ -66,7 +67,7 @@ fn a_soft_tcp_finds_a_table_that_is_higher_than_told_and_presses_little() {
         assert!(beside_m.abs() < 1e-3, "friction {friction_nm}: {touched:?}");
         assert!((touched.force_n - told.press_n).abs() < 2.0, "friction {friction_nm}: {touched:?}");
         assert!(touched.force_n < MAX_STATIC_N && touched.peak_n < MAX_PEAK_N, "friction {friction_nm}: {touched:?}");
-        // It stands, without an error, and the next motion begins where it stands.
+        // It is at rest, without an error, and the next motion starts there.
         let state = robot.state().unwrap();
         assert_eq!(state.mode, ArmMode::Idle);
         assert!((state.q - state.q_commanded).amax() < 2e-3);
@@ -82,7 +83,7 @@ fn joint_positions_press_on_the_same_table_until_the_robot_stops() {
     let mut robot = Robot::new(&mut arm, limits(), Watch::default());
     go_above(&mut robot);
     robot.set_contact_sensitivity(ContactSensitivity::Contact).unwrap();
-    // To where the told table is touched.
+    // To the contact with the table at the given height.
     let motion = line_to(&mut robot, [ABOVE_M[0], ABOVE_M[1], FINGERTIP_BEYOND_TCP_M - HIGHER_M + 0.0015]);
     let error = robot.follow(motion).unwrap_err();
     assert!(matches!(error, RobotError::Reflex(_)), "{error}");

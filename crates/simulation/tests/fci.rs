@@ -12,7 +12,8 @@ use sdg_fci::wire::{Load, RobotMode, RobotState, Status};
 use sdg_fci::{FciError, Limits, RobotError, isometry};
 use sdg_kinematics::{ArmGeometry, JointVector};
 
-/// How far the arm may lag behind its reference in these slow motions: the stiffness of 3000 N·m/rad yields 0.3 mrad to 1 N·m.
+/// Largest lag of the arm behind its reference in these slow motions: the stiffness of 3000 N·m/rad gives 0.3 mrad per
+/// 1 N·m.
 const LAG_RAD: f64 = 2e-3;
 const LAG_M: f64 = 2e-3;
 
@@ -117,7 +118,7 @@ fn every_generator_moves_the_arm_with_either_controller() {
 fn torques_move_the_arm_and_gravity_is_the_robots() {
     let (_server, mut robot) = serve_panda();
     let start = robot.read_state().unwrap().clone();
-    // Nothing commanded: the arm floats where it is.
+    // Without commands the arm floats in place.
     let mut clock = Clock::default();
     let floating = robot.control_torques(|state, step| until([0.0; 7], clock.tick(state, step), 1.0)).unwrap();
     let drift = (0..7).map(|joint| (floating.q[joint] - start.q[joint]).abs()).fold(0.0, f64::max);
@@ -141,7 +142,7 @@ fn torques_move_the_arm_and_gravity_is_the_robots() {
 #[test]
 fn a_load_that_is_not_told_of_is_felt_and_one_that_is_told_of_is_carried() {
     let (_server, mut robot) = serve_panda();
-    // Told of 0.5 kg that are not there, the robot pushes up with 4.9 N, and feels that nothing pushes back.
+    // Told of an absent load of 0.5 kg, the robot pushes up with 4.9 N, and measures no force against it.
     robot.set_load(&Load { mass: 0.5, center: [0.0, 0.0, 0.1], inertia: [0.0; 9] }).unwrap();
     assert_eq!(robot.read_state().unwrap().load_mass, 0.5);
     let start = robot.state().q_desired;
@@ -172,14 +173,14 @@ fn the_hand_homes_moves_and_tells_what_it_holds() {
 
 #[test]
 fn each_limit_stops_the_motion_outside_of_it_and_none_inside() {
-    // Within the Cartesian limits, what the joints need may be beyond theirs: to tell the two apart, they are allowed more.
+    // Within the Cartesian limits the joints may exceed theirs: to test the former alone, the joints get higher limits.
     let limits = Limits::PANDA;
     let agile = Limits {
         acceleration: limits.acceleration.map(|value| 3.0 * value),
         jerk: limits.jerk.map(|value| 3.0 * value),
         ..limits
     };
-    // An answer that is left out on purpose is waited for as long as one that is late.
+    // The wait for an answer that is omitted on purpose is as long as for a late one.
     let pace = Pace::Lockstep { max_wait: Duration::from_millis(100) };
     for (limits_of_server, is_cartesian) in [(limits, false), (agile, true)] {
         let server = serve(pace, limits_of_server);
@@ -201,14 +202,14 @@ fn each_limit_stops_the_motion_outside_of_it_and_none_inside() {
     }
 }
 
-/// How far the end effector's motion is from a direction that the joints cannot do.
+/// Distance of the end effector's motion from a direction that the joints cannot execute.
 fn smallest_singular_value(q: &[f64; 7]) -> f64 {
     ArmGeometry::panda().jacobian(&JointVector::from(*q)).svd(false, false).singular_values.min()
 }
 
 #[test]
 fn no_cartesian_motion_starts_at_a_singular_pose_and_one_does_just_beside_it() {
-    /// What the server asks for, as franka-sim does.
+    /// The server's condition, as in franka-sim.
     const MIN_SINGULAR_VALUE: f64 = 0.05;
     let (_server, mut robot) = serve_panda();
     let home = robot.read_state().unwrap().q_desired;
@@ -219,7 +220,7 @@ fn no_cartesian_motion_starts_at_a_singular_pose_and_one_does_just_beside_it() {
         std::array::from_fn(|joint| home[joint] + share * (stretched[joint] - home[joint]))
     };
     assert!(smallest_singular_value(&home) > 0.06 && smallest_singular_value(&stretched) < 0.04);
-    // The share of the way at which the smallest singular value is the least that is allowed.
+    // The share of the path at which the smallest singular value reaches its allowed minimum.
     let (mut beside, mut singular) = (0.0, 1.0);
     while singular - beside > 1e-6 {
         let middle = 0.5 * (beside + singular);
@@ -243,7 +244,7 @@ fn no_cartesian_motion_starts_at_a_singular_pose_and_one_does_just_beside_it() {
                 }
             }
         }
-        // It is no error: the joints may go on.
+        // It is not an error: the joints may continue.
         assert_eq!(robot.read_state().unwrap().robot_mode, RobotMode::Idle);
     }
     limit_cases::go_to(&mut robot, &home).unwrap();
@@ -262,7 +263,7 @@ fn the_arm_stops_before_it_touches_itself() {
     robot.automatic_error_recovery().unwrap();
     let share = (stopped[3] - home[3]) / (folded[3] - home[3]);
     assert!((0.5..1.0).contains(&share), "{share}");
-    // It may move out, to just before, and not in again.
+    // It may move out, to just before that point, but not in again.
     let just_before = std::array::from_fn(|joint| home[joint] + (share - 0.02) * (folded[joint] - home[joint]));
     limit_cases::go_to(&mut robot, &just_before).unwrap();
     let error = limit_cases::go_to(&mut robot, &folded).unwrap_err();

@@ -1,4 +1,4 @@
-//! Faults, injected: the arm stops, the error is one clear line, and nothing moves until the recovery.
+//! Injected faults: the arm stops, the error is one clear line, and nothing moves until the recovery.
 
 use std::io::Write;
 use std::net::TcpStream;
@@ -17,10 +17,11 @@ use sdg_fci::wire::{
 };
 use sdg_fci::{FciError, Limits, RobotError, read_message};
 
-/// The Panda's slowest joint brakes from its full speed in 0.29 s, this one in 0.03 s; with what the controller needs to settle.
+/// The Panda's slowest joint brakes from its full speed in 0.29 s, this one in 0.03 s; includes the controller's
+/// settling time.
 const STOPPING_TIME: Duration = Duration::from_millis(200);
 
-/// Waits for the arm to stand, within the robot's time, and checks that it goes on standing there.
+/// Waits until the arm stands still, within the robot's time, and checks that it stays so.
 fn assert_stands(robot: &mut Robot) {
     let stopped = robot.read_state().unwrap().clone();
     let begin = stopped.message_id;
@@ -80,7 +81,7 @@ fn twenty_lost_commands_stop_the_arm_and_nineteen_are_made_up_for() {
                 if (400..400 + num_lost).contains(&ms) {
                     return Ok(None);
                 }
-                // The lost commands were made up for at constant velocity.
+                // The lost commands were replaced at constant velocity.
                 if ms == 400 + num_lost {
                     assert!((state.dq_desired[0] - SPEED).abs() < 1e-9, "{:?}", state.dq_desired);
                 }
@@ -118,7 +119,7 @@ fn lost_commands_in_the_middle_of_a_motion_are_made_up_for_in_every_generator() 
             robot
                 .control_unchecked(ControllerMode::JointImpedance, generator, |_, step| {
                     ms += step.as_millis() as u64;
-                    // Three lost commands in the acceleration, and three where the speed is largest.
+                    // Three lost commands during the acceleration, and three at the highest speed.
                     if [250, 251, 252, 500, 501, 502].contains(&ms) {
                         return Ok(None);
                     }
@@ -180,7 +181,7 @@ fn what_is_no_number_is_neither_sent_nor_followed() {
         .unwrap_err();
     assert_eq!(error.to_string(), "q: expected finite numbers, found NaN");
     assert_eq!(robot.read_state().unwrap().robot_mode, RobotMode::Idle);
-    // The server refuses it from a client that does not look.
+    // The server refuses it from a client without checks.
     for (controller, generator) in [
         (ControllerMode::JointImpedance, MotionGeneratorMode::JointPosition),
         (ControllerMode::JointImpedance, MotionGeneratorMode::JointVelocity),
@@ -284,7 +285,7 @@ fn another_thread_can_stop_a_motion() {
         .unwrap_err();
     assert!(matches!(&error, FciError::Motion { status: Status::Preempted, .. }), "{error}");
     assert_stands(&mut robot);
-    // A stop is no error: the next motion may start.
+    // A stop is not an error: the next motion may start.
     assert_eq!(robot.read_state().unwrap().robot_mode, RobotMode::Idle);
     robot
         .control_joint_positions(InternalController::JointImpedance, |state, _| ControlFlow::Break(state.q_desired))

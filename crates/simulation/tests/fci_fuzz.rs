@@ -1,5 +1,5 @@
-//! A hundred thousand cycles of the simulated robot with requests and commands full of mistakes: no panic, and no number of a
-//! state that is none.
+//! A hundred thousand cycles of the simulated robot with many invalid requests and commands: no panic, and no NaN in a
+//! state.
 
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -55,7 +55,7 @@ fn any_request(rng: &mut Pcg64Mcg) -> Request {
     }
 }
 
-/// What holds the arm where it is, and a few mistakes in it.
+/// Commands that hold the arm in place, with a few errors.
 fn any_command(state: &RobotState, rng: &mut Pcg64Mcg) -> Option<RobotCommand> {
     let motion = MotionCommand {
         q: state.q_desired,
@@ -116,7 +116,7 @@ fn mistakes_stop_the_robot_and_nothing_else() {
             num_motions += u32::from(outgoing.response.status == Status::MotionStarted);
             num_finished += u32::from(outgoing.command == Command::Move && outgoing.response.status == Status::Success);
         }
-        // An arm that a mistake has set moving is soon near the end of a joint, where nothing more is learnt.
+        // An arm set in motion by an error is soon near the end of a joint, where no further cases are tested.
         let q = plant.observe().q;
         if (q - nalgebra::SVector::<f64, 7>::from(sdg_kinematics::READY_RAD)).amax() > 0.5 {
             plant = PandaPlant::new(&WorkcellConfig::new(SceneVariation::nominal(None))).unwrap();

@@ -1,7 +1,7 @@
-//! What goes wrong on the network: the arm stops, one line says why, and nothing moves by itself afterwards.
+//! Faults of the network: the arm stops, one line gives the reason, and nothing moves by itself afterwards.
 //!
-//! Faults of the robot itself (NaN and jumps in commands, another version, a failing hand) stand in fci_faults.rs, those of an arm
-//! in this process in robot_faults.rs.
+//! Faults of the robot itself (NaN and jumps in commands, another version, a failing hand) are in fci_faults.rs, those
+//! of an arm in this process in robot_faults.rs.
 
 use std::thread;
 use std::time::{Duration, Instant};
@@ -16,9 +16,9 @@ use sdg_robot::{
 };
 use sdg_simulation::{SharedPositions, Workcell};
 
-/// Time passes and nothing moves: neither the arm nor what it holds.
+/// Time passes and nothing moves: neither the arm nor the held part.
 fn assert_stands_still(arm: &mut FrankaArm, positions: &SharedPositions) {
-    // What is left of a stop dies out.
+    // The remaining motion of a stop decays.
     arm.wait(0.2, &mut Watch::default()).ok();
     let before = positions.get();
     arm.wait(0.3, &mut Watch::default()).ok();
@@ -32,7 +32,7 @@ fn assert_latched(robot: &mut Robot<FrankaArm>, motion: Trajectory, positions: &
     assert_stands_still(robot.arm(), positions);
 }
 
-/// After a recovery that was asked for, the arm moves again.
+/// After a requested recovery, the arm moves again.
 fn assert_recovers(robot: &mut Robot<FrankaArm>) {
     robot.recover().unwrap();
     let motion = some_motion(robot.arm());
@@ -51,7 +51,7 @@ fn stalling(stalls: Vec<(u32, Duration)>) -> Watch {
     }))
 }
 
-/// A command that is not there after this time is lost.
+/// A command that has not arrived after this time is lost.
 const MAX_WAIT: Duration = Duration::from_millis(20);
 
 #[test]
@@ -68,8 +68,8 @@ fn late_commands_are_made_up_for_on_the_way() {
     end[0] += 0.6;
     end[4] += 0.4;
     let duration_ms = (motion(&start, &end).duration_secs() * 1e3) as u32;
-    // Where the acceleration changes, a robot that goes on at a constant one is soon elsewhere: at the start, at the end and between.
-    // Five or so commands are lost each time.
+    // When the acceleration changes, a robot that continues at a constant one soon deviates: at the start, at the end
+    // and between. About five commands are lost each time.
     let stalls = [3, 50, 150, duration_ms / 2, duration_ms - 60, duration_ms - 8].map(|at| (at, 5 * MAX_WAIT));
     let mut robot = Robot::new(&mut arm, Workcell::safety_limits(), stalling(stalls.to_vec()));
     robot.follow(motion(&start, &end)).unwrap();
@@ -118,7 +118,7 @@ fn a_table_that_is_higher_than_its_file_says_stops_the_arm() {
     assert_latched(&mut robot, motion, &positions);
 }
 
-/// Finds the part in a picture that is so old.
+/// Finds the part in a picture of this age.
 struct OldPicture(Twin, Duration);
 
 impl PartFinder<FrankaArm> for OldPicture {
@@ -141,7 +141,7 @@ fn no_motion_begins_on_a_detection_that_is_older_than_a_second() {
     let mut robot = Robot::new(&mut arm, Workcell::safety_limits(), Watch::default());
     let report = grasp(&mut robot, &mut finder, &mut (), mount, &GraspConfig::default()).unwrap();
     let GraspOutcome::Failed { step: GraspStep::Detect, why } = &report.outcome else { panic!("{report:?}") };
-    assert_eq!(why, "the detection is 1.2 s old when the arm is to move, at most 1.0 s are allowed");
+    assert_eq!(why, "the detection is 1.2 s old when the arm should move, at most 1.0 s are allowed");
     assert_eq!(report.looks, [1, 0], "the way to the part was not begun");
     assert_stands_still(robot.arm(), &positions);
 }
@@ -154,7 +154,7 @@ fn a_part_that_slips_is_told_by_the_hand() {
     let mount = cell.wrist_camera();
     let mut twin = Twin { cell, positions: positions.clone() };
     let mut robot = Robot::new(&mut arm, Workcell::safety_limits(), Watch::default());
-    // A force that does not hold what weighs so much.
+    // A force that is too small for this weight.
     let config = GraspConfig { grasp_force_n: 0.3, ..GraspConfig::default() };
     let report = grasp(&mut robot, &mut twin, &mut (), mount, &config).unwrap();
     let GraspOutcome::Failed { step, why } = report.outcome else { panic!("0.3 N hold nothing") };

@@ -1,6 +1,7 @@
-//! A line that loses, repeats and changes what passes between robot and program: the arm goes on, or it stops with one line.
+//! A relay that loses, repeats and changes data between robot and program: the arm continues, or it stops with one
+//! line.
 //!
-//! Faults of the programs at both ends stand in network_faults.rs.
+//! Faults of the programs at both ends are in network_faults.rs.
 
 use std::time::{Duration, Instant};
 
@@ -13,18 +14,18 @@ use sdg_robot::{
 };
 use sdg_simulation::{SharedPositions, Workcell};
 
-/// A command that is not there after this time is lost.
+/// A command that has not arrived after this time is lost.
 const LOCKSTEP: Pace = Pace::Lockstep { max_wait: Duration::from_millis(20) };
-/// A fault comes so many states after the motion's begin, where the arm moves.
+/// Number of states after the motion's start at which a fault occurs, while the arm moves.
 const FAULT_AT: u64 = 500;
-/// A client that hears nothing new gives up after 3 s.
+/// A client that receives nothing new gives up after 3 s.
 const MAX_WAIT: Duration = Duration::from_secs(20);
 
 fn all_pass() -> PassCommand {
     Box::new(|_| true)
 }
 
-/// Changes the states from [`FAULT_AT`] on, so many of them.
+/// Changes this many states from [`FAULT_AT`] on.
 fn changing(num_states: u64, mut change: impl FnMut(&mut RobotState) + Send + 'static) -> ChangeState {
     Box::new(move |number, state| {
         let mut state = state.clone();
@@ -53,7 +54,7 @@ impl Line {
         Robot::new(&mut self.arm, Workcell::safety_limits(), Watch::default())
     }
 
-    /// The line of the error that ended a motion, after which nothing moves, and what was seen of the arm.
+    /// The line of the error that ended a motion, after which nothing moves, and the observed states of the arm.
     fn stopped(&mut self) -> (String, Vec<ArmState>) {
         let positions = self.positions.clone();
         let mut robot = self.robot();
@@ -67,7 +68,7 @@ impl Line {
         let open = HandCommand::Move { opening_m: 0.02, speed_m_s: 0.1 };
         assert!(matches!(robot.start_hand(open), Err(RobotError::Latched(_))), "{line}");
         let states = robot.watch().states().copied().collect();
-        // What is left of a stop dies out; the simulated time passes whether or not the client hears of it.
+        // The remaining motion of a stop decays; the simulated time passes even if the client does not hear of it.
         self.let_time_pass();
         let before = positions.get();
         self.let_time_pass();
@@ -81,7 +82,7 @@ impl Line {
         std::thread::sleep(Duration::from_millis(300));
     }
 
-    /// The motion gets to its end, whatever the line does.
+    /// The motion reaches its end in spite of the relay.
     fn arrives(&mut self) {
         let mut robot = self.robot();
         let motion = some_motion(robot.arm());
@@ -91,7 +92,7 @@ impl Line {
     }
 }
 
-/// From the fault on the arm moves for no longer than a controlled stop takes.
+/// After the fault the arm moves for no longer than a controlled stop takes.
 fn assert_stops_in_time(states: &[ArmState], is_faulty: impl Fn(&ArmState) -> bool) {
     let fault = states.iter().find(|state| is_faulty(state)).expect("the fault was seen");
     let last = states.last().unwrap();
@@ -103,7 +104,7 @@ fn assert_stops_in_time(states: &[ArmState], is_faulty: impl Fn(&ArmState) -> bo
 fn a_position_that_is_no_number_stops_the_arm() {
     let mut line = Line::new(changing(20, |state| state.q[3] = f64::NAN), all_pass());
     let (text, states) = line.stopped();
-    assert_eq!(text, "the arm was stopped: its state cannot be: joint 4 is at NaN");
+    assert_eq!(text, "the arm was stopped: its state is implausible: joint 4 is at NaN");
     assert_stops_in_time(&states, |state| state.q[3].is_nan());
     assert_eq!(line.arm.state().unwrap().mode, ArmMode::Idle);
 }
@@ -112,7 +113,7 @@ fn a_position_that_is_no_number_stops_the_arm() {
 fn a_position_that_jumps_by_a_radian_stops_the_arm() {
     let mut line = Line::new(changing(20, |state| state.q[3] += 1.0), all_pass());
     let (text, states) = line.stopped();
-    assert!(text.starts_with("the arm was stopped: its state cannot be: joint 4 jumped by 1.0"), "{text}");
+    assert!(text.starts_with("the arm was stopped: its state is implausible: joint 4 jumped by 1.0"), "{text}");
     assert_stops_in_time(&states, |state| state.q[3] - state.q_commanded[3] > 0.9);
     assert_eq!(line.arm.state().unwrap().mode, ArmMode::Idle);
 }
@@ -120,18 +121,18 @@ fn a_position_that_jumps_by_a_radian_stops_the_arm() {
 #[test]
 fn a_reference_that_cannot_be_stops_the_arm_and_is_not_followed() {
     for (value, expected) in [
-        (f64::NAN, "the arm was stopped: its state cannot be: joint 4 is led to NaN"),
-        (1.0, "the arm was stopped: its state cannot be: the reference of joint 4 jumped by 1.0"),
+        (f64::NAN, "the arm was stopped: its state is implausible: joint 4 is commanded to NaN"),
+        (1.0, "the arm was stopped: its state is implausible: the reference of joint 4 jumped by 1.0"),
     ] {
         let mut line = Line::new(changing(20, move |state| state.q_desired[3] += value), all_pass());
         let (text, _) = line.stopped();
         assert!(text.starts_with(expected), "{text}");
-        // No command was made of it: the robot ended the motion itself, without an error.
+        // No command resulted from it: the robot ended the motion itself, without an error.
         assert_eq!(line.arm.state().unwrap().mode, ArmMode::Idle);
     }
 }
 
-/// The first state of a run that is lost, and the one after it that is not.
+/// The first lost state of a run, and the first one after it.
 fn lost(num: u64) -> ChangeState {
     Box::new(move |number, state| match (FAULT_AT..FAULT_AT + num).contains(&number) {
         true => Vec::new(),
@@ -168,7 +169,7 @@ fn twenty_lost_states_or_commands_stop_the_arm() {
 fn a_line_that_goes_dead_stops_the_arm_at_both_ends() {
     let mut line = Line::new(lost(u64::MAX / 2), Box::new(|number| number < FAULT_AT));
     let (text, states) = line.stopped();
-    // The robot's own end is told over TCP, which still gets through.
+    // The robot reports its own end over TCP, which is still forwarded.
     assert!(text.starts_with("the arm stopped itself: communication_constraints_violation ("), "{text}");
     let gaps = states.windows(2).map(|pair| pair[1].time_secs - pair[0].time_secs);
     assert!(gaps.fold(0.0, f64::max) <= MAX_SILENCE_SECS + PERIOD_SECS);
@@ -199,7 +200,7 @@ fn what_is_no_state_ends_the_motion() {
         let mut line = Line::new(broken, all_pass());
         let (text, _) = line.stopped();
         assert!(text.starts_with("the connection to the robot at 127.0.0.1") && text.contains(expected), "{text}");
-        // The robot heard no more of its client and stopped.
+        // The robot no longer heard its client and stopped.
         assert_eq!(line.arm.state().unwrap().mode, ArmMode::Reflex);
     }
 }

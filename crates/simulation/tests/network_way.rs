@@ -1,4 +1,5 @@
-//! A planned way around a wall over TCP and UDP, in lockstep: followed without stopping at its waypoints, and stopped in its corner.
+//! A planned path around a wall over TCP and UDP, in lockstep: followed without stopping at its waypoints, and stopped
+//! in its corner.
 
 use crate::network::{connect, serve};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
@@ -11,7 +12,7 @@ use sdg_robot::{
 use sdg_simulation::scene::SceneVariation;
 use sdg_simulation::{CollisionWorld, Workcell, WorkcellConfig};
 
-/// How far the arm may be from its reference while it moves, rad: 30 ms of lag at most that a stiff arm has.
+/// Largest distance of the arm from its reference during motion, rad: a stiff arm lags by at most 30 ms.
 const TRACKING_RAD: f64 = 0.02;
 
 fn wall() -> Obstacle {
@@ -34,7 +35,7 @@ fn cell() -> Workcell {
     cell
 }
 
-/// The one motion to a side of the wall.
+/// The single motion to one side of the wall.
 fn plan(robot: &mut Robot<FrankaArm>, y: f64) -> Trajectory {
     let obstacles = [wall()];
     let surroundings = Surroundings {
@@ -52,7 +53,7 @@ fn plan(robot: &mut Robot<FrankaArm>, y: f64) -> Trajectory {
     way.motions.into_iter().next().unwrap()
 }
 
-/// How far a motion leaves the straight one, rad.
+/// Deviation of a motion from the straight one, rad.
 fn bend_rad(motion: &Trajectory) -> f64 {
     let (start, way) = (motion.start(), motion.end() - motion.start());
     let off = |share: usize| {
@@ -83,7 +84,7 @@ fn a_way_over_a_wall_is_followed_in_one_motion() {
         let q = JointVector::from_column_slice(&positions.get()[..7]);
         assert!((q - motion.end()).amax() < TRACKING_RAD, "{q}");
     }
-    // One of the two may be straight, from the configuration that the other ended in.
+    // One of the two may be straight, from the other's end configuration.
     assert!(most_bent_rad > 0.1, "{most_bent_rad}");
     drop(arm);
     server.stop().unwrap();

@@ -10,16 +10,16 @@ use sdg_simulation::objects::ObjectSpec;
 /// Of the parts of the tray.
 const MAX_BESIDE_M: f64 = 0.003;
 const MAX_TURNED_DEG: f64 = 3.0;
-/// A part that lies already and is not touched settles by less.
+/// Settling of a lying part that is not touched stays below this.
 const MAX_MOVED_M: f64 = 0.5e-3;
-/// What a part and a table stand.
+/// Largest force that a part and a table withstand.
 const MAX_STATIC_N: f64 = 10.0;
 const MAX_PEAK_N: f64 = 25.0;
-/// With the part in free air the tcp is no farther beside its reference.
+/// Largest deviation of the tcp from its reference with the part in free air.
 const MAX_FREE_AIR_M: f64 = 1.5e-3;
 const MAX_FREE_AIR_DEG: f64 = 0.5;
 
-/// Places parts into cells one after the other; those that lie already stay in the scene.
+/// Places parts into cells one after the other; the placed ones stay in the scene.
 fn fill(at: Where, cells: &[u32]) {
     let spec = ObjectSpec::by_name("spring_clip").unwrap();
     let mut lying: Vec<Isometry3<f64>> = Vec::new();

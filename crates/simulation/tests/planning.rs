@@ -8,7 +8,7 @@ use sdg_simulation::{CollisionWorld, PlanningProblem};
 #[test]
 fn no_path_of_fifty_collides_in_mujoco() {
     const COUNT: u64 = 50;
-    /// Of start and goal both being free it does not follow that a path exists; all of these have one.
+    /// A free start and a free goal do not imply that a path exists; all of these problems have one.
     const MIN_FOUND: usize = 49;
     let (mut num_found, mut num_bent, mut num_steps) = (0, 0, 0);
     for seed in 0..COUNT {

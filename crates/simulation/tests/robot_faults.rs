@@ -1,4 +1,4 @@
-//! What goes wrong with a simulated arm: it stops, says so in one line, and nothing moves by itself afterwards.
+//! Faults of a simulated arm: it stops, reports the reason in one line, and nothing moves by itself afterwards.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -12,7 +12,7 @@ use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::scene::SceneVariation;
 use sdg_simulation::{ArmFault, ArmFaultKind, AttemptErrors, RenderConfig, Workcell, WorkcellConfig, marked_grasp};
 
-/// Knows where the part is, and takes no picture.
+/// Knows the part's pose, and takes no picture.
 struct Truth;
 
 impl PartFinder<Workcell> for Truth {
@@ -35,7 +35,7 @@ fn run(robot: &mut Robot<'_, Workcell>) -> sdg_robot::Result<GraspReport> {
     grasp(robot, &mut Truth, &mut (), mount, &GraspConfig::default())
 }
 
-/// A motion that is safe from where the arm is.
+/// A motion that is safe from the arm's position.
 fn some_motion(robot: &mut Robot<'_, Workcell>) -> Trajectory {
     let start = robot.arm().state().unwrap().q_commanded;
     let end = start + JointVector::from([0.1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
@@ -54,10 +54,10 @@ fn assert_stands_still(robot: &mut Robot<'_, Workcell>) {
     };
     let before = place(robot);
     for _ in 0..10 {
-        // A fault that stays is seen again; the arm is at rest all the same.
+        // A persistent fault is detected again; the arm is still at rest.
         let _ = robot.wait(0.05);
     }
-    // What is left of the controller's error after a stop dies out within a tenth of a second.
+    // The controller's remaining error after a stop decays within a tenth of a second.
     assert!((place(robot) - before).amax() < 2e-3, "{}", place(robot) - before);
 }
 
@@ -74,8 +74,8 @@ fn nothing_is_wrong_without_a_fault() {
 #[test]
 fn a_state_that_cannot_be_stops_the_arm_for_good() {
     for (kind, expected) in [
-        (ArmFaultKind::NotANumber, "the arm was stopped: its state cannot be: joint 4 is at NaN"),
-        (ArmFaultKind::Jump, "the arm was stopped: its state cannot be: joint 4 jumped by 1.00"),
+        (ArmFaultKind::NotANumber, "the arm was stopped: its state is implausible: joint 4 is at NaN"),
+        (ArmFaultKind::Jump, "the arm was stopped: its state is implausible: joint 4 jumped by 1.00"),
     ] {
         // In the first motion.
         let mut cell = cell(Some(ArmFault { at_secs: 0.3, kind }));
@@ -87,7 +87,7 @@ fn a_state_that_cannot_be_stops_the_arm_for_good() {
         let stopped_after_secs = robot.arm().data().time_secs() - 0.3;
         assert!(stopped_after_secs <= STOP_SECS + 0.002, "{stopped_after_secs} s");
         assert_stands_still(&mut robot);
-        // What was seen last is there to be written to a file.
+        // The last states are available for a file.
         assert!(robot.watch().states().len() > 500);
     }
 }
@@ -100,7 +100,7 @@ fn after_a_reflex_a_person_decides() {
     assert_eq!(error.to_string(), "the arm stopped itself: an injected reflex");
     assert_stands_still(&mut robot);
     assert!(robot.latched().unwrap().contains("an injected reflex"));
-    // What caused it is still there.
+    // Its cause persists.
     assert!(robot.recover().is_err());
     assert_stands_still(&mut robot);
 }
@@ -117,7 +117,7 @@ fn a_program_that_starts_anew_finds_the_arm_in_reflex() {
 #[test]
 fn a_hand_that_does_nothing_is_noticed() {
     // It fails before it opens to the part's width, and after that, before it closes.
-    for (at_secs, expected) in [(0.5, "the hand failed: it was to open to"), (3.0, "do not press")] {
+    for (at_secs, expected) in [(0.5, "the hand failed: the opening should be"), (3.0, "do not press")] {
         let mut cell = cell(Some(ArmFault { at_secs, kind: ArmFaultKind::HandStuck }));
         let mut robot = Robot::new(&mut cell, Workcell::safety_limits(), Watch::default());
         match run(&mut robot) {
@@ -137,7 +137,7 @@ fn a_hand_that_does_nothing_is_noticed() {
 fn a_part_that_slips_is_felt_by_the_hand() {
     let mut cell = cell(None);
     let mut robot = Robot::new(&mut cell, Workcell::safety_limits(), Watch::default());
-    // A force that does not hold what weighs so much.
+    // A force that is too small for this weight.
     let config = GraspConfig { grasp_force_n: 0.3, ..GraspConfig::default() };
     let mount = robot.arm().wrist_camera();
     let report = grasp(&mut robot, &mut Truth, &mut (), mount, &config).unwrap();
@@ -162,7 +162,7 @@ fn a_person_stops_the_arm_on_its_path() {
     let state = robot.arm().state().unwrap();
     assert!(state.dq.amax() < 0.02, "{}", state.dq);
     assert_stands_still(&mut robot);
-    // A person has looked: it moves again.
+    // A person has checked it: it moves again.
     pressed.store(false, Ordering::SeqCst);
     robot.recover().unwrap();
     let motion = some_motion(&mut robot);
@@ -180,8 +180,8 @@ fn a_motion_from_elsewhere_is_not_begun() {
     let slow = JointLimits::panda().scaled(0.1, 0.1, 0.1).unwrap();
     let motion = Trajectory::point_to_point(&start, &ready_pose(), &slow).unwrap();
     let error = robot.follow(motion).unwrap_err().to_string();
-    assert!(error.contains("starts 1.000 rad from where joint 2 is"), "{error}");
-    // It was not begun, so nothing needs a person's look.
+    assert!(error.contains("starts 1.000 rad from the position of joint 2 is"), "{error}");
+    // It was not started, so that no person needs to check it.
     assert_eq!(robot.latched(), None);
     let motion = some_motion(&mut robot);
     robot.follow(motion).unwrap();

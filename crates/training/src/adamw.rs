@@ -22,13 +22,13 @@ pub struct AdamW {
 }
 
 impl AdamW {
-    /// With β of 0.9 and 0.999 and ε of 1e-8. `weight_decay` is decoupled from the gradients; each parameter's gradient is
-    /// scaled down to a norm of `max_gradient_norm` where it is larger.
+    /// With β of 0.9 and 0.999 and ε of 1e-8. `weight_decay` is decoupled from the gradients; each parameter's gradient
+    /// is scaled down to a norm of `max_gradient_norm` if it is larger.
     pub fn new(weight_decay: f64, max_gradient_norm: f64) -> Self {
         Self { weight_decay, max_gradient_norm, step: 0, moments: HashMap::new() }
     }
 
-    /// The module after a step; parameters without a gradient stay as they are.
+    /// The module after a step; parameters without a gradient are unchanged.
     pub fn step<M: Module>(&mut self, learning_rate: f64, module: M, gradients: GradientsParams) -> M {
         self.step += 1;
         let params = AdamWParams {
@@ -44,7 +44,7 @@ impl AdamW {
     }
 }
 
-/// The state of [`AdamW`] between steps, by the parameters' names: enough to go on with the same bits.
+/// The state of [`AdamW`] between steps, by the parameters' names: enough to continue with the same bits.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct AdamWState {
     /// Steps done.
@@ -67,8 +67,8 @@ impl AdamW {
         AdamWState { step: self.step, moments }
     }
 
-    /// The same optimiser as it was for `module` when [`Self::state`] was asked. Moments of parameters that the module
-    /// has not, or has in another size, are left out.
+    /// The same optimiser as for `module` when [`Self::state`] was called. Moments of parameters that the module
+    /// lacks, or has in another size, are left out.
     pub fn with_state<M: Module>(mut self, module: &M, state: &AdamWState) -> Self {
         self.step = state.step;
         self.moments.clear();
@@ -173,7 +173,7 @@ mod tests {
         let mut restored = AdamW::new(0.1, 0.5).with_state(&net, &state);
         let (one, other) = (step(&mut adamw, net.clone()), step(&mut restored, net.clone()));
         assert_eq!(state_dict::export(&one), state_dict::export(&other));
-        // Without its memory the step is another.
+        // Without its state the step differs.
         let forgetful = step(&mut AdamW::new(0.1, 0.5), net);
         assert_ne!(state_dict::export(&one), state_dict::export(&forgetful));
     }

@@ -1,11 +1,11 @@
-//! Why a training run ended without a network.
+//! The reason why a training run ended without a network.
 
-/// Why a run ended without a network.
+/// The reason why a run ended without a network.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum TrainingError {
-    /// A setting that no run can have.
+    /// An invalid setting of a run.
     #[error("{setting}: expected {expected}, found {found}")]
     BadSetting { setting: &'static str, expected: &'static str, found: String },
     /// A loss that is NaN or infinite.
@@ -18,16 +18,16 @@ pub enum TrainingError {
         /// The learning rate of that step.
         learning_rate: f64,
     },
-    /// The observer asked to stop before there was anything to keep.
+    /// The observer requested a stop before there was a network to keep.
     #[error("stopped at step {step}, before the first validation: there is no model to keep")]
     StoppedTooEarly { step: usize },
-    /// The held-back samples could not be looked at.
+    /// The held-back samples could not be examined.
     #[error("the held-back samples cannot be examined: {0}")]
     Examination(Box<dyn std::error::Error + Send + Sync>),
     /// A demonstration that cannot be taught.
     #[error(transparent)]
     Demonstration(#[from] sdg_demonstration::Error),
-    /// Parameters to start the orientation CNN from that are another network's.
+    /// Initial parameters of the orientation CNN that belong to another network.
     #[error("weights to start the orientation CNN from: expected those of this network, found another {name}")]
     Start {
         /// The first parameter that does not fit.

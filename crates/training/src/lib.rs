@@ -6,13 +6,13 @@
 //! held-back samples ─────────────────────── validation in pixels and degrees ─────┘ best checkpoint, early stop
 //! ```
 //!
-//! Both are taught by one loop (run.rs), and what differs is a `Task`: batches, loss, validation.
+//! Both are trained by one loop (run.rs); their differences are in a `Task`: batches, loss, validation.
 //!
-//! A run is a function of its seed: which samples, in which order, every random choice of the losses. Only a time
-//! budget that cuts a run short makes it depend on the machine.
+//! A run is a function of its seed: the samples, their order, and every random choice of the losses. It depends
+//! on the machine only if a time budget shortens it.
 //!
-//! What is deliberately absent: how a grasp is read off detections (the `grasp` crate passes that in), files, and any
-//! printing: a run reports its progress by [`TrainingEvent`]s.
+//! This crate deliberately does not read grasps from detections (the `grasp` crate passes that in), has no files, and
+//! prints nothing: a run reports its progress by [`TrainingEvent`]s.
 //!
 //! ```
 //! use sdg_training::{OneCycle, TrainingConfig};

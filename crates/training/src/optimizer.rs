@@ -1,4 +1,4 @@
-//! The optimiser that a configuration asks for.
+//! The configured optimiser.
 
 use burn::grad_clipping::GradientClippingConfig;
 use burn::module::Module;
@@ -9,34 +9,34 @@ use serde::{Deserialize, Serialize};
 
 use crate::adamw::AdamW;
 
-/// What a step makes of the gradients.
+/// The update rule of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Optimizer {
-    /// Steps as long as the gradients are steady: learns from nothing in a few hundred of them.
+    /// Steps of constant length for steady gradients: learns from random values in a few hundred of them.
     AdamW,
     /// Stochastic gradient descent with momentum, as Detectron2 fine-tunes.
     Sgd {
-        /// Share of the last step that the next one keeps.
+        /// Share of the last step that is added to the next.
         momentum: f64,
     },
 }
 
 /// An optimiser with its state.
 pub(crate) enum Stepper {
-    /// Our AdamW, one kernel a parameter.
+    /// Our AdamW, one kernel per parameter.
     Fused(AdamW),
     /// An optimiser of burn.
     Composed(ModuleOptimizer),
 }
 
 impl Stepper {
-    /// The optimiser of a detector. Each parameter's gradient is cut to a norm of `max_gradient_norm`.
+    /// The optimiser of a detector. Each parameter's gradient is scaled down to a norm of at most `max_gradient_norm`.
     pub(crate) fn new(optimizer: Optimizer, weight_decay: f64, max_gradient_norm: f32) -> Self {
         match optimizer {
             Optimizer::AdamW => Self::Fused(AdamW::new(weight_decay, max_gradient_norm.into())),
             Optimizer::Sgd { momentum } => {
                 let sgd = SgdConfig::new()
-                    // Without dampening, as torch and Detectron2 have it.
+                    // Without dampening, as in torch and Detectron2.
                     .with_momentum(Some(MomentumConfig::new().with_momentum(momentum).with_dampening(0.0)))
                     .with_weight_decay(Some(WeightDecayConfig::new(weight_decay as f32)))
                     .with_gradient_clipping(Some(GradientClippingConfig::Norm(max_gradient_norm)));
@@ -45,8 +45,8 @@ impl Stepper {
         }
     }
 
-    /// burn's AdamW, which the orientation CNN is taught with: ours differs from it in the last bits, and the models of a
-    /// seed are to stay what they are.
+    /// burn's AdamW, which trains the orientation CNN: ours differs from it in the last bits, and the models of a seed
+    /// must not change.
     pub(crate) fn composed_adamw(weight_decay: f64, max_gradient_norm: f32) -> Self {
         let adamw = AdamWConfig::new()
             .with_weight_decay(weight_decay as f32)

@@ -1,8 +1,8 @@
-//! How far a run is, in [0, 1], from its steps, time budget and early stop.
+//! The progress of a run, in [0, 1], from its steps, time budget and early stop.
 
 use serde::{Deserialize, Serialize};
 
-/// Why a run ended.
+/// The reason for a run's end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Ending {
     /// All steps were done.
@@ -11,7 +11,7 @@ pub enum Ending {
     EarlyStop,
     /// The time budget was used up.
     TimeBudget,
-    /// The observer asked to stop.
+    /// The observer requested a stop.
     Interrupted,
 }
 
@@ -20,7 +20,7 @@ pub enum Ending {
 pub(crate) struct Pace {
     steps: usize,
     budget_secs: Option<f64>,
-    /// Step and progress at which a validation was good enough, and the steps left from there.
+    /// Step and progress at which a validation was good enough, and the remaining steps from there.
     cool_down: Option<(usize, f64, usize)>,
 }
 
@@ -47,12 +47,12 @@ impl Pace {
         }
     }
 
-    /// Steps that the run will have, as known now.
+    /// Number of steps of the run, as known now.
     pub(crate) fn planned_steps(&self) -> usize {
         self.cool_down.map_or(self.steps, |(from, _, length)| from + length)
     }
 
-    /// Why the run is over before `step`, or `None` while it is not.
+    /// The reason why the run is over before `step`, or `None` while it is not.
     pub(crate) fn ending(&self, step: usize, elapsed_secs: f64) -> Option<Ending> {
         if step >= self.planned_steps() {
             return Some(if self.cool_down.is_some() { Ending::EarlyStop } else { Ending::Completed });

@@ -1,20 +1,20 @@
-//! Batches, prepared on another thread while the network is busy with the one before.
+//! Batches, prepared on another thread while the network processes the one before.
 
 use std::collections::VecDeque;
 use std::sync::mpsc;
 
 use crate::error::TrainingError;
 
-/// A batch that is asked for.
+/// A requested batch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct BatchRequest<K> {
-    /// The step that learns from it.
+    /// The step that uses it.
     pub(crate) step: usize,
-    /// Kind of the batch, where a run has several.
+    /// Kind of the batch, if a run has several.
     pub(crate) kind: K,
 }
 
-/// Batches asked for ahead: one in use, one ready, one in the making.
+/// Number of requested batches: one in use, one ready, one in preparation.
 const AHEAD: usize = 2;
 
 /// Batches in the order of their steps, prepared ahead on another thread.
@@ -25,8 +25,8 @@ pub(crate) struct Batches<K, B> {
 }
 
 impl<K: Copy + PartialEq, B> Batches<K, B> {
-    /// The batch that is wanted. The ones after it are asked for as if nothing changed; when something did, they are
-    /// thrown away, so that what is trained on depends on the requests alone and not on which thread was faster.
+    /// The requested batch. The following ones are requested as if nothing changed; if something did, they are
+    /// discarded, so that the training depends on the requests alone and not on the threads' speed.
     pub(crate) fn next(&mut self, wanted: BatchRequest<K>) -> Result<B, TrainingError> {
         if self.pending.front().is_some_and(|first| *first != wanted) {
             while self.pending.pop_front().is_some() {
@@ -36,7 +36,7 @@ impl<K: Copy + PartialEq, B> Batches<K, B> {
         for step in wanted.step + self.pending.len()..=wanted.step + AHEAD {
             let request = BatchRequest { step, ..wanted };
             self.pending.push_back(request);
-            // Fails only when the thread has ended, which receiving then tells.
+            // Fails only when the thread has ended, which the receiving side reports.
             let _ = self.requests.send(request);
         }
         self.pending.pop_front();
@@ -46,14 +46,14 @@ impl<K: Copy + PartialEq, B> Batches<K, B> {
     fn receive(&mut self) -> Result<B, TrainingError> {
         match self.batches.recv() {
             Ok(batch) => batch,
-            // The thread ends early only by a panic, which the scope raises again.
+            // The thread ends early only by a panic, which the scope propagates.
             Err(mpsc::RecvError) => panic!("the thread that prepares batches ended"),
         }
     }
 }
 
-/// Runs `consume` while another thread prepares the batches that it asks for, in the order of the requests. The thread
-/// ends with `consume`.
+/// Runs `consume` while another thread prepares the requested batches, in the order of the requests. The thread ends
+/// with `consume`.
 pub(crate) fn with_batches<K: Copy + PartialEq + Send, B: Send, T>(
     mut prepare: impl FnMut(BatchRequest<K>) -> Result<B, TrainingError> + Send,
     consume: impl FnOnce(&mut Batches<K, B>) -> T,
@@ -63,7 +63,7 @@ pub(crate) fn with_batches<K: Copy + PartialEq + Send, B: Send, T>(
         let (sender, batches) = mpsc::channel();
         scope.spawn(move || {
             for request in asked {
-                // An error here means that nobody waits any more.
+                // An error here means that the receiver is gone.
                 if sender.send(prepare(request)).is_err() {
                     return;
                 }

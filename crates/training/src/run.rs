@@ -1,6 +1,6 @@
-//! The loop that teaches every network: batch, loss, gradients, step; now and then a validation.
+//! The loop that trains every network: batch, loss, gradients, step, and sometimes a validation.
 //!
-//! What is taught is a [`Task`]; the loop knows only the order of things, the learning rate and the ends of a run.
+//! A [`Task`] defines the training; the loop handles only the order, the learning rate and the end of a run.
 
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
@@ -14,22 +14,22 @@ use crate::optimizer::Stepper;
 use crate::pace::{Ending, Pace};
 use crate::schedule::OneCycle;
 
-/// A network and what it learns.
+/// A network and its training data.
 pub(crate) trait Task {
-    /// The network, on a device that carries autodiff while it is taught.
+    /// The network, on a device that carries autodiff during training.
     type Network: Module;
-    /// What a step learns from.
+    /// The data of a step.
     type Batch;
-    /// The loss of a step in figures.
+    /// The figures of a step's loss.
     type Losses: LossFigures;
 
-    /// The batch of a step, when `progress` of the run, in [0, 1], is done.
+    /// The batch of a step at `progress` of the run, in [0, 1].
     ///
     /// # Errors
     /// A sample that the network refuses.
     fn batch(&mut self, step: usize, progress: f64) -> Result<Self::Batch, TrainingError>;
 
-    /// The loss to descend, a scalar `[1]`, and its figures.
+    /// The loss to minimise, a scalar `[1]`, and its figures.
     ///
     /// # Errors
     /// A batch that the network refuses.
@@ -40,13 +40,13 @@ pub(crate) trait Task {
         step: usize,
     ) -> Result<(Tensor<1>, Self::Losses), TrainingError>;
 
-    /// Hears of a step and may end the run.
+    /// Called after a step; may stop the run.
     fn after_step(&mut self, step: &Step<'_, Self>) -> ControlFlow<()>;
 
-    /// Measures the network, here without gradients, after some steps.
+    /// Measures the network, without gradients, after some steps.
     ///
     /// # Errors
-    /// Held-back samples that cannot be looked at.
+    /// Held-back samples that cannot be examined.
     fn validate(
         &mut self,
         network: Self::Network,
@@ -60,7 +60,7 @@ pub(crate) trait LossFigures: Copy {
     /// Name in messages.
     const NAME: &'static str;
 
-    /// The loss that the step descends.
+    /// The loss that is minimised.
     fn total(&self) -> f64;
 }
 
@@ -72,24 +72,24 @@ pub(crate) struct Step<'a, T: Task + ?Sized> {
     pub(crate) learning_rate: f64,
     /// Losses before the update.
     pub(crate) losses: T::Losses,
-    /// Steps that the run will have, as known now.
+    /// Number of steps of the run, as known now.
     pub(crate) planned_steps: usize,
     /// Since the start of the run.
     pub(crate) elapsed_secs: f64,
 }
 
-/// What a validation decides.
+/// The decision of a validation.
 pub(crate) struct Validated {
-    /// Steps from here to the end of the run, where the network is good enough.
+    /// Number of steps from here to the end of the run, if the network is good enough.
     pub(crate) cool_down: Option<usize>,
     /// Whether the run continues.
     pub(crate) flow: ControlFlow<()>,
 }
 
-/// What a loop needs to know of a run's settings.
+/// The settings that a loop needs.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct RunSettings {
-    /// Optimiser steps, unless early stop or the time budget ends the run before.
+    /// Optimiser steps, unless early stop or the time budget ends the run earlier.
     pub(crate) steps: usize,
     /// Wall-clock time for the whole run.
     pub(crate) time_budget: Option<Duration>,
@@ -123,7 +123,7 @@ pub(crate) struct Ended<N> {
     pub(crate) ending: Ending,
 }
 
-/// Teaches a network. A run that is not interrupted ends with a validation.
+/// Trains a network. A run that is not interrupted ends with a validation.
 ///
 /// # Errors
 /// A loss that is not finite, and the task's own.
@@ -139,7 +139,7 @@ pub(crate) fn run<T: Task>(
     let (mut step, mut validated_at) = (0, None);
     let ending = loop {
         if let Some(ending) = pace.ending(step, elapsed_secs()) {
-            // The last steps have the lowest learning rate: what they made of the network is not known yet.
+            // The last steps have the lowest learning rate: their effect on the network is not known yet.
             if validated_at != Some(step) {
                 task.validate(network.valid(), step, start)?;
             }

@@ -5,8 +5,8 @@ use serde::{Deserialize, Serialize};
 /// One cycle: a cosine up to `peak` during warm-up, a cosine down to nearly nothing for the rest.
 ///
 /// # Source
-/// Smith and Topin 2018, with PyTorch's `OneCycleLR` factors. Detectron2's default warm-up of 1000 iterations makes
-/// the paper's 1000-iteration runs one long ramp upwards: the trap that this schedule avoids.
+/// Smith and Topin 2018, with PyTorch's `OneCycleLR` factors. With Detectron2's default warm-up of 1000 iterations
+/// the learning rate of the paper's 1000-iteration runs only increases; this schedule avoids that.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct OneCycle {
     /// Highest learning rate.
@@ -21,7 +21,7 @@ const START_DIVISOR: f64 = 25.0;
 const END_DIVISOR: f64 = 1e4;
 
 impl OneCycle {
-    /// The learning rate when `progress` of the run, in `[0, 1]`, is done.
+    /// The learning rate at `progress` of the run, in `[0, 1]`.
     pub fn learning_rate(&self, progress: f64) -> f64 {
         let progress = progress.clamp(0.0, 1.0);
         if progress < self.warm_up {

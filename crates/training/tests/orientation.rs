@@ -1,4 +1,4 @@
-//! The orientation CNN learns, repeatably, and every parameter takes part.
+//! The orientation CNN learns, repeatably, and every parameter contributes.
 #![allow(clippy::unwrap_used)]
 
 use std::ops::ControlFlow;
@@ -11,7 +11,7 @@ use sdg_orientation::OrientationConfig;
 use sdg_training::orientation::{LabelledCrop, OrientationEvent, OrientationTraining, TrainedOrientation, train};
 use sdg_training::{Ending, OneCycle, TrainingError};
 
-/// A bar through the middle at an angle, bright towards its end.
+/// A bar through the centre at an angle, bright towards its end.
 fn bar(degrees: f64) -> LabelledCrop {
     let (sin, cos) = degrees.to_radians().sin_cos();
     let crop = RgbImage::from_fn(32, 32, |x, y| {
@@ -23,7 +23,7 @@ fn bar(degrees: f64) -> LabelledCrop {
     LabelledCrop { crop, angle: Angle::from_degrees(degrees) }
 }
 
-/// Four bars a scene, spread over the circle by the golden angle.
+/// Four bars per scene, distributed over the circle by the golden angle.
 fn bars(scene_idx: u64) -> Vec<LabelledCrop> {
     (0..4).map(|i| bar(137.508 * (4 * scene_idx + i) as f64)).collect()
 }
@@ -70,7 +70,7 @@ fn ten_steps_on_bars_lower_the_loss_the_same_way_twice() {
     };
     let ((first, weights), (again, same_weights)) = (losses(), losses());
     assert_eq!(first.len(), 10);
-    // Before the first step every angle is as likely as any other: ln 360.
+    // Before the first step all angles are equally likely: ln 360.
     assert!((first[0] - 360f64.ln()).abs() < 0.1, "{first:?}");
     assert!(first[9] < first[0] - 0.3, "{first:?}");
     assert_eq!((first, weights), (again, same_weights));

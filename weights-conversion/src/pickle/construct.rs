@@ -1,4 +1,4 @@
-//! What the allowed globals make of their arguments, and what a state does to an object.
+//! The results of the allowed globals for their arguments, and the effect of a state on an object.
 
 use crate::element::ElementType;
 use crate::error::{Result, WeightsError};
@@ -12,10 +12,10 @@ fn damaged(at: u64, expected: impl Into<String>, found: impl Into<String>) -> We
     WeightsError::damaged(format!("pickle, byte {at}"), expected, found)
 }
 
-/// Imitates a call.
+/// Emulates a call.
 pub(crate) fn call(arena: &mut Arena, global: Global, arguments: &[Value], at: u64) -> Result<Value> {
     let object = match (global, arguments) {
-        // The class, a shape and a letter, all of which the state overrides.
+        // The class, a shape and a letter; the state overrides them all.
         (Global::Reconstruct, [Value::Global(Global::NdArray), ..]) => Object::Array(None),
         (Global::FromBuffer, &[buffer, dtype, shape, order]) => {
             let fortran_order = arena.text(order) == Some("F");
@@ -50,7 +50,7 @@ pub(crate) fn call(arena: &mut Arena, global: Global, arguments: &[Value], at: u
 pub(crate) fn set_state(arena: &mut Arena, object: Value, state: Value, at: u64) -> Result<()> {
     match arena.object(object) {
         Some(Object::Array(None)) => {
-            // Old arrays lack the version in front.
+            // Old arrays lack the leading version.
             let (shape, dtype, fortran_order, buffer) = match arena.sequence(state) {
                 Some(&[Value::Int(_), shape, dtype, Value::Bool(fortran_order), buffer])
                 | Some(&[shape, dtype, Value::Bool(fortran_order), buffer]) => (shape, dtype, fortran_order, buffer),
@@ -82,7 +82,7 @@ pub(crate) fn set_state(arena: &mut Arena, object: Value, state: Value, at: u64)
             }
             Ok(())
         }
-        // torch hangs `_metadata` on a state dict; no weight depends on it.
+        // torch attaches `_metadata` to a state dict; no weight depends on it.
         Some(Object::Dict(_)) => Ok(()),
         _ => Err(damaged(at, "an array, an element type or a dict that takes a state", arena.describe(object))),
     }
@@ -105,7 +105,7 @@ pub(crate) fn storage(arena: &mut Arena, id: Value, at: u64) -> Result<Value> {
         return Err(damaged(at, "a storage's key of at most 64 bytes", format!("{} bytes", key.len())));
     }
     if !matches!(view, [] | [Value::None]) {
-        return Err(damaged(at, "a storage of its own", "a view of another storage, as torch before 0.4 wrote"));
+        return Err(damaged(at, "a separate storage", "a view of another storage, as torch before 0.4 wrote"));
     }
     let storage = StorageRef { key: key.into(), element, num_elements };
     Ok(arena.add(Object::Storage(Box::new(storage))))

@@ -2,14 +2,14 @@
 
 use crate::element::ElementType;
 
-/// A function or class that the machine imitates.
+/// A function or class that the machine emulates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Global {
     /// Makes an empty numpy array, which a state then fills.
     Reconstruct,
     /// Makes a numpy array around a buffer (protocol 5).
     FromBuffer,
-    /// Makes a numpy scalar; no weight.
+    /// Makes a numpy scalar, which is not a weight.
     Scalar,
     /// The class of numpy arrays.
     NdArray,
@@ -21,7 +21,7 @@ pub(crate) enum Global {
     Bytes,
     /// Makes a dict.
     OrderedDict,
-    /// Makes a torch tensor: storage, offset, size, stride, and what training needs.
+    /// Makes a torch tensor: storage, offset, size, stride, and training data.
     RebuildTensor,
     /// Wraps a torch tensor.
     RebuildParameter,
@@ -30,7 +30,7 @@ pub(crate) enum Global {
 }
 
 impl Global {
-    /// The global of that name, if it is one that weights need.
+    /// The global of that name, if weights need it.
     pub fn resolve(module: &str, name: &str) -> Option<Self> {
         Some(match (module, name) {
             ("numpy.core.multiarray" | "numpy._core.multiarray", "_reconstruct") => Self::Reconstruct,

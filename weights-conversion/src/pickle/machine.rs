@@ -10,18 +10,18 @@ use super::construct;
 use super::global::Global;
 use super::object::{Arena, Object, Pickle, Text, Value};
 
-/// A ResNet-50 detector with its optimiser's state takes some 30 000. Bounds memory and time: an operation adds some
-/// 200 bytes at most, beside what it copies from the file.
+/// Maximum number of operations; a ResNet-50 detector with its optimiser's state has about 30 000. Limits memory and
+/// time: an operation adds at most about 200 bytes, besides copies from the file.
 const MAX_OPERATIONS: u32 = 400_000;
-/// Longer text is no name.
+/// Longer texts are not names.
 const LONGEST_NAME: u64 = 1024;
-/// More arguments than any allowed function takes.
+/// Maximum number of arguments of an allowed function.
 const MAX_ARGUMENTS: usize = 16;
 
 /// Runs the pickle at the start of `span`.
 ///
 /// # Errors
-/// A global that weights do not need; anything that is no pickle of protocol 2 to 5, or is cut short or altered.
+/// A global that weights do not need; a file that is not a pickle of protocol 2 to 5, or is truncated or altered.
 pub(crate) fn load(source: &mut Source, span: Span) -> Result<Pickle> {
     let mut machine = Machine {
         scanner: Scanner::new(source, span)?,
@@ -44,7 +44,7 @@ pub(crate) fn load(source: &mut Source, span: Span) -> Result<Pickle> {
 
 struct Machine<'a> {
     scanner: Scanner<'a>,
-    /// Where the current operation stands in the file.
+    /// The position of the current operation in the file.
     at: u64,
     stack: Vec<Value>,
     /// Heights of the stack at the open marks.
@@ -55,7 +55,7 @@ struct Machine<'a> {
 }
 
 impl Machine<'_> {
-    /// Does one operation; true at the end of the pickle.
+    /// Executes one operation; returns true at the end of the pickle.
     fn step(&mut self) -> Result<bool> {
         self.charge(1)?;
         self.at = self.scanner.position();
@@ -63,7 +63,7 @@ impl Machine<'_> {
         match opcode {
             // STOP
             b'.' => return Ok(true),
-            // PROTO, FRAME: the machine has no use for them.
+            // PROTO, FRAME: not used by the machine.
             0x80 => self.scanner.skip(1).map(drop)?,
             0x95 => self.scanner.skip(8).map(drop)?,
             b'(' => self.marks.push(self.stack.len()),
@@ -183,7 +183,7 @@ impl Machine<'_> {
         Ok(())
     }
 
-    /// Text, Python 2 strings and bytes: short ones are read, of the others the place is kept.
+    /// Text, Python 2 strings and bytes: short ones are read, of the others the position is stored.
     fn string(&mut self, opcode: u8) -> Result<()> {
         let scanner = &mut self.scanner;
         let len = match opcode {
@@ -335,7 +335,7 @@ impl Machine<'_> {
             return Err(self.damaged("a few arguments", format!("{}", items.len())));
         }
         let items = items.to_vec();
-        // A dict made of a list copies the list.
+        // A dict made from a list copies the list.
         if let Some(list) = items.first().and_then(|first| self.arena.sequence(*first)) {
             self.charge(list.len())?;
         }

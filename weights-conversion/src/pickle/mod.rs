@@ -1,11 +1,12 @@
 //! A pickle reader that can build weights and nothing else.
 //!
-//! Python's pickle is a program for a stack machine, and a forged one may call any function. This machine knows the
-//! opcodes of protocols 2 to 5 and [a dozen globals](global::Global), which it imitates; any other global ends the
-//! reading with an error that names it. Large strings are not read but remembered by their place in the file.
+//! Python's pickle is a program for a stack machine, and a forged one may call any function. This machine supports
+//! the opcodes of protocols 2 to 5 and [a dozen globals](global::Global), which it emulates; any other global ends
+//! the reading with an error that names it. Large strings are not read; only their positions in the file are
+//! stored.
 //!
-//! Objects live in one arena and refer to each other by index: an object may contain itself, and nothing here
-//! recurses. The number of operations is bounded, so memory is too.
+//! Objects live in one arena and refer to each other by index: an object may contain itself, and no function
+//! here is recursive. The number of operations is limited, and therefore also the memory.
 
 pub(crate) mod construct;
 pub(crate) mod global;

@@ -1,4 +1,4 @@
-//! What the machine builds: values, and an arena of objects.
+//! The objects of the machine: values, and an arena of objects.
 
 use crate::element::ElementType;
 use crate::error::Result;
@@ -28,7 +28,7 @@ pub(crate) struct Dtype {
     pub big_endian: bool,
 }
 
-/// A torch storage, by reference: its bytes stand elsewhere.
+/// A torch storage, by reference: its bytes are elsewhere.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct StorageRef {
     pub key: Box<str>,
@@ -45,13 +45,13 @@ pub(crate) struct TensorRef {
     pub strides: Vec<usize>,
 }
 
-/// Text, or a Python 2 string, which is text or bytes as its reader likes.
+/// Text, or a Python 2 string, which may be text or bytes.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Text {
     pub span: Span,
-    /// How its bytes are written, if it stands for bytes.
+    /// The encoding of its bytes, if it represents bytes.
     pub encoding: Encoding,
-    /// The text itself, where it is short enough for a name.
+    /// The text itself, if it is short enough for a name.
     pub short: Option<Box<str>>,
 }
 
@@ -68,7 +68,7 @@ pub(crate) enum Object {
     Array(Option<Box<StoredTensor>>),
     Storage(Box<StorageRef>),
     Tensor(Box<TensorRef>),
-    /// Something that is no weight.
+    /// An object that is not a weight.
     Other,
 }
 
@@ -79,7 +79,7 @@ pub(crate) struct Arena {
 }
 
 impl Arena {
-    /// Adds an object. The machine's bound on operations keeps the count far below `u32::MAX`.
+    /// Adds an object. The machine's limit of operations keeps the count far below `u32::MAX`.
     pub fn add(&mut self, object: Object) -> Value {
         self.objects.push(object);
         Value::Object((self.objects.len() - 1) as u32)
@@ -90,7 +90,7 @@ impl Arena {
         self.objects.iter()
     }
 
-    /// The object behind a value.
+    /// The object of a value.
     pub fn object(&self, value: Value) -> Option<&Object> {
         match value {
             Value::Object(idx) => self.objects.get(idx as usize),
@@ -98,7 +98,7 @@ impl Arena {
         }
     }
 
-    /// The object behind a value, to change.
+    /// The object of a value, mutable.
     pub fn object_mut(&mut self, value: Value) -> Option<&mut Object> {
         match value {
             Value::Object(idx) => self.objects.get_mut(idx as usize),
@@ -114,7 +114,7 @@ impl Arena {
         }
     }
 
-    /// Bytes, or a Python 2 string that stands for bytes.
+    /// Bytes, or a Python 2 string that represents bytes.
     pub fn bytes(&self, value: Value) -> Option<Payload> {
         match self.object(value)? {
             Object::Bytes(payload) => Some(*payload),
@@ -165,7 +165,7 @@ impl Arena {
         items.iter().map(size).collect()
     }
 
-    /// What a value is, for an error.
+    /// The kind of a value, for an error.
     pub fn describe(&self, value: Value) -> &'static str {
         match value {
             Value::None => "None",
@@ -186,11 +186,11 @@ impl Arena {
     }
 }
 
-/// What a pickle built.
+/// The result of a pickle.
 #[derive(Debug)]
 pub(crate) struct Pickle {
     pub arena: Arena,
     pub root: Value,
-    /// Where the pickle ends in the file.
+    /// The end of the pickle in the file.
     pub end: u64,
 }

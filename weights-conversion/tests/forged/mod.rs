@@ -1,7 +1,7 @@
 //! Checkpoint files built byte by byte, with contents that no regular writer makes.
 #![allow(dead_code, reason = "each test takes what it needs")]
 
-/// Parts in a row.
+/// A sequence of parts.
 pub fn cat(parts: &[&[u8]]) -> Vec<u8> {
     parts.concat()
 }
@@ -11,7 +11,7 @@ pub fn text(text: &str) -> Vec<u8> {
     cat(&[&[0x8c, text.len() as u8], text.as_bytes()])
 }
 
-/// A pickled dict of one name; `value` are the operations that make its value.
+/// A pickled dict of one name; `value` contains the operations for its value.
 pub fn dict_with(name: &str, value: &[u8]) -> Vec<u8> {
     cat(&[b"\x80\x04}", &text(name), value, b"s."])
 }

@@ -1,4 +1,4 @@
-//! The squares, their dots, and where corners lie.
+//! The squares, their dots, and the positions of corners.
 
 use nalgebra::{Point2, Point3};
 
@@ -6,8 +6,9 @@ use crate::error::CalibrationError;
 
 /// Squares of the pattern of dots in each direction, more than any board has.
 pub(crate) const PATTERN_SIDE: u32 = 32;
-/// The dots: one bit for each square, `1 << column` of `PATTERN[row]`. Drawn at random, and the first of 100 s of draws at which on 9 × 6
-/// squares any two windows of 3 × 3 differ and any two of 4 × 4 in at least four squares, under every turn (the test below).
+/// The dots: one bit for each square, `1 << column` of `PATTERN[row]`. Drawn at random; the first pattern of 100 s of
+/// draws in which on 9 × 6 squares any two windows of 3 × 3 differ, and any two of 4 × 4 differ in at least four
+/// squares, at every turn (the test below).
 const PATTERN: [u32; PATTERN_SIDE as usize] = pattern(13);
 
 const fn pattern(seed: u64) -> [u32; PATTERN_SIDE as usize] {
@@ -35,9 +36,9 @@ pub struct Board {
 }
 
 impl Board {
-    /// Fewest and most squares in a direction: four have three by three corners between them.
+    /// Minimum and maximum number of squares in a direction: four have three by three corners between them.
     pub const SIDES: [u32; 2] = [4, 30];
-    /// A dot's radius in sides of a square. A saddle point's neighbourhood, up to 0.45 sides, stays free of it.
+    /// A dot's radius in sides of a square. The neighbourhood of a saddle point, up to 0.45 sides, is free of it.
     pub const DOT_RADIUS: f64 = 0.17;
     /// Shortest and longest side of a square, metres: from a board under a microscope to one on a wall.
     const SQUARES_M: [f64; 2] = [0.0005, 0.5];
@@ -72,10 +73,10 @@ impl Board {
         self.square_m
     }
 
-    /// The same board as a printer made it that prints 100 mm as `measured_mm`.
+    /// The same board from a printer that prints 100 mm as `measured_mm`.
     ///
     /// # Errors
-    /// [`CalibrationError::Ruler`]: no printer is off by more than a tenth.
+    /// [`CalibrationError::Ruler`]: no printer has an error of more than a tenth.
     pub fn as_printed(&self, measured_mm: f64) -> Result<Self, CalibrationError> {
         if !(90.0..=110.0).contains(&measured_mm) {
             return Err(CalibrationError::Ruler { measured_mm });
@@ -83,7 +84,7 @@ impl Board {
         Ok(Self { square_m: self.square_m * measured_mm / 100.0, ..*self })
     }
 
-    /// Where a corner lies, in metres of the board's frame.
+    /// The position of a corner, in metres of the board's frame.
     pub fn corner(&self, [i, j]: [u32; 2]) -> Point3<f64> {
         Point3::new(f64::from(i) * self.square_m, f64::from(j) * self.square_m, 0.0)
     }
@@ -94,12 +95,12 @@ impl Board {
         (1..self.rows).flat_map(move |j| (1..columns).map(move |i| [i, j]))
     }
 
-    /// How many corners lie between squares.
+    /// Number of corners between squares.
     pub fn num_corners(&self) -> usize {
         ((self.columns - 1) * (self.rows - 1)) as usize
     }
 
-    /// The middle of the board in metres of its frame.
+    /// The centre of the board in metres of its frame.
     pub fn center(&self) -> Point2<f64> {
         Point2::new(f64::from(self.columns), f64::from(self.rows)) * (0.5 * self.square_m)
     }
@@ -114,7 +115,7 @@ impl Board {
         column < PATTERN_SIDE && row < PATTERN_SIDE && PATTERN[row as usize] >> column & 1 == 1
     }
 
-    /// Whether ink is printed at a place of the board's frame, in sides of a square.
+    /// Whether ink is printed at a point of the board's frame, in sides of a square.
     pub fn is_inked(&self, place: &Point2<f64>) -> bool {
         let inside = |value: f64, side: u32| (0.0..f64::from(side)).contains(&value);
         if !(inside(place.x, self.columns) && inside(place.y, self.rows)) {
@@ -150,7 +151,7 @@ mod tests {
             .flat_map(|place| (0..4).map(move |turn| window(side, place, turn)))
             .collect();
         let pairs = windows.iter().enumerate().flat_map(|(k, a)| windows[k + 1..].iter().map(move |b| (a, b)));
-        // Windows whose squares have other colours cannot be confused.
+        // Windows with different colours of squares cannot be confused.
         let alike = pairs.filter(|(a, b)| a[0].0 == b[0].0);
         alike.map(|(a, b)| a.iter().zip(b).filter(|(a, b)| a.1 != b.1).count()).min().unwrap()
     }
@@ -168,7 +169,7 @@ mod tests {
         assert!(!board.is_inked(&Point2::new(-0.01, 0.01)) && !board.is_inked(&Point2::new(9.01, 5.9)));
         assert_eq!(board.corner([8, 5]), Point3::new(0.2, 0.125, 0.0));
         assert_eq!(board.corners().count(), board.num_corners());
-        // A dot has the other colour: the ink in its middle is not that beside it.
+        // A dot has the other colour: the ink at its centre differs from the ink beside it.
         let (column, row) = (0..54).map(|k| (k % 9, k / 9)).find(|(x, y)| Board::has_dot(*x, *y)).unwrap();
         let [x, y] = [column, row].map(|k| f64::from(k) + 0.5);
         assert_ne!(board.is_inked(&Point2::new(x, y)), board.is_inked(&Point2::new(x + 0.2, y)));

@@ -1,4 +1,4 @@
-//! The board: a checkerboard in which dots tell the squares apart.
+//! The board: a checkerboard with dots that identify the squares.
 //!
 //! ```text
 //! y ↑   ■ □ ■ □        Square (column, row) counts from the lower left, square (0, 0) is dark.
@@ -6,9 +6,9 @@
 //!   │   ■ □ ■ □        Corner [i, j] lies at (i, j) · square_m.
 //!   └──────────→ x     The origin is the outer corner of square (0, 0); z points out of the sheet, towards the reader.
 //! ```
-//! Some squares have a dot of the other colour in their middle. The pattern of dots is the same on every board, whatever its
-//! number of squares, and differs between any two places and turns at which three by three squares can be seen: a board that
-//! the picture cuts off is still known, and neither 9 × 6 nor 8 × 6 squares can be taken for the other.
+//! Some squares have a dot of the other colour in their middle. The pattern of dots is the same on every board of any
+//! size, and differs between any two places and turns with three by three visible squares. A board that the picture
+//! cuts off is therefore still identified, and boards of 9 × 6 and 8 × 6 squares cannot be confused.
 
 mod checkerboard;
 mod sheet;

@@ -1,7 +1,7 @@
 //! The board on paper, as SVG and as PDF.
 //!
-//! Legend: millimetres from the lower left of the paper, y up. Both files hold the same shapes; SVG's y points down, which is turned
-//! as shapes are written. Beside the board stand its facts and a line of 100 mm for the ruler.
+//! Legend: millimetres from the lower left of the paper, y up. Both files contain the same shapes; SVG's y points down
+//! and is converted on writing. Beside the board are its data and a line of 100 mm for a ruler.
 
 use std::fmt::Write;
 
@@ -32,7 +32,7 @@ impl Paper {
         }
     }
 
-    /// The name, as the command line has it.
+    /// The name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::A4 => "a4",
@@ -42,9 +42,9 @@ impl Paper {
     }
 }
 
-/// What no office printer reaches, at each side.
+/// Margin that no office printer reaches, at each side.
 const MARGIN_MM: f64 = 8.0;
-/// White below the board and the facts under it.
+/// White below the board and its data.
 const FOOTER_MM: f64 = 30.0;
 /// Length of the printed line by which a ruler checks the print's scale.
 const RULER_MM: f64 = 100.0;
@@ -65,15 +65,15 @@ enum Shape {
     Rectangle { x: f64, y: f64, width: f64, height: f64 },
     /// A filled circle, in mm.
     Disc { x: f64, y: f64, radius: f64, is_dark: bool },
-    /// Words from their lower left.
+    /// Text, from its lower left corner.
     Text { x: f64, y: f64, size: f64, text: String },
 }
 
 impl Sheet {
-    /// The longest side, in whole 5 mm, of squares that fit on the paper.
+    /// The longest side of squares that fit on the paper, in whole 5 mm.
     ///
     /// # Errors
-    /// [`CalibrationError::Paper`] where not even 5 mm fit.
+    /// [`CalibrationError::Paper`] if not even 5 mm fit.
     pub fn square_m_that_fits(columns: u32, rows: u32, paper: Paper) -> Result<f64, CalibrationError> {
         let [width, height] = room_mm(paper);
         let side = (width / f64::from(columns)).min(height / f64::from(rows));
@@ -87,7 +87,7 @@ impl Sheet {
     /// Lays a board out.
     ///
     /// # Errors
-    /// [`CalibrationError::Paper`] where it does not fit.
+    /// [`CalibrationError::Paper`] if it does not fit.
     pub fn new(board: Board, paper: Paper) -> Result<Self, CalibrationError> {
         let [paper_width, paper_height] = paper.size_mm();
         let square = 1000.0 * board.square_m();
@@ -99,7 +99,7 @@ impl Sheet {
             return Err(CalibrationError::Paper { paper: paper.name(), columns, rows, square_mm: square, fits_mm });
         }
         let left = 0.5 * (paper_width - width);
-        // The white around the board is shared above and below it.
+        // The remaining white is divided above and below the board.
         let bottom = FOOTER_MM + 0.5 * (paper_height - MARGIN_MM - FOOTER_MM - height);
         let mut shapes = Vec::new();
         let squares = || (0..rows).flat_map(|row| (0..columns).map(move |column| (column, row)));
@@ -116,7 +116,7 @@ impl Sheet {
         Ok(Self { board, paper, shapes })
     }
 
-    /// `sdg-board squares=9x6 square_mm=25 paper=a4`: what both files say of themselves.
+    /// `sdg-board squares=9x6 square_mm=25 paper=a4`: the description in both files.
     pub fn facts(&self) -> String {
         let (columns, rows, square_m) = (self.board.columns(), self.board.rows(), self.board.square_m());
         format!(
@@ -126,10 +126,10 @@ impl Sheet {
         )
     }
 
-    /// The board that a file of [`Self::to_svg`] or [`Self::to_pdf`] holds.
+    /// The board in a file of [`Self::to_svg`] or [`Self::to_pdf`].
     ///
     /// # Errors
-    /// [`CalibrationError::NoBoardFile`] where the file does not say.
+    /// [`CalibrationError::NoBoardFile`] if the file does not contain it.
     pub fn board_of(file: &str) -> Result<Board, CalibrationError> {
         let facts =
             file.split_once("sdg-board squares=").map(|(_, facts)| facts).ok_or(CalibrationError::NoBoardFile)?;
@@ -234,7 +234,7 @@ impl Sheet {
     }
 }
 
-/// Width and height that a board may have.
+/// Available width and height of a board.
 fn room_mm(paper: Paper) -> [f64; 2] {
     let [width, height] = paper.size_mm();
     [width - 2.0 * MARGIN_MM, height - MARGIN_MM - FOOTER_MM]
@@ -242,7 +242,7 @@ fn room_mm(paper: Paper) -> [f64; 2] {
 
 fn footer(shapes: &mut Vec<Shape>, board: &Board, left: f64, bottom: f64) {
     let (columns, rows, square_m) = (board.columns(), board.rows(), board.square_m());
-    // Between the line and the board the white must be wide enough that the outer squares' corners stay clear.
+    // The white between the line and the board must be wide enough that the outer squares' corners stay clear.
     let line = bottom - 12.0;
     let mut text = |x: f64, y: f64, size: f64, text: String| shapes.push(Shape::Text { x, y, size, text });
     text(left, bottom - 6.0, 3.5, "Origin: the corner above. x to the right, y upwards.".to_owned());
@@ -258,13 +258,13 @@ fn footer(shapes: &mut Vec<Shape>, board: &Board, left: f64, bottom: f64) {
     );
     text(left, line - 8.0, 3.5, facts);
     shapes.push(Shape::Rectangle { x: left, y: line - 0.15, width: RULER_MM, height: 0.3 });
-    // The ticks end where the line does: the ruler measures from outer edge to outer edge.
+    // The ticks end at the line's ends: a ruler measures from outer edge to outer edge.
     for x in [left, left + RULER_MM - 0.3] {
         shapes.push(Shape::Rectangle { x, y: line - 2.0, width: 0.3, height: 4.0 });
     }
 }
 
-/// Four cubic Bézier curves, off a circle by 0.03 % of its radius.
+/// Four cubic Bézier curves, with an error of 0.03 % of the circle's radius.
 fn pdf_circle(x: f64, y: f64, radius: f64) -> String {
     const HANDLE: f64 = 0.552_284_75;
     let at = |u: f64, v: f64| format!("{} {}", trimmed(x + u * radius), trimmed(y + v * radius));
@@ -281,7 +281,7 @@ fn pdf_circle(x: f64, y: f64, radius: f64) -> String {
     format!("{start} m{}", curves.concat())
 }
 
-/// A number to a ten-thousandth, without zeros at its end.
+/// A number to a ten-thousandth, without trailing zeros.
 fn trimmed(value: f64) -> String {
     let text = format!("{value:.4}");
     let text = text.trim_end_matches('0').trim_end_matches('.');

@@ -1,4 +1,5 @@
-//! Whether corners that a grid gave are a board's: they lie as a plane's do, and squares differ from their neighbours, not within.
+//! Whether the corners of a grid belong to a board: they lie on a plane, and brightness differs between squares but not
+//! within.
 
 use std::collections::BTreeMap;
 
@@ -10,13 +11,13 @@ use super::seen_corner::SeenCorner;
 use crate::board::Board;
 use crate::homography;
 
-/// How far corners may be from where a homography puts them, root mean square, in sides of a square. Of the boards in this crate's tests
-/// the lenses that bend most leave 0.08, grids in photos of wood, metal and cloth 0.13 and more.
+/// Largest root mean square distance of corners from a homography, in sides of a square. For the boards in this crate's
+/// tests the lenses with the strongest distortion give 0.08, grids in photos of wood, metal and cloth at least 0.13.
 const MAX_OFF: f64 = 0.12;
-/// How much brightness may vary within a square, over how much it differs from squares beside it: medians over all squares. The boards of
-/// the tests have 0.03 at most (dark, noisy), grids in such photos 0.7 and more.
+/// Largest variation of brightness within a square divided by the difference to its neighbours: medians over all
+/// squares. The boards of the tests have at most 0.03 (dark, noisy), grids in such photos at least 0.7.
 const MAX_VARIATION: f64 = 0.35;
-/// Where a square's own colour is sampled, in sides of the square: outside a dot, inside the edges.
+/// Sample points of a square's own colour, in sides of the square: outside a dot, inside the edges.
 const RING: [[f64; 2]; 8] =
     [[0.27, 0.27], [0.73, 0.27], [0.27, 0.73], [0.73, 0.73], [0.18, 0.5], [0.82, 0.5], [0.5, 0.18], [0.5, 0.82]];
 
@@ -56,7 +57,7 @@ fn variation(picture: &Luminance, corners: &[SeenCorner]) -> Option<f64> {
         let samples: Vec<f64> = samples.collect::<Option<_>>()?;
         let mean = samples.iter().sum::<f64>() / samples.len() as f64;
         let variance = samples.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / samples.len() as f64;
-        // Dark squares are to be darker.
+        // Dark squares must be darker.
         let sign = if Board::is_dark(i, j) { -1.0 } else { 1.0 };
         Some(([i, j], (mean, variance.sqrt(), sign)))
     });

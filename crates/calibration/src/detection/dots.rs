@@ -1,4 +1,4 @@
-//! The dots in a grid's squares, and where on the board the grid lies.
+//! The dots in a grid's squares, and the grid's placement on the board.
 
 use std::collections::BTreeMap;
 
@@ -9,28 +9,29 @@ use super::luminance::Luminance;
 use crate::board::{Board, PATTERN_SIDE};
 use crate::error::CalibrationError;
 
-/// How a grid lies on the board: the corner `[i, j]` of the board at each of the grid's places.
+/// A grid's placement on the board: the board's corner `[i, j]` for each place of the grid.
 pub(super) type Placed = BTreeMap<Place, [u32; 2]>;
 
-/// How much a dot is there, from 0 to 1, by the square between `[i, j]` and `[i + 1, j + 1]`.
+/// The presence of a dot, from 0 to 1, for the square between `[i, j]` and `[i + 1, j + 1]`.
 type Dots = BTreeMap<Place, f64>;
 
-/// The share of the squares that may contradict the board: shadows, glare.
+/// Largest share of the squares that may contradict the board, because of shadows or glare.
 const MAX_CONTRADICTION: f64 = 0.2;
-/// By how many squares the second best placement must be worse. Windows of four by four squares differ in at least four.
+/// Number of squares by which the second best placement must be worse. Windows of four by four squares differ in at
+/// least four.
 const MIN_MARGIN: f64 = 1.5;
-/// Corners that may lie outside the board, found in what lies beside it.
+/// Number of corners that may lie outside the board, found in its surroundings.
 const MAX_OUTSIDE: usize = 2;
 /// Below it no square has a dot: a plain checkerboard.
 const MAX_PLAIN: f64 = 0.3;
-/// Where a square is looked at for its own colour, in sides of the square from its middle: outside a dot, inside the edges.
+/// Sample points of a square's own colour, in sides of the square from its centre: outside a dot, inside the edges.
 const RING: f64 = 0.32;
 
-/// Finds the grid's place on the board.
+/// Finds the grid's placement on the board.
 ///
 /// # Errors
-/// [`CalibrationError::BoardUnclear`] where several fit or none, [`CalibrationError::OtherBoard`] where a larger board fits,
-/// [`CalibrationError::OtherCheckerboard`] where one without dots has other squares.
+/// [`CalibrationError::BoardUnclear`] if several or none fit, [`CalibrationError::OtherBoard`] if a larger board fits,
+/// [`CalibrationError::OtherCheckerboard`] if one without dots has other squares.
 pub(super) fn identify(picture: &Luminance, grid: &Grid, board: &Board) -> Result<Placed, CalibrationError> {
     let dots = read(picture, grid);
     if let Some(placed) = place(grid, &dots, [board.columns(), board.rows()]) {
@@ -53,10 +54,10 @@ pub(super) fn identify(picture: &Luminance, grid: &Grid, board: &Board) -> Resul
     }
 }
 
-/// Why a grid without dots is not the whole board.
+/// The reason why a grid without dots is not the whole board.
 fn other_checkerboard(grid: &Grid, board: &Board) -> CalibrationError {
     let [columns, rows] = [board.columns(), board.rows()];
-    // The longer side as that of the board.
+    // With the longer side as that of the board.
     let mut found = grid.extent().map(|corners| corners as u32 + 1);
     found.sort_unstable();
     if columns >= rows {
@@ -113,14 +114,14 @@ fn read(picture: &Luminance, grid: &Grid) -> Dots {
         .collect()
 }
 
-/// The place at `[u, v]` of a square, 0 to 1 along each side.
+/// The point at `[u, v]` of a square, 0 to 1 along each side.
 fn within(&[a, b, c, d]: &[Point2<f64>; 4], [u, v]: [f64; 2]) -> Point2<f64> {
     let lower = a.coords * (1.0 - u) + b.coords * u;
     let upper = c.coords * (1.0 - u) + d.coords * u;
     Point2::from(lower * (1.0 - v) + upper * v)
 }
 
-/// The only placement on a board of so many squares that the dots agree with.
+/// The only placement on a board of this many squares that agrees with the dots.
 fn place(grid: &Grid, dots: &Dots, sides: [u32; 2]) -> Option<Placed> {
     let mut placements: Vec<(f64, Turned)> = Turned::all(grid, sides)
         .filter(|turned| turned.agrees_in_color(grid))
@@ -133,7 +134,8 @@ fn place(grid: &Grid, dots: &Dots, sides: [u32; 2]) -> Option<Placed> {
     is_clear.then(|| turned.corners(grid, sides))
 }
 
-/// A board without dots can be told from itself turned by half only by colours, and only where it is whole.
+/// A board without dots and the same board after half a turn differ only by colours, and only if the board is
+/// completely visible.
 fn plain(grid: &Grid, board: &Board) -> Option<Placed> {
     let sides = [board.columns(), board.rows()];
     if grid.len() != board.num_corners() {
@@ -153,7 +155,7 @@ struct Turned {
 }
 
 impl Turned {
-    /// Every way that leaves at most [`MAX_OUTSIDE`] rows or columns outside.
+    /// Every placement with at most [`MAX_OUTSIDE`] rows or columns outside.
     fn all(grid: &Grid, [columns, rows]: [u32; 2]) -> impl Iterator<Item = Self> {
         (0..4).flat_map(move |quarters| {
             let turned = Self { quarters, shift: [0, 0] };
@@ -190,7 +192,7 @@ impl Turned {
         ((column + row).rem_euclid(2) == 0) == grid.first_is_dark
     }
 
-    /// How many squares contradict the board; `None` where too many corners lie outside.
+    /// Number of squares that contradict the board; `None` if too many corners lie outside.
     fn contradiction(&self, grid: &Grid, dots: &Dots, sides: [u32; 2]) -> Option<f64> {
         let outside = grid.len() - self.corners(grid, sides).len();
         if outside > MAX_OUTSIDE {

@@ -1,7 +1,8 @@
-//! Saddle points to a grid: grown from one of them, from neighbour to neighbour.
+//! From saddle points to a grid, grown from one of them, neighbour by neighbour.
 //!
-//! Legend: a grid's places `[i, j]` count from the first saddle point, and may be negative. Steps along `i` and `j` turn as the board's
-//! x and y do when its printed side is seen: `j` is to the left of `i` (y of pixels points down).
+//! Legend: a grid's places `[i, j]` count from the first saddle point, and may be negative. The steps along `i` and `j`
+//! have the orientation of the board's x and y as seen from its printed side: `j` is to the left of `i` (y of pixels
+//! points down).
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -15,19 +16,20 @@ pub(super) type Place = [i32; 2];
 /// The four neighbours of a place, and the axis of each.
 const NEIGHBOURS: [(Place, usize, f64); 4] =
     [([1, 0], 0, 1.0), ([-1, 0], 0, -1.0), ([0, 1], 1, 1.0), ([0, -1], 1, -1.0)];
-/// How far a neighbour may lie from where the last step leads, in steps: perspective shortens steps by up to a sixth.
+/// Largest distance of a neighbour from the prediction of the last step, in steps: perspective shortens steps by up to
+/// a sixth.
 const MAX_OFF: f64 = 0.3;
-/// How far the first neighbours may lie beside the edges' directions: the sine of 14 degrees.
+/// Largest deviation of the first neighbours from the edges' directions: the sine of 14 degrees.
 const MAX_SINE: f64 = 0.25;
-/// A neighbour's strength over a corner's: light falls off along a board, but not at once.
+/// Minimum strength of a neighbour relative to a corner's: light decreases along a board, but not abruptly.
 const MIN_STRENGTH: f64 = 0.05;
-/// Corners from which grids are grown: the strongest that no grid holds yet.
+/// Number of corners from which grids are grown: the strongest that are not yet in a grid.
 const MAX_SEEDS: usize = 60;
 
 /// Corners in a grid.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Grid {
-    /// Where each is in the picture.
+    /// Their positions in the picture.
     pub(super) corners: BTreeMap<Place, Point2<f64>>,
     /// Whether the square between `[0, 0]` and `[1, 1]` is dark.
     pub(super) first_is_dark: bool,
@@ -55,7 +57,7 @@ impl Grid {
         Self { corners, ..*self }
     }
 
-    /// How wide the squares around a corner are at least, in pixels: from an edge to the one opposite.
+    /// Minimum width of the squares around a corner, in pixels: from an edge to the opposite one.
     pub(super) fn width(&self, place: Place) -> Option<f64> {
         let ways = |axis: usize| {
             let of_axis = NEIGHBOURS.iter().filter(move |(_, of, _)| *of == axis);
@@ -65,8 +67,8 @@ impl Grid {
         widths.min_by(f64::total_cmp)
     }
 
-    /// From a corner to its neighbour. Beyond the grid's border, which the board's outer squares are, as perspective goes on: the last
-    /// two ways, and by how much they shrink.
+    /// From a corner to its neighbour. Beyond the grid's border, at the board's outer squares, extrapolated with
+    /// perspective: from the last two steps and their ratio.
     fn way(&self, [i, j]: Place, [di, dj]: Place) -> Option<Vector2<f64>> {
         let at = |steps: i32| self.corners.get(&[i + steps * di, j + steps * dj]);
         let here = at(0)?;
@@ -78,7 +80,7 @@ impl Grid {
         Some(last * shrinkage.min(1.0))
     }
 
-    /// The corners around the square between `[i, j]` and `[i + 1, j + 1]`, where all four are there.
+    /// The corners around the square between `[i, j]` and `[i + 1, j + 1]`, if all four are present.
     pub(super) fn square(&self, [i, j]: Place) -> Option<[Point2<f64>; 4]> {
         let at = |di, dj| self.corners.get(&[i + di, j + dj]).copied();
         Some([at(0, 0)?, at(1, 0)?, at(0, 1)?, at(1, 1)?])
@@ -123,7 +125,7 @@ impl<'a> Growth<'a> {
             let ways = saddles.iter().filter(|other| is_neighbour(first, other)).map(|other| other.place - first.place);
             let along = ways.filter(|way| way.perp(&edge).abs() < MAX_SINE * way.norm() && way.norm() > 0.0);
             let nearest = along.min_by(|a, b| a.norm().total_cmp(&b.norm()))?;
-            // Along the edge's direction, so that both steps are known to turn the same way.
+            // Along the edge's direction, so that both steps are known to have the same orientation.
             Some(if nearest.dot(&edge) < 0.0 { -nearest } else { nearest })
         };
         let [edge, other_edge] = first.edges();
@@ -169,7 +171,7 @@ impl<'a> Growth<'a> {
         self.members
     }
 
-    /// The way to the next place: as the last step along this axis was, or as it is one row beside.
+    /// The step to the next place: that of the last step along this axis, or that of the neighbouring row.
     fn step(&self, [i, j]: Place, axis: usize, sign: f64) -> Vector2<f64> {
         let [along, across] = if axis == 0 { [[1, 0], [0, 1]] } else { [[0, 1], [1, 0]] };
         let sign_i = sign as i32;
@@ -192,7 +194,7 @@ fn is_neighbour(first: &Saddle, other: &Saddle) -> bool {
 fn grid(saddles: &[Saddle], members: &BTreeMap<Place, usize>) -> Grid {
     let corners: BTreeMap<Place, Point2<f64>> = members.iter().map(|(place, k)| (*place, saddles[*k].place)).collect();
     let mut grid = Grid { corners, first_is_dark: false };
-    // At each corner of a dark square brightness falls towards the square's middle; squares alternate.
+    // At each corner of a dark square brightness decreases towards the square's centre; squares alternate.
     let mut votes = 0;
     for (place, k) in members {
         let Some([here, .., opposite]) = grid.square(*place) else { continue };

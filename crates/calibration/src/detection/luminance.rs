@@ -43,7 +43,7 @@ impl Luminance {
         Some(upper * (1.0 - v) + lower * v)
     }
 
-    /// Two by two pixels to one: places in pixels are halved exactly.
+    /// Two by two pixels to one: positions in pixels are halved exactly.
     pub(super) fn halved(&self) -> Self {
         let [width, height] = [self.width / 2, self.height / 2];
         let mut values = Vec::with_capacity(width * height);

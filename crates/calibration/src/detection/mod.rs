@@ -1,12 +1,12 @@
-//! The board in a picture: corners to a fraction of a pixel, each with its place on the board.
+//! The board in a picture: corners to a fraction of a pixel, each with its position on the board.
 //!
 //! ```text
 //! picture ─ halved until no board is missed ─ saddle points ─ grid grown from neighbour to neighbour   saddle.rs, grid.rs
 //!         ─ dots read, place and turn on the board ─ corners refined at full resolution                dots.rs, refine.rs
 //!         ─ refused where corners are no plane's or squares not even                                   acceptance.rs
 //! ```
-//! A grid is grown by what its last steps were, so distortion and perspective need not be known. Pixels have the first pixel's centre at
-//! (0.5, 0.5).
+//! A grid is extended from its last steps, so that distortion and perspective need not be known. Pixels have the first
+//! pixel's centre at (0.5, 0.5).
 
 mod acceptance;
 mod dots;
@@ -24,17 +24,18 @@ pub use self::seen_corner::SeenCorner;
 use crate::board::Board;
 use crate::error::CalibrationError;
 
-/// Fewest corners of a board that is used: three by three.
+/// Minimum number of corners of a usable board: three by three.
 pub const MIN_CORNERS: usize = 9;
-/// Pictures are halved as long as they stay at least this long: in a blurred picture the corners are found only there.
+/// Pictures are halved as long as their longer side stays at least this: in a blurred picture the corners are found
+/// only at low resolution.
 const MIN_SIDE: u32 = 160;
-/// Pictures larger than this are first looked at halved: smoothing there makes sharp corners of large squares no less visible.
+/// Larger pictures are first searched at half size: smoothing there does not hide sharp corners of large squares.
 const MAX_SIDE: u32 = 2000;
 
-/// Finds the board, whole or in part.
+/// Finds the board, completely or partly visible.
 ///
 /// # Units and frames
-/// Pixels with the first centre at (0.5, 0.5); corners as [`Board`] counts them, row by row.
+/// Pixels with the first centre at (0.5, 0.5); corners in [`Board`]'s order, row by row.
 ///
 /// # Errors
 /// [`CalibrationError::BoardNotFound`], [`CalibrationError::BoardUnclear`], [`CalibrationError::OtherBoard`].
@@ -66,7 +67,7 @@ pub fn find_board(picture: &GrayImage, board: &Board) -> Result<Vec<SeenCorner>,
                         found = corners;
                     }
                 }
-                // What the first grid that was large enough lacks says most: later ones are parts of it.
+                // The error of the first sufficiently large grid is the most informative: later ones are parts of it.
                 Err(error) => refusal = refusal.or(Some(error)),
             }
         }

@@ -1,8 +1,8 @@
 //! Corners to a fraction of a pixel.
 //!
-//! Legend: `g` a brightness gradient at pixel `p`, `q` the corner, `w` a Gaussian weight. On both edges, and in the squares, where
-//! `g = 0`, the gradient is at right angles to the way from the corner: `gᵀ (p - q) = 0`. Least squares over a window give
-//! `q = (Σ w g gᵀ)⁻¹ Σ w g gᵀ p`.
+//! Legend: `g` a brightness gradient at pixel `p`, `q` the corner, `w` a Gaussian weight. On both edges, and in the
+//! squares, where `g = 0`, the gradient is perpendicular to the vector from the corner: `gᵀ (p - q) = 0`. Least squares
+//! over a window give `q = (Σ w g gᵀ)⁻¹ Σ w g gᵀ p`.
 //!
 //! # Source
 //! Förstner and Gülch 1987; OpenCV's `cornerSubPix` minimises the same sum over a square window.
@@ -14,16 +14,16 @@ use super::grid::Grid;
 use super::luminance::Luminance;
 use super::seen_corner::SeenCorner;
 
-/// The window's radius in sides of a square: it reaches neither the next edge nor a dot.
+/// The window's radius in sides of a square: it contains neither the next edge nor a dot.
 const WINDOW: f64 = 0.38;
-/// Its bounds in pixels: fewer give too few gradients; more add the lens's curvature.
+/// Its limits in pixels: smaller windows have too few gradients, larger ones include the lens's curvature.
 const WINDOWS_PX: [f64; 2] = [2.5, 24.0];
 /// The weight's standard deviation in radii of the window.
 const SIGMA: f64 = 0.5;
 const MAX_STEPS: usize = 30;
-/// Where steps end, in pixels.
+/// Step size at which the iteration ends, in pixels.
 const TOLERANCE_PX: f64 = 1e-3;
-/// How far a corner may move from where the grid had it, in sides of a square.
+/// Largest movement of a corner from its position in the grid, in sides of a square.
 const MAX_MOVE: f64 = 0.3;
 
 /// The grid's corners on the board, refined; those without a clear corner, or near the picture's border, are left out.
@@ -76,7 +76,7 @@ fn step(picture: &Luminance, corner: &Point2<f64>, radius: f64) -> Option<Point2
             side += outer * way;
         }
     }
-    // An edge alone leaves the place along it open.
+    // A single edge does not determine the position along it.
     let [a, b]: [f64; 2] = normal.symmetric_eigenvalues().into();
     if a.min(b) <= 0.01 * a.max(b) {
         return None;

@@ -1,4 +1,4 @@
-//! Saddle points of brightness: where four squares meet.
+//! Saddle points of brightness: the meeting points of four squares.
 //!
 //! Legend: `H` the second derivatives of the smoothed brightness. At a corner brightness is, up to a factor, the product of the
 //! signed distances to both edges: `det H < 0`, and the edges are the directions `d` with `dᵀ H d = 0`.
@@ -17,21 +17,22 @@ pub(super) struct Saddle {
     pub(super) strength: f64,
 }
 
-/// Smoothing before derivatives are taken: noise is gone, and corners of squares of six pixels are still apart.
+/// Smoothing before derivatives: it removes noise, and corners of squares of six pixels stay separate.
 const SIGMA: f64 = 1.5;
-/// The least contrast between dark and light squares, of 255. A tenth of what a board in the dark still has.
+/// Minimum contrast between dark and light squares, of 255. A tenth of that of a board in the dark.
 const MIN_CONTRAST: f64 = 10.0;
-/// The larger curvature over the smaller: an edge with noise on it is no corner. Squares seen at 70 degrees have 3.
+/// Largest ratio of the two curvatures: a noisy edge is not a corner. Squares seen at 70 degrees have 3.
 const MAX_CURVATURE_RATIO: f64 = 8.0;
-/// Where brightness is compared with that opposite, in pixels: beyond the smoothing, within squares of six pixels.
+/// Distance at which brightness is compared with the opposite side, in pixels: beyond the smoothing, within squares of
+/// six pixels.
 const RING_PX: f64 = 4.0;
 const RING_PLACES: usize = 24;
-/// How much brightness may differ from that opposite, over how much it varies otherwise. 0 where four squares meet, 2 where a dark
-/// square's corner stands on white, which is a saddle point, too.
+/// Largest difference of brightness from the opposite side, relative to its other variation. It is 0 where four squares
+/// meet, and 2 for a dark square's corner on white, which is also a saddle point.
 const MAX_ASYMMETRY: f64 = 0.5;
-/// Neighbours that a saddle point must be stronger than.
+/// Neighbours that must be weaker than a saddle point.
 const RADIUS: usize = 2;
-/// The strongest are kept; no board has half as many corners.
+/// Maximum number of kept points, the strongest; no board has half as many corners.
 const MAX_SADDLES: usize = 2000;
 
 /// The saddle points of a picture, strongest first.
@@ -86,7 +87,7 @@ impl Saddle {
 
     /// Whether dark and light squares are exchanged between two corners, as they are between neighbours along an edge.
     pub(super) fn is_opposite(&self, other: &Self) -> bool {
-        // The trace of the product of both forms' traceless parts: 1 for alike, -1 for a quarter turn.
+        // The trace of the product of both forms' traceless parts: 1 for equal forms, -1 for a quarter turn.
         let traceless = |m: &Matrix2<f64>| (m - Matrix2::identity() * (0.5 * m.trace())).normalize();
         traceless(&self.hessian).dot(&traceless(&other.hessian)) < 0.0
     }
@@ -99,7 +100,7 @@ fn hessian(smooth: &Luminance, x: usize, y: usize) -> Matrix2<f64> {
     Matrix2::new(at(2, 1) - middle + at(0, 1), xy, xy, at(1, 2) - middle + at(1, 0))
 }
 
-/// From a pixel's centre to where the gradient vanishes, at most a pixel.
+/// From a pixel's centre to the zero of the gradient, at most a pixel.
 fn newton_step(smooth: &Luminance, hessian: &Matrix2<f64>, x: usize, y: usize) -> Vector2<f64> {
     let difference = |a: f32, b: f32| 0.5 * f64::from(a - b);
     let gradient = Vector2::new(
@@ -110,7 +111,7 @@ fn newton_step(smooth: &Luminance, hessian: &Matrix2<f64>, x: usize, y: usize) -
     step * (1.0 / step.norm()).min(1.0)
 }
 
-/// Whether brightness around a place is what it is opposite.
+/// Whether brightness around a point equals that on the opposite side.
 fn is_symmetric(smooth: &Luminance, place: &Point2<f64>) -> bool {
     let half = RING_PLACES / 2;
     let ring: Option<Vec<f64>> = (0..RING_PLACES)
@@ -131,7 +132,7 @@ fn is_symmetric(smooth: &Luminance, place: &Point2<f64>) -> bool {
 fn is_strongest(strengths: &[f32], width: usize, x: usize, y: usize) -> bool {
     let strength = strengths[y * width + x];
     (y - RADIUS..=y + RADIUS).all(|row| {
-        // Of two alike the first in reading order stays.
+        // Of two equal ones the first in reading order is kept.
         (x - RADIUS..=x + RADIUS).all(|column| {
             let other = strengths[row * width + column];
             if (row, column) < (y, x) { other < strength } else { other <= strength }

@@ -1,12 +1,12 @@
-//! A corner with its place on the board.
+//! A corner with its position on the board.
 
 use nalgebra::Point2;
 
-/// A corner of the board and where the picture shows it.
+/// A corner of the board and its position in the picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SeenCorner {
-    /// Which corner, as [`Board::corner`](crate::Board::corner) counts.
+    /// The corner, with the indices of [`Board::corner`](crate::Board::corner).
     pub corner: [u32; 2],
-    /// Where it appears, in pixels.
+    /// Its position, in pixels.
     pub pixel: Point2<f64>,
 }

@@ -1,4 +1,5 @@
-//! Reprojection over all pictures as a function of `X`, `Y` and the board's scale, and of what each robot pose is off by.
+//! Reprojection over all pictures as a function of `X`, `Y` and the board's scale, and of the errors of each robot
+//! pose.
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, SVector, Vector6};
 use sdg_geometry::{Mount, PinholeCamera};
@@ -23,12 +24,12 @@ pub(super) struct Bundle<'a> {
     motions: Vec<Isometry3<f64>>,
     pub(super) x: Isometry3<f64>,
     pub(super) y: Isometry3<f64>,
-    /// The board's size as a multiple of the size that was told; `Y` is followed by the scaled board.
+    /// The board's size as a multiple of the given one; `Y` is followed by the scaled board.
     pub(super) board_scale: f64,
     is_scale_free: bool,
-    /// What each pose is off by: a small motion in the flange's frame.
+    /// The error of each pose: a small motion in the flange's frame.
     errors: Vec<Isometry3<f64>>,
-    /// Metres and radians of robot error that weigh as much as a pixel; `None` where poses are exact.
+    /// Metres and radians of robot error with the weight of a pixel; `None` if poses are exact.
     robot_sigma: Option<[f64; 2]>,
 }
 
@@ -57,12 +58,12 @@ impl<'a> Bundle<'a> {
         }
     }
 
-    /// The same with the board's scale as a parameter, which is held otherwise.
+    /// The same with the board's scale as a free parameter, which is otherwise fixed.
     pub(super) fn with_free_scale(&self, board_scale: f64) -> Self {
         Self { board_scale, is_scale_free: true, ..self.clone() }
     }
 
-    /// The same with robot errors of so many metres and radians for a pixel.
+    /// The same with robot errors of this many metres and radians per pixel.
     pub(super) fn with_robot_sigma(&self, sigma: [f64; 2]) -> Self {
         Self { robot_sigma: Some(sigma), ..self.clone() }
     }
@@ -80,12 +81,12 @@ impl<'a> Bundle<'a> {
         fewer
     }
 
-    /// RMS of each picture, the robot's poses as given.
+    /// RMS of each picture, with the given robot poses.
     pub(super) fn rms_of_pictures(&self) -> Vec<f64> {
         (0..self.views.len()).map(|k| (self.square(k) / self.views[k].corners.len() as f64).sqrt()).collect()
     }
 
-    /// RMS over all, the robot's poses as given.
+    /// RMS over all, with the given robot poses.
     pub(super) fn rms_px(&self) -> f64 {
         let count: usize = self.views.iter().map(|view| view.corners.len()).sum();
         ((0..self.views.len()).map(|k| self.square(k)).sum::<f64>() / count as f64).sqrt()
@@ -105,7 +106,7 @@ impl<'a> Bundle<'a> {
         let mut block = Block::empty();
         let camera_from_x = self.x.inverse();
         let (motion, error) = (&self.motions[view], &self.errors[view]);
-        // The flange is on the camera's side of A on the hand, and on the board's side else.
+        // For a camera on the hand the flange is on the camera's side of A, otherwise on the board's side.
         let (camera_from_flange, flange_from_y) = match self.mount {
             Mount::Hand => (camera_from_x, *motion),
             Mount::Base => (camera_from_x * motion, Isometry3::identity()),

@@ -4,8 +4,8 @@
 //! `(R_A - I) t_X = R_X t_B - t_A`.
 //!
 //! # Source
-//! Park and Martin, Robot sensor calibration: solving AX = XB on the Euclidean group, 1994; the rotation here by singular values, which keeps it
-//! proper where noise is large.
+//! Park and Martin, Robot sensor calibration: solving AX = XB on the Euclidean group, 1994; the rotation here by
+//! singular values, which keeps it proper under strong noise.
 
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Rotation3, UnitQuaternion, Vector3};
 use sdg_geometry::Mount;
@@ -14,17 +14,17 @@ use crate::error::CalibrationError;
 
 /// A turn by nearly half has an axis of either sign.
 const MAX_ANGLE: f64 = 2.9;
-/// The least root mean square turn about the second axis, in degrees: at 4 degrees, noise of 0.1 degrees is a fortieth.
+/// Minimum root mean square turn about the second axis, in degrees: at 4 degrees, noise of 0.1 degrees is a fortieth.
 const MIN_SECOND_TURN_DEG: f64 = 4.0;
 
-/// The lever at which a turn counts as much as a shift, metres: about how far boards are from flanges.
+/// The lever arm at which a turn has the weight of a shift, metres: about the distance of boards from flanges.
 const LEVER_M: f64 = 0.3;
 
-/// Whether the board's size is that which was told.
+/// The board has the given size.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum BoardSize {
     Told,
-    /// A multiple of it that is found.
+    /// The board has a multiple of it, which is estimated.
     Free,
 }
 
@@ -41,7 +41,7 @@ pub(super) struct Closed {
 /// A motion of the flange from one picture to another, and the board's.
 type Pair = (Isometry3<f64>, Isometry3<f64>);
 
-/// `X` and `Y` from motions and the board's poses; `None` where they leave it open.
+/// `X` and `Y` from motions and the board's poses; `None` if they are not determined.
 pub(super) fn solve(motions: &[Isometry3<f64>], boards: &[Isometry3<f64>], size: BoardSize) -> Option<Closed> {
     let pairs = pairs(motions, boards, usize::MAX);
     let rotation = turn_between(&pairs)?;
@@ -61,7 +61,7 @@ pub(super) fn solve(motions: &[Isometry3<f64>], boards: &[Isometry3<f64>], size:
         };
         side.fixed_rows_mut::<3>(3 * k).copy_from(&(told - a.translation.vector));
     }
-    // The normal equations: of hundreds of pairs the singular values take longer than all the rest.
+    // The normal equations: for hundreds of pairs the singular values take longer than everything else.
     let mut normal = (matrix.transpose() * &matrix).fixed_view::<4, 4>(0, 0).into_owned();
     if size == BoardSize::Told {
         normal[(3, 3)] = 1.0;
@@ -74,7 +74,7 @@ pub(super) fn solve(motions: &[Isometry3<f64>], boards: &[Isometry3<f64>], size:
     let x = Isometry3::from_parts(found.fixed_rows::<3>(0).into_owned().into(), rotation);
     let board = boards.first()?;
     let scaled = Isometry3::from_parts((board.translation.vector * board_scale).into(), board.rotation);
-    // Any picture's Y is near enough to start from.
+    // The Y of any picture is close enough as a start.
     let y = motions.first()?.inverse() * x * scaled;
     Some(Closed { x, y, board_scale, left_rad: left.sqrt() })
 }
@@ -86,10 +86,10 @@ pub(super) fn turns_left(motions: &[Isometry3<f64>], boards: &[Isometry3<f64>]) 
     left.filter(|left| left.is_finite()).map_or(f64::INFINITY, f64::sqrt)
 }
 
-/// Pictures with which each is compared where thousands of readings are: the two before it.
+/// Number of pictures with which each is compared when there are thousands of readings: the two before it.
 const NEAR: usize = 2;
 
-/// All pairs of pictures that are at most so many apart.
+/// All pairs of pictures at most this far apart.
 fn pairs(motions: &[Isometry3<f64>], boards: &[Isometry3<f64>], apart: usize) -> Vec<Pair> {
     let indices = (0..motions.len()).flat_map(|i| (i.saturating_sub(apart)..i).map(move |j| (i, j)));
     let pairs = indices.map(|(i, j)| (motions[i] * motions[j].inverse(), boards[i] * boards[j].inverse()));

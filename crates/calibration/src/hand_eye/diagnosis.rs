@@ -1,12 +1,12 @@
-//! Robot poses that contradict the pictures: which mistake explains it.
+//! Robot poses that contradict the pictures: finds the error that explains it.
 //!
 //! ```text
-//! robot errors small, board's size as told ─ no question
+//! robot errors small, board's size as given ─ no question
 //!   ├─ board's size a parameter: falls the robot's error by much, and is the size another? ─ OtherBoardScale
 //!   └─ robot errors suspect ─ other readings of all poses    readings.rs, euler.rs ─ HandEyeDisagrees
 //!                           ─ a few poses wrong, exchanged   mixed_up.rs           ─ WrongPoses
 //! ```
-//! Of several explanations the one counts that leaves the least; of those that leave as much, the simplest.
+//! Of several explanations the one with the smallest residual is used; among equal ones, the simplest.
 
 use nalgebra::Isometry3;
 
@@ -16,29 +16,32 @@ use super::readings;
 use super::solve::{Evidence, MAX_ROBOT_SCALE, SUSPECT_ROBOT_SCALE, Solved};
 use crate::error::CalibrationError;
 
-/// Another reading explains the pictures where it leaves at most this share of the reprojection.
+/// Largest share of the reprojection error at which another reading explains the pictures.
 const MAX_SHARE: f64 = 0.3;
-/// A few poses explain the pictures where the others leave at most this share: three quarters of the squares are theirs.
+/// Largest share of the error that remains without a few wrong poses: three quarters of the squared error are theirs.
 const MAX_SHARE_OF_FEW: f64 = 0.5;
-/// The most that an explanation leaves beyond the corners' own errors, in radians of the picture: 5 px at a focal length of 700 px. A robot
-/// that is off by 0.5 mm and 0.25 degrees leaves as much.
+/// Largest residual of an explanation beyond the corners' own errors, in radians of the picture: 5 px at a focal length
+/// of 700 px. A robot with errors of 0.5 mm and 0.25 degrees has as much.
 const MAX_LEFT_RAD: f64 = 0.007;
-/// What the closed form leaves at most before the minimum is looked for, which takes long where there is none: robot errors that leave
-/// [`MAX_LEFT_RAD`] leave a fifth of it between two pictures.
+/// Largest residual of the closed form before the minimum is searched, which takes long if there is none: robot errors
+/// with [`MAX_LEFT_RAD`] have a fifth of it between two pictures.
 const MAX_CLOSED_RAD: f64 = 0.1;
-/// Ratio of two explanations' residuals up to which they count as alike.
+/// Ratio of two explanations' residuals up to which they count as equal.
 const ALIKE: f64 = 1.2;
-/// A difference that no corner shows, in pixels.
+/// A difference that is not visible in corners, in pixels.
 const ALIKE_PX: f64 = 0.02;
-/// A board's size that is off by less is left alone: on a line of 100 mm it is what a ruler is read to.
+/// A smaller error of the board's size is ignored: it is the reading error of a ruler on a line of 100 mm.
 const MIN_SCALE_ERROR: f64 = 0.003;
-/// Standard errors by which the board's size is off at least.
+/// Minimum error of the board's size, in standard errors.
 const MIN_SCALE_SIGMAS: f64 = 5.0;
-/// Equations left of which fewer make the standard error itself uncertain: of four pictures 11 are left, and it counts three times.
+/// Number of remaining equations below which the standard error itself is uncertain: four pictures leave 11, and it
+/// counts three times.
 const FEW_EQUATIONS: f64 = 30.0;
-/// The board's size explains the robot's errors where at most this share of them is left: a quarter of the squares are the size's.
+/// Largest remaining share of the robot's errors at which the board's size explains them: a quarter of the squared
+/// error is due to the size.
 const MAX_ROBOT_SHARE: f64 = 0.85;
-/// A turn by which the robot's and the board's turns between two pictures may differ, radians: 3 degrees, twice [`MAX_ROBOT_SCALE`].
+/// Largest difference between the robot's and the board's turns between two pictures, radians: 3 degrees, twice
+/// [`MAX_ROBOT_SCALE`].
 const MAX_TURN_DIFFERENCE_RAD: f64 = 0.05;
 
 /// An explanation, and its residual.
@@ -48,13 +51,13 @@ struct Explanation {
 }
 
 enum Kind {
-    /// All poses are to be read otherwise.
+    /// All poses are to be read differently.
     Reading {
         name: String,
         is_other_mount: bool,
     },
     MixedUp(MixedUp),
-    /// The board's size as a multiple of that told, and its standard error.
+    /// The board's size as a multiple of the given one, and its standard error.
     BoardScale([f64; 2]),
 }
 
@@ -65,7 +68,7 @@ enum Kind {
 pub(super) fn checked<'a>(evidence: &Evidence<'a>, robot: &[Isometry3<f64>]) -> Result<Solved<'a>, CalibrationError> {
     let boards = evidence.boards();
     let turns = closed_form::check_turns(evidence.mount, &evidence.motions(robot));
-    // Where the board turns about one axis, too, the poses are right and do not suffice.
+    // If the board also turns about only one axis, the poses are right but insufficient.
     if turns.is_err() && closed_form::check_turns(evidence.mount, &boards).is_err() {
         turns.clone()?;
     }
@@ -85,7 +88,7 @@ pub(super) fn checked<'a>(evidence: &Evidence<'a>, robot: &[Isometry3<f64>]) -> 
     let found = if rms_px.is_finite() {
         format!("{rms_px:.1} px between them where the board alone leaves {board_rms_px:.2} px")
     } else {
-        "no place of the camera that explains both".to_owned()
+        "no pose of the camera that explains both".to_owned()
     };
     match best {
         Some(Explanation { rms_px: left, kind }) => Err(refusal(kind, left, found, evidence)),
@@ -93,7 +96,7 @@ pub(super) fn checked<'a>(evidence: &Evidence<'a>, robot: &[Isometry3<f64>]) -> 
             turns?;
             let hint = match turns_that_differ(evidence, robot) {
                 Some(differ) => format!(": {differ}"),
-                None => ": check that each picture stands with its own pose, that the robot stood still, and that neither board nor \
+                None => ": check that each picture is listed with its own pose, that the robot stood still, and that neither board nor \
                          camera was moved"
                     .to_owned(),
             };
@@ -103,7 +106,8 @@ pub(super) fn checked<'a>(evidence: &Evidence<'a>, robot: &[Isometry3<f64>]) -> 
     }
 }
 
-/// Readings of all poses and choices of a few, each where it leaves no more than corners and a robot may.
+/// Readings of all poses and selections of a few, each if its residual is no larger than that of corners and a robot
+/// may be.
 fn suspected(evidence: &Evidence, robot: &[Isometry3<f64>], rms_px: f64) -> Vec<Explanation> {
     let readings = readings::plausible(evidence.mount, robot, &evidence.boards());
     let readings = readings.into_iter().filter_map(|reading| {
@@ -132,7 +136,7 @@ fn suspected(evidence: &Evidence, robot: &[Isometry3<f64>], rms_px: f64) -> Vec<
     readings.chain(mixed_up).filter(explains).collect()
 }
 
-/// Reprojection with other robot poses; `None` where it is more than corners and a robot may leave.
+/// Reprojection error with other robot poses; `None` if it is larger than corners and a robot may cause.
 fn left_px(evidence: &Evidence, robot: &[Isometry3<f64>]) -> Option<f64> {
     let motions = evidence.motions(robot);
     closed_form::check_turns(evidence.mount, &motions).ok()?;
@@ -150,9 +154,10 @@ fn is_little(evidence: &Evidence, rms_px: f64) -> bool {
     rms_px <= most
 }
 
-/// The board's size where it is another than told, and explains the robot's errors.
+/// The board's size, if it differs from the given one and explains the robot's errors.
 fn other_scale(evidence: &Evidence, robot: &[Isometry3<f64>], solved: Option<&Solved>) -> Option<Explanation> {
-    // The squares fall by the share of the robot's errors that the size explains: a cheap look before the whole minimum.
+    // The squared error decreases by the share of the robot's errors that the size explains: a cheap check before the
+    // full minimisation.
     let promises =
         |solved: &Solved| solved.gain_of_free_scale() > 0.5 * (1.0 - MAX_ROBOT_SHARE.powi(2)) * solved.freedom;
     if !solved.is_none_or(promises) {
@@ -163,7 +168,7 @@ fn other_scale(evidence: &Evidence, robot: &[Isometry3<f64>], solved: Option<&So
     let off = (scale - 1.0).abs();
     let noise = solved.map_or(f64::INFINITY, Solved::robot_noise);
     let rms_px = free.minimum.at.rms_px();
-    // A robot's noise may leave more than a reading may: where it is accepted with the board as told, it is here.
+    // A robot's noise may leave more than a reading may: if it is accepted with the given board, it is accepted here.
     let is_accepted = noise <= MAX_ROBOT_SCALE || is_little(evidence, rms_px);
     let explains = free.robot_noise() < (MAX_ROBOT_SHARE * noise).min(MAX_ROBOT_SCALE) && is_accepted;
     let min_sigmas = MIN_SCALE_SIGMAS * (1.0 + (FEW_EQUATIONS / free.freedom).powi(2)).sqrt();
@@ -171,9 +176,9 @@ fn other_scale(evidence: &Evidence, robot: &[Isometry3<f64>], solved: Option<&So
         .then_some(Explanation { rms_px, kind: Kind::BoardScale([scale, sigma]) })
 }
 
-/// The first of those that leave as little as any; they stand from the simplest on.
+/// The first of those with the smallest residual; they are sorted, the simplest first.
 fn simplest(mut explanations: Vec<Explanation>) -> Option<Explanation> {
-    // Without both of two exchanged pictures the others agree, too.
+    // Without both of two exchanged pictures the others also agree.
     let exchanged = explanations.iter().find_map(|explanation| match explanation.kind {
         Kind::MixedUp(MixedUp::Exchanged(two)) => Some(MixedUp::Wrong(two.to_vec())),
         _ => None,
@@ -209,7 +214,7 @@ fn numbered(pictures: &[usize]) -> Vec<String> {
     pictures.iter().map(|k| format!("picture {}", k + 1)).collect()
 }
 
-/// Root of the mean squared distance of corners where each picture has a pose of its own.
+/// Root of the mean squared distance of corners if each picture has its own pose.
 fn evidence_rms_px(evidence: &Evidence) -> f64 {
     let pictures = || evidence.poses.iter().zip(&evidence.views).map(|(pose, view)| (pose.rms_px, view.corners.len()));
     let squares: f64 = pictures().map(|(rms, num)| rms * rms * num as f64).sum();
@@ -217,7 +222,7 @@ fn evidence_rms_px(evidence: &Evidence) -> f64 {
     (squares / num as f64).sqrt()
 }
 
-/// The hint where the robot turns by other angles than the board: no mistake in translations explains it.
+/// The hint if the robot turns by other angles than the board: no error in translations explains it.
 fn turns_that_differ(evidence: &Evidence, robot: &[Isometry3<f64>]) -> Option<String> {
     let boards = evidence.boards();
     let turn = |poses: &[Isometry3<f64>], k: usize| poses[k].rotation.angle_to(&poses[k - 1].rotation);
@@ -226,8 +231,9 @@ fn turns_that_differ(evidence: &Evidence, robot: &[Isometry3<f64>]) -> Option<St
     let [robot_turn, board_turn] = *turns.get(turns.len() / 2)?;
     ((robot_turn - board_turn).abs() > MAX_TURN_DIFFERENCE_RAD).then(|| {
         format!(
-            "between pictures the flange turns by other angles than the board (typically by {:.0} degrees where the board turns by {:.0}): \
-             check that each picture stands with its own pose, and how the rotations were made (order of Euler angles, degrees or radians)",
+            "between pictures the flange turns by other angles than the board (typically by {:.0} degrees where the \
+             board turns by {:.0}): check that each picture is listed with its own pose, and how the rotations were \
+             made (order of Euler angles, degrees or radians)",
             robot_turn.to_degrees(),
             board_turn.to_degrees()
         )

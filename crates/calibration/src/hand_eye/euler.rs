@@ -1,7 +1,8 @@
-//! Rotations taken apart into three angles and put together in another way.
+//! Rotations decomposed into three angles and composed in another way.
 //!
-//! Legend: a rotation is composed as `R_k(a) · R_l(b) · R_m(c)`, `k`, `l`, `m` axes (0 is x). Turns about fixed axes are the same
-//! product read from the right, so the six orders of three axes are intrinsic and extrinsic turns alike. Angles in radians.
+//! Legend: a rotation is composed as `R_k(a) · R_l(b) · R_m(c)`, `k`, `l`, `m` axes (0 is x). Turns about fixed axes
+//! are the same product read from the right, so that the six orders of three axes cover intrinsic and extrinsic turns.
+//! Angles in radians.
 
 use std::f64::consts::PI;
 
@@ -9,28 +10,28 @@ use nalgebra::{Rotation3, UnitQuaternion, Vector3};
 
 /// The orders of three axes (Tait–Bryan), and of three angles.
 pub(super) const ORDERS: [[usize; 3]; 6] = [[2, 1, 0], [0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1]];
-/// Orders whose first and last axis are one (proper Euler angles); ZYZ are the O, A, T of several robots.
+/// Orders with equal first and last axes (proper Euler angles); ZYZ are the O, A, T angles of several robots.
 const PROPER: [[usize; 3]; 6] = [[2, 1, 2], [2, 0, 2], [0, 1, 0], [0, 2, 0], [1, 0, 1], [1, 2, 1]];
 
-/// Pictures before a picture that tell which of two rotations was meant.
+/// Number of earlier pictures that decide between the two possible rotations.
 const NUM_BEFORE: usize = 2;
 
 /// How three angles make a rotation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Composition {
-    /// The factors' axes from left to right, and which of the three angles each takes.
+    /// The factors' axes from left to right, and the index of the angle that each takes.
     Product { axes: [usize; 3], angles: [usize; 3] },
     /// Axis times angle, with these angles along x, y and z.
     RotationVector { angles: [usize; 3] },
 }
 
 impl Composition {
-    /// As a rotation is taken apart: each factor takes the angle of its place.
+    /// The usual decomposition of a rotation: each factor takes the angle at its position.
     pub(super) fn in_order(axes: [usize; 3]) -> Self {
         Self::Product { axes, angles: [0, 1, 2] }
     }
 
-    /// The rotation that three angles make.
+    /// The rotation from three angles.
     fn rotation(self, values: &[f64; 3]) -> UnitQuaternion<f64> {
         match self {
             Self::Product { axes, angles } => {
@@ -47,10 +48,10 @@ impl Composition {
         }
     }
 
-    /// The angles that make a rotation: the middle one within a quarter turn, and beyond.
+    /// The angles of a rotation: with the middle one within a quarter turn, and beyond.
     fn angles(self, rotation: &UnitQuaternion<f64>) -> [[f64; 3]; 2] {
         match self {
-            // Of the product in order alone: rotations are taken apart in no other way.
+            // Only for the product in order, because rotations are decomposed in no other way.
             Self::Product { axes: [k, l, m], .. } => {
                 let matrix: Rotation3<f64> = rotation.to_rotation_matrix();
                 let sign = if (k + 1) % 3 == l { 1.0 } else { -1.0 };
@@ -62,14 +63,14 @@ impl Composition {
             Self::RotationVector { .. } => {
                 let vector = rotation.scaled_axis();
                 let angle = vector.norm();
-                // The same turn the other way round.
+                // The same turn in the other direction.
                 let far = if angle > 0.0 { vector * (1.0 - 2.0 * PI / angle) } else { vector };
                 [vector.into(), far.into()]
             }
         }
     }
 
-    /// As formulas have it, the three angles being a, b and c.
+    /// The formula, with the three angles named a, b and c.
     pub(super) fn formula(self) -> String {
         let name = |angle: usize| ["a", "b", "c"][angle];
         match self {
@@ -86,24 +87,24 @@ impl Composition {
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// A rotation that was composed in one way of angles that were meant in another.
+/// A rotation that was composed in one way from angles that were meant in another.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Recomposition {
     pub(super) composed: Composition,
     pub(super) meant: Composition,
-    /// The angles' factor: radians that were taken for degrees are 180 / π times as large.
+    /// The angles' factor: radians that were taken for degrees are larger by the factor 180 / π.
     pub(super) unit: f64,
 }
 
 impl Recomposition {
-    /// The rotations that may have been meant: three angles have two values for one rotation.
+    /// The rotations that may have been meant: one rotation has two sets of three angles.
     fn meant(&self, rotation: &UnitQuaternion<f64>) -> [UnitQuaternion<f64>; 2] {
         let of_both = self.composed.angles(rotation);
         of_both.map(|values| self.meant.rotation(&values.map(|value| self.unit * value)))
     }
 
-    /// The rotations that were meant, from either of the first picture's two on: of each further picture's two that which turns as the
-    /// board did since the two pictures before. `turns` tells by how much, of pictures.
+    /// The rotations that were meant, starting from each of the first picture's two: of each further picture's two, the
+    /// one that turns as the board did since the two pictures before. `turns` gives this turn between pictures.
     pub(super) fn apply(
         &self,
         rotations: &[UnitQuaternion<f64>],
@@ -123,13 +124,13 @@ impl Recomposition {
         meant
     }
 
-    /// All that are tried with one unit of angles, the likelier ones first: another order of the same turns about x, y and z; angles
-    /// that belong to other axes; rotation vectors; proper Euler angles.
+    /// All tried combinations with one unit of angles, the more likely ones first: another order of the same turns
+    /// about x, y and z; angles that belong to other axes; rotation vectors; proper Euler angles.
     pub(super) fn all(unit: f64) -> Vec<Self> {
         let mut all = Vec::new();
         let mut add = |composed, meant| all.push(Self { composed, meant, unit });
         let composed = ORDERS.map(|axes| (axes, Composition::in_order(axes)));
-        // An angle's place is that of its axis in the order that it was composed in.
+        // An angle's position is that of its axis in the order of composition.
         let place = |order: [usize; 3], axis: usize| order.iter().position(|of| *of == axis).unwrap_or_default();
         for (order, from) in composed {
             for axes in ORDERS {
@@ -192,7 +193,7 @@ mod tests {
 
     #[test]
     fn turns_about_x_then_y_then_z_of_the_fixed_frame_are_the_product_from_the_right() {
-        // Rz(90°)·Rx(90°) takes y first to z, which the turn about z leaves.
+        // Rz(90°)·Rx(90°) first takes y to z, which the turn about z does not change.
         let composition = Composition::Product { axes: [2, 1, 0], angles: [2, 1, 0] };
         let turned = composition.rotation(&[FRAC_PI_2, 0.0, FRAC_PI_2]) * Vector3::y();
         assert!((turned - Vector3::z()).norm() < 1e-12);
@@ -212,7 +213,7 @@ mod tests {
         };
         let off = recomposition.meant(&composed).map(|found| found.angle_to(&meant));
         assert!(off[0] > 0.1 && off[1] < 1e-7, "{off:?}");
-        // The first is told; of the second the turn since then.
+        // The first is given; of the second the turn since then.
         let turns = |_: usize, _: usize| 0.0;
         let found = recomposition.apply(&[composed; 2], 1, &turns);
         assert!(found.iter().all(|found| found.angle_to(&meant) < 1e-7));

@@ -1,4 +1,4 @@
-//! Which few robot poses do not belong to their pictures: one or two that are wrong, or two that are exchanged.
+//! Finds a few robot poses that do not match their pictures: one or two that are wrong, or two that are exchanged.
 
 use nalgebra::Isometry3;
 
@@ -6,7 +6,7 @@ use super::closed_form::{self, BoardSize};
 use super::solve::Evidence;
 use super::view::MIN_POSES;
 
-/// The mistake in the poses of a few pictures.
+/// The error in the poses of a few pictures.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum MixedUp {
     /// These are wrong.
@@ -15,14 +15,16 @@ pub(super) enum MixedUp {
     Exchanged([usize; 2]),
 }
 
-/// The poses that stay leave at most this share of what all leave in closed form.
+/// Largest share of the closed form's residual that the remaining poses may have.
 const MAX_SHARE: f64 = 0.5;
-/// Another choice that leaves less than so many times as much is as good: it is not known which pose is wrong.
+/// Another choice with a residual below this many times as much is equally good: then it is unknown which pose is
+/// wrong.
 const MIN_AMBIGUITY: f64 = 2.0;
-/// Pictures of which one may be named, and two: of fewer the others agree by chance where the robot is merely off.
+/// Minimum numbers of pictures for naming one, and two: with fewer the others agree by chance if the robot is merely
+/// inaccurate.
 const MIN_FOR_ONE: usize = MIN_POSES + 2;
 const MIN_FOR_TWO: usize = MIN_POSES + 4;
-/// Of more pictures not every two are looked at, but the worst one with each other.
+/// With more pictures not every pair is tried, only the worst picture with each other.
 const MAX_ALL_PAIRS: usize = 30;
 
 /// The most plausible choice of each kind, the simplest kind first.
@@ -64,7 +66,7 @@ pub(super) fn plausible(evidence: &Evidence, robot: &[Isometry3<f64>]) -> Vec<Mi
     found
 }
 
-/// The choice that leaves clearly less than all others, and than what is given.
+/// The choice with a clearly smaller residual than all others, and than the given poses.
 fn clearest<T>(mut choices: Vec<(f64, T)>, given: f64) -> Option<T> {
     choices.sort_by(|a, b| a.0.total_cmp(&b.0));
     let second = choices.get(1).map_or(f64::INFINITY, |(left, _)| *left);

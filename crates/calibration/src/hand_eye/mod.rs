@@ -1,4 +1,4 @@
-//! Where the camera is on the robot, or beside it, from robot poses and pictures of the board.
+//! The camera's pose on the robot, or beside it, from robot poses and pictures of the board.
 //!
 //! Legend, one equation for both mounts, picture `i`: `camera_from_board_i = X⁻¹ A_i Y`.
 //!
@@ -13,8 +13,8 @@
 //!               ─ robot poses that are off: their errors estimated with X and Y ─ one left out at a time
 //! poses that contradict the pictures ─ readings of all, a few that are wrong, the board's size        diagnosis.rs, readings.rs, mixed_up.rs
 //! ```
-//! A robot's pose is off by far more than a pixel: 0.05 degrees at 0.5 m are 0.4 mm. Where reprojection says so, each pose gets six
-//! corrections of its own, whose squares are weighed against the pixels'.
+//! A robot's pose has an error far above a pixel: 0.05 degrees at 0.5 m are 0.4 mm. If reprojection shows this, each
+//! pose gets six corrections, whose squares are weighted relative to those of the pixels.
 
 mod bundle;
 mod closed_form;
@@ -44,25 +44,26 @@ pub struct HandEye {
     pub frame_from_camera: Isometry3<f64>,
     /// `base_from_board` or `flange_from_board`, in metres.
     pub frame_from_board: Isometry3<f64>,
-    /// Root of the expected squared distance of the camera from its true place, metres.
+    /// Root of the expected squared distance of the camera from its true position, metres.
     pub sigma_m: f64,
     /// Root of the expected squared angle, radians.
     pub sigma_rad: f64,
-    /// Reprojection with the robot's poses as given: root of the mean squared distance of corners.
+    /// Reprojection with the given robot poses: root of the mean squared distance of corners.
     pub rms_px: f64,
-    /// Reprojection where each picture has a pose of its own: what corners and intrinsics alone leave.
+    /// Reprojection if each picture has its own pose: the error of corners and intrinsics alone.
     pub board_rms_px: f64,
-    /// What the robot's poses are off by, if they are measurably: metres and radians along and about each axis. Their ratio is assumed.
+    /// The estimated errors of the robot's poses, if measurable: metres and radians along and about each axis. Their
+    /// ratio is assumed.
     pub robot_sigma: Option<[f64; 2]>,
-    /// RMS of each picture with the robot's pose as given, in the order given.
+    /// RMS of each picture with the given robot pose, in the given order.
     pub pictures_rms_px: Vec<f64>,
-    /// How far the camera moves when a picture is left out: metres and radians, in the order given.
+    /// Movement of the camera when a picture is left out: metres and radians, in the given order.
     pub spread: Vec<[f64; 2]>,
 }
 
 impl HandEye {
-    /// The camera with its place: on the hand, or over the table. `table_height_m` is the table's z in the base; without it, that of the
-    /// camera's file or 0.
+    /// The camera with its pose: on the hand, or over the table. `table_height_m` is the table's z in the base; without
+    /// it, that of the camera's file or 0.
     pub fn mounted(&self, camera: CalibratedCamera, mount: Mount, table_height_m: Option<f64>) -> CalibratedCamera {
         match mount {
             Mount::Hand => CalibratedCamera { flange_from_camera: Some(self.frame_from_camera), ..camera },

@@ -5,15 +5,16 @@
 //!   - picture: 00.png
 //!     base_from_flange: {translation_m: [0.4, 0.0, 0.5], rotation_xyzw: [1.0, 0.0, 0.0, 0.0]}
 //! ```
-//! JSON has the same names. CSV has the header `picture,x,y,z,qx,qy,qz,qw`, lengths in metres; semicolons, tabs or blanks may stand between
-//! the fields, numbers may have decimal commas, and lines that start with `#` are comments.
+//! JSON has the same names. CSV has the header `picture,x,y,z,qx,qy,qz,qw`, lengths in metres; the fields may be
+//! separated by semicolons, tabs or blanks, numbers may have decimal commas, and lines that start with `#` are
+//! comments.
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use serde::Deserialize;
 
 use crate::error::CalibrationError;
 
-/// Where the robot was for a picture.
+/// The robot's pose for a picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RobotPose {
     /// The picture's file.
@@ -39,13 +40,13 @@ struct Pose {
     rotation_xyzw: Vec<f64>,
 }
 
-/// No arm reaches as far, metres.
+/// Larger than any arm's reach, metres.
 const MAX_REACH_M: f64 = 5.0;
-/// How far a quaternion may be from length 1: files round.
+/// Tolerance of a quaternion's length, for rounding in files.
 const MAX_QUATERNION_ERROR: f64 = 1e-3;
 const HEADER: &str = "picture,x,y,z,qx,qy,qz,qw";
 
-/// How a file is written.
+/// The format of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Format {
     Csv,
@@ -54,7 +55,7 @@ enum Format {
 }
 
 impl Format {
-    /// From the first bytes where they leave no doubt, else from the ending of the file's name.
+    /// By the first bytes if they are unambiguous, otherwise by the extension of the file's name.
     fn of(name: &str, text: &str) -> Self {
         let first = text.lines().find(|line| is_row(line)).unwrap_or_default();
         let ending = name.rsplit_once('.').map(|(_, ending)| ending.to_ascii_lowercase()).unwrap_or_default();
@@ -70,7 +71,7 @@ impl Format {
     }
 }
 
-/// Whether a line of CSV has a row: neither empty nor a comment.
+/// Whether a line of CSV contains a row: it is neither empty nor a comment.
 fn is_row(line: &str) -> bool {
     !line.trim().is_empty() && !line.trim_start().starts_with('#')
 }
@@ -78,7 +79,7 @@ fn is_row(line: &str) -> bool {
 /// Reads robot poses from the text of a file with this name.
 ///
 /// # Errors
-/// [`CalibrationError::PosesUnreadable`]; [`CalibrationError::RobotPose`] for a pose that is none, or in millimetres.
+/// [`CalibrationError::PosesUnreadable`]; [`CalibrationError::RobotPose`] for an invalid pose, or one in millimetres.
 pub fn read_robot_poses(name: &str, text: &str) -> Result<Vec<RobotPose>, CalibrationError> {
     let text = text.trim_start_matches('\u{feff}').trim_start();
     let entries = match Format::of(name, text) {
@@ -107,7 +108,7 @@ fn unreadable(found: String) -> CalibrationError {
 fn read_csv(text: &str) -> Result<Vec<Entry>, CalibrationError> {
     let mut rows = text.lines().map(str::trim).filter(|line| is_row(line));
     let header = rows.next().unwrap_or_default();
-    // Spreadsheets of countries with decimal commas put semicolons between the fields.
+    // Spreadsheets with decimal commas separate the fields by semicolons.
     let separator = [';', '\t', ','].into_iter().find(|separator| header.contains(*separator)).unwrap_or(' ');
     if !fields(header, separator).join(",").eq_ignore_ascii_case(HEADER) {
         return Err(unreadable(format!("as CSV, the header {header:?} instead of {HEADER}")));
@@ -123,7 +124,7 @@ fn entry_of_row(row: &str, separator: char) -> Result<Entry, CalibrationError> {
     let num_fields = HEADER.split(',').count();
     let mut fields = fields(row, separator);
     if fields.len() != num_fields {
-        // Decimal commas beside commas between the fields: blanks tell them apart.
+        // With decimal commas and commas between the fields, blanks distinguish them.
         fields = row.split_whitespace().map(|field| field.trim_end_matches(separator)).collect();
     }
     let expected = || unreadable(format!("as CSV, the line {row:?}, expected {HEADER}"));

@@ -1,4 +1,4 @@
-//! Robot poses read otherwise than they were given: mistakes that are often made.
+//! Other interpretations of the given robot poses: frequent errors.
 
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion};
 use sdg_geometry::Mount;
@@ -11,7 +11,7 @@ use super::view::motion;
 pub(super) struct Reading {
     /// The reading in words, as part of a sentence.
     pub(super) name: String,
-    /// Whether the camera is then mounted at the other place than told.
+    /// Whether the camera is then mounted at the other place than given.
     pub(super) is_other_mount: bool,
     /// `base_from_flange` of each picture.
     pub(super) robot: Vec<Isometry3<f64>>,
@@ -20,8 +20,8 @@ pub(super) struct Reading {
 /// A reading of one pose.
 type OfPose = fn(&Isometry3<f64>) -> Isometry3<f64>;
 
-/// Mistakes other than Euler angles, the simplest first. A camera on the hand with poses inverted is a camera beside the robot: both have
-/// one equation.
+/// Errors other than Euler angles, the simplest first. A camera on the hand with inverted poses is a camera beside the
+/// robot: both have the same equation.
 const READINGS: [(&str, bool, OfPose); 8] = [
     ("rotation_xyzw seems to hold w first", false, w_first),
     ("the poses seem to be flange_from_base, or the mount to be the other one", true, Isometry3::inverse),
@@ -39,18 +39,19 @@ const READINGS: [(&str, bool, OfPose); 8] = [
     ("the rotations seem to be transposed, and the mount to be the other one", true, |pose| transposed(pose).inverse()),
 ];
 
-/// Rotations that another reading explains leave at most this share of what those given leave in closed form.
+/// Largest share of the closed form's residual with the given rotations that another reading of rotations may have.
 const MAX_TURNS_SHARE: f64 = 0.5;
-/// Readings of Euler angles that leave the least in closed form, and are looked at further.
+/// Number of readings of Euler angles with the smallest closed-form residuals that are evaluated further.
 const NUM_EULER: usize = 3;
-/// Ratio of two readings' residuals up to which they count as alike.
+/// Ratio of two readings' residuals up to which they count as equal.
 const ALIKE: f64 = 1.1;
-/// Below it all digits are rounding, radians.
+/// Below it all digits are rounding errors, radians.
 const ROUNDING_RAD: f64 = 1e-5;
-/// Rotations all smaller than this may be radians that were taken for degrees: half a turn about each axis is 3.14 "degrees".
+/// If all rotations are smaller than this, they may be radians that were taken for degrees: half a turn about each axis
+/// is 3.14 "degrees".
 const MAX_TINY_RAD: f64 = 0.1;
 
-/// All readings whose rotations fit those of the boards, the simplest first.
+/// All readings whose rotations match those of the boards, the simplest first.
 pub(super) fn plausible(mount: Mount, robot: &[Isometry3<f64>], boards: &[Isometry3<f64>]) -> Vec<Reading> {
     let left = |robot: &[Isometry3<f64>]| {
         let motions: Vec<_> = robot.iter().map(|pose| motion(mount, pose)).collect();
@@ -64,7 +65,7 @@ pub(super) fn plausible(mount: Mount, robot: &[Isometry3<f64>], boards: &[Isomet
             is_other_mount,
             robot: robot.iter().map(of_pose).collect(),
         })
-        // Those of translations leave the rotations as they are.
+        // Those of translations do not change the rotations.
         .filter(|reading| left(&reading.robot) <= given)
         .collect();
     let is_tiny = robot.iter().all(|pose| pose.rotation.angle() < MAX_TINY_RAD);
@@ -83,7 +84,7 @@ pub(super) fn plausible(mount: Mount, robot: &[Isometry3<f64>], boards: &[Isomet
         .filter(|(left, ..)| *left < MAX_TURNS_SHARE * given)
         .collect();
     let least = ways.iter().map(|(left, ..)| *left).fold(f64::INFINITY, f64::min);
-    // Of those alike the likelier ones stand first.
+    // Among equal ones the more likely come first.
     ways.retain(|(left, ..)| *left <= ALIKE * least + ROUNDING_RAD);
     let likeliest = ways.iter().take(NUM_EULER);
     readings.extend(likeliest.map(|(_, way, first)| Reading {

@@ -1,4 +1,4 @@
-//! The minimum over all pictures, with the robot's errors where reprojection shows them.
+//! The minimum over all pictures, with the robot's errors if reprojection shows them.
 
 use nalgebra::Isometry3;
 use sdg_geometry::{Mount, PinholeCamera};
@@ -11,20 +11,22 @@ use crate::error::CalibrationError;
 use crate::least_squares::{Minimum, minimise};
 use crate::pose::BoardPose;
 
-/// A robot's errors along and about an axis that are assumed at first, and keep this ratio: metres and radians.
-/// The figures of issue 16 for an arm's noise.
+/// Initially assumed errors of a robot along and about an axis, whose ratio is kept: metres and radians. The
+/// figures of issue 16 for an arm's noise.
 pub(super) const ROBOT_SIGMA: [f64; 2] = [0.0001, 0.000_872_665];
-/// The excess of squares over what exact robot poses leave, as a ratio: 15 pictures leave a deviation of 0.16.
+/// Ratio of the squared error to that expected for exact robot poses: 15 pictures have a deviation of 0.16.
 const MAX_EXCESS: f64 = 1.5;
-/// Robot errors, as multiples of those assumed, beyond which poses and pictures do not belong together: 3 mm and 1.5 degrees.
+/// Robot errors, as multiples of the assumed ones, beyond which poses and pictures do not match: 3 mm and 1.5 degrees.
 pub(super) const MAX_ROBOT_SCALE: f64 = 30.0;
-/// Where other readings of the poses are tried: 0.15 mm and 0.075 degrees. One pose of 15 that is off by 10 mm leaves as much.
+/// Robot errors from which other readings of the poses are tried: 0.15 mm and 0.075 degrees. One pose of 15 with an
+/// error of 10 mm causes as much.
 pub(super) const SUSPECT_ROBOT_SCALE: f64 = 1.5;
-/// Robot errors from which the search starts again where it found none.
+/// Robot errors from which the search restarts if it found none.
 const FURTHER_SCALES: [f64; 2] = [5.0, 25.0];
-/// It does not start again where the closed form leaves more, in radians: poses and pictures do not belong together at all.
+/// It does not restart if the closed form's residual is larger, in radians: then poses and pictures do not match at
+/// all.
 const MAX_RETRY_RAD: f64 = 0.2;
-/// What corners are off by at least, in pixels.
+/// Minimum error of corners, in pixels.
 const MIN_CORNER_SIGMA_PX: f64 = 0.02;
 
 /// Pictures, and their solution without the robot's poses.
@@ -38,12 +40,12 @@ pub(super) struct Evidence<'a> {
     pub(super) poses: Vec<&'a BoardPose>,
 }
 
-/// The minimum, and the errors that led to it.
+/// The minimum, and the estimated errors of the robot.
 pub(super) struct Solved<'a> {
     pub(super) minimum: Minimum<Bundle<'a>, NUM_SHARED>,
-    /// Multiples of [`ROBOT_SIGMA`]; `None` where robot poses count as exact.
+    /// Multiples of [`ROBOT_SIGMA`]; `None` if robot poses count as exact.
     pub(super) robot_scale: Option<f64>,
-    /// Equations less parameters.
+    /// Equations minus parameters.
     pub(super) freedom: f64,
     corner_sigma_px: f64,
     pub(super) board_rms_px: f64,
@@ -59,7 +61,7 @@ impl<'a> Evidence<'a> {
         }
     }
 
-    /// Where the board is in each picture.
+    /// The board's pose in each picture.
     pub(super) fn boards(&self) -> Vec<Isometry3<f64>> {
         self.poses.iter().map(|pose| pose.camera_from_board).collect()
     }
@@ -92,7 +94,7 @@ impl<'a> Solved<'a> {
             BoardSize::Free => (start.with_free_scale(closed.board_scale), 13),
         };
         let exact = minimise(start.clone()).ok_or(CalibrationError::NoPose)?;
-        // Each picture's six parameters are replaced by those of all.
+        // Each picture's six parameters are replaced by the common ones.
         let freedom = (6 * views.len() - num_shared) as f64;
         let solved = |minimum, robot_scale| Self { minimum, robot_scale, freedom, corner_sigma_px, board_rms_px };
         let excess = |cost: f64| (cost - free_cost) / (corner_sigma_px * corner_sigma_px) / freedom;
@@ -103,7 +105,8 @@ impl<'a> Solved<'a> {
             let sigma = ROBOT_SIGMA.map(|sigma| scale * sigma / corner_sigma_px);
             minimise(from.with_robot_sigma(sigma)).ok_or(CalibrationError::NoPose)
         };
-        // The errors are right where the squares are as many as equations are left; they fall as the errors grow.
+        // The errors are right if the squared error equals the number of remaining equations; it decreases with growing
+        // errors.
         let weighed = |first: f64, from: &Bundle<'a>| {
             let mut scale = first;
             let mut minimum = solve(scale, from)?;
@@ -120,7 +123,7 @@ impl<'a> Solved<'a> {
             Ok((minimum, scale, is_right))
         };
         let (minimum, scale, is_right) = weighed(1.0, &exact.at)?;
-        // Where one pose is far off the minimum with exact poses, or with small errors, may lead nowhere.
+        // If one pose has a large error, the minimisation with exact poses, or with small errors, may not converge.
         if !is_right && closed.left_rad < MAX_RETRY_RAD {
             for first in FURTHER_SCALES {
                 if let Ok((minimum, scale, true)) = weighed(first, &start) {
@@ -131,13 +134,13 @@ impl<'a> Solved<'a> {
         Ok(solved(minimum, Some(scale)))
     }
 
-    /// Multiples of [`ROBOT_SIGMA`], 0 where robot poses count as exact.
+    /// Multiples of [`ROBOT_SIGMA`], 0 if robot poses count as exact.
     pub(super) fn robot_noise(&self) -> f64 {
         self.robot_scale.unwrap_or_default()
     }
 
-    /// By how much the squares would fall with the board's scale free and the robot's errors weighed as now, over what they fall without a
-    /// reason: 1.
+    /// The decrease of the squared error with a free scale of the board and the present weights of the robot's errors,
+    /// relative to the decrease expected by chance: 1.
     pub(super) fn gain_of_free_scale(&self) -> f64 {
         let at = &self.minimum.at;
         let free = minimise(at.with_free_scale(at.board_scale));
@@ -150,16 +153,16 @@ impl<'a> Solved<'a> {
         Some([self.minimum.at.board_scale, variance.max(0.0).sqrt()])
     }
 
-    /// Squares are in pixels, with the robot's errors weighed against them.
+    /// Squares are in pixels, with the weighted robot's errors.
     pub(super) fn variance(&self) -> f64 {
         self.corner_sigma_px * self.corner_sigma_px
     }
 
-    /// `X` found without each picture.
+    /// `X` without each picture.
     pub(super) fn without_each(&self) -> Vec<Isometry3<f64>> {
         let all = &self.minimum.at;
         (0..all.num_views())
-            // What cannot be found without a picture rests on it alone: as far as the sum of all others.
+            // If no solution exists without a picture, everything depends on it: the value is the sum of all others.
             .map(|k| minimise(all.without(k)).map_or(Isometry3::identity(), |minimum| minimum.at.x))
             .collect()
     }

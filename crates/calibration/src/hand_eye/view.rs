@@ -5,10 +5,10 @@ use sdg_geometry::Mount;
 
 use crate::detection::SeenCorner;
 
-/// With three pictures nothing is left when one is taken away.
+/// With three pictures, none can be removed.
 pub const MIN_POSES: usize = 4;
 
-/// `A_i`. On the hand the board lies still; beside the robot the flange holds it.
+/// `A_i`. With the camera on the hand the board is at rest; beside the robot the flange holds it.
 pub(super) fn motion(mount: Mount, base_from_flange: &Isometry3<f64>) -> Isometry3<f64> {
     match mount {
         Mount::Hand => base_from_flange.inverse(),
@@ -16,11 +16,11 @@ pub(super) fn motion(mount: Mount, base_from_flange: &Isometry3<f64>) -> Isometr
     }
 }
 
-/// A robot's pose and the corners seen from there.
+/// A robot's pose and the corners seen from it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HandEyeView {
-    /// Where the robot says that its flange is, in metres.
+    /// The pose of the flange according to the robot, in metres.
     pub base_from_flange: Isometry3<f64>,
-    /// What the picture shows of the board.
+    /// The visible corners of the board.
     pub corners: Vec<SeenCorner>,
 }

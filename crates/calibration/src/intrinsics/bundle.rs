@@ -16,7 +16,7 @@ pub(super) struct Bundle<'a> {
     pub(super) camera: PinholeCamera,
     /// `camera_from_board` of each picture.
     pub(super) poses: Vec<Isometry3<f64>>,
-    /// Huber's bound: residuals beyond count by their length, not by its square.
+    /// Huber's bound: larger residuals count by their length, not by its square.
     pub(super) robust_px: f64,
     pub(super) has_k3: bool,
 }
@@ -33,7 +33,7 @@ impl Problem<NUM_INTRINSICS> for Bundle<'_> {
                 let weight = if length <= self.robust_px { 1.0 } else { self.robust_px / length };
                 block.add(&residual, &projected.by_intrinsics, &(projected.by_point * by_twist(&p)), weight);
                 if weight < 1.0 {
-                    // Huber's 2 b |r| - b² in place of the weighted square b |r|.
+                    // Huber's 2 b |r| - b², not the weighted square b |r|.
                     block.cost += self.robust_px * (length - self.robust_px);
                 }
             }
@@ -78,7 +78,7 @@ impl Bundle<'_> {
         (sum / self.num_corners() as f64).sqrt()
     }
 
-    /// Without corners that lie more than `ratio` times the RMS away, unless a picture has few.
+    /// Without corners farther away than `ratio` times the RMS, unless a picture has few.
     pub(super) fn without_outliers(mut self, ratio: f64) -> Self {
         let bound = (ratio * self.rms_px()).powi(2);
         let kept = (0..self.views.len()).map(|view| {

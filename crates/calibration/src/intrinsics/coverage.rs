@@ -1,4 +1,4 @@
-//! What a calibration's pictures lack, and the view that would help most.
+//! Missing views of a calibration, and the most useful next one.
 
 use std::fmt;
 
@@ -7,7 +7,7 @@ use sdg_geometry::{Polygon, convex_hull};
 
 use super::bundle::Bundle;
 
-/// What the pictures lack.
+/// A deficiency of the pictures.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Advice {
@@ -18,22 +18,22 @@ pub enum Advice {
     },
     /// The board is tilted, but about one axis only.
     OneAxis {
-        /// Which way it was not tilted.
+        /// The direction in which it was not tilted.
         missing: &'static str,
     },
     /// The board is small in all pictures.
     TooFar {
-        /// Share of the picture that it fills at most.
+        /// Largest share of the picture that it fills.
         max_share: f64,
     },
-    /// Nothing is known of the lens there.
+    /// The lens is not determined there.
     Empty {
-        /// Which part of the picture.
+        /// The part of the picture.
         part: &'static str,
     },
     /// There are few pictures.
     Few {
-        /// How many are used.
+        /// Number of used pictures.
         found: usize,
     },
 }
@@ -61,11 +61,11 @@ impl fmt::Display for Advice {
     }
 }
 
-/// The tilt that makes a board no longer face-on.
+/// Minimum tilt of a board that is not face-on.
 const MIN_TILT_DEG: f64 = 15.0;
-/// The least spread, largest less smallest, of tilts about an axis.
+/// Minimum range, largest minus smallest, of tilts about an axis.
 const MIN_SPREAD_DEG: f64 = 15.0;
-/// The least share of the picture that the largest board fills.
+/// Minimum share of the picture filled by the largest board.
 const MIN_SHARE: f64 = 0.12;
 const MIN_PICTURES: usize = 8;
 /// The picture's parts, three by three.
@@ -75,7 +75,7 @@ const PARTS: [[&str; 3]; 3] = [
     ["in the lower left corner", "at the lower border", "in the lower right corner"],
 ];
 
-/// What is missing, most useful first: without tilts the focal length is open, without corners the lens.
+/// The deficiencies, most useful first: without tilts the focal length is undetermined, without corners the lens.
 pub(super) fn advice(bundle: &Bundle<'_>, used: &[usize]) -> Vec<Advice> {
     let mut advice = Vec::new();
     let normals = bundle.normals();
@@ -107,7 +107,7 @@ pub(super) fn advice(bundle: &Bundle<'_>, used: &[usize]) -> Vec<Advice> {
             [seen.pixel.x / width, seen.pixel.y / height].map(|share| (3.0 * share).clamp(0.0, 2.0) as usize);
         is_seen[row][column] = true;
     }
-    // Corners first: the lens bends most there.
+    // Corners first, because the lens's distortion is largest there.
     for [row, column] in [[0, 0], [0, 2], [2, 0], [2, 2], [0, 1], [1, 0], [1, 2], [2, 1], [1, 1]] {
         if !is_seen[row][column] {
             advice.push(Advice::Empty { part: PARTS[row][column] });

@@ -1,8 +1,8 @@
-//! The focal length of a camera that was never calibrated, from one picture of the sheet, and what it costs not to know it.
+//! The focal length of an uncalibrated camera, from one picture of the sheet, and the effect of its uncertainty.
 //!
-//! Square pixels, no lens distortion, and an optical axis near the middle of the picture are assumed. A sheet seen from straight above
-//! has the same picture at every focal length (twice as long, twice as far); the more it is tilted, the more exactly
-//! the focal length follows.
+//! Square pixels, no lens distortion, and an optical axis near the middle of the picture are assumed. A sheet seen
+//! vertically from above has the same picture at every focal length (twice as long, twice as far); the accuracy of the
+//! focal length grows with the tilt.
 
 use nalgebra::{Isometry3, Matrix6, Point2, SMatrix, SVector, Vector6};
 use sdg_geometry::{PinholeCamera, PlumbBob, PosedCamera};
@@ -22,7 +22,7 @@ use crate::projection::{by_twist, motion, off, project};
 pub struct FocalEstimate {
     /// Pixels, the same for both axes.
     pub focal_px: f64,
-    /// Its standard error, from the corners' residuals and an optical axis that is not quite in the middle.
+    /// Its standard error, from the corners' residuals and an optical axis slightly away from the centre.
     pub sigma_px: f64,
 }
 
@@ -33,22 +33,23 @@ impl FocalEstimate {
     }
 }
 
-/// How far the optical axis is from the picture's middle, as a share of its longer side: what phones and webcams have.
+/// Distance of the optical axis from the picture's centre, as a share of its longer side: typical of phones and
+/// webcams.
 const CENTER_SIGMA: f64 = 0.02;
-/// What corners are off by at least.
+/// Minimum error of corners.
 const MIN_CORNER_SIGMA_PX: f64 = 0.05;
-/// Focal lengths that cameras have, in longer sides of the picture.
+/// Range of focal lengths of cameras, in longer sides of the picture.
 const FOCALS: [f64; 2] = [0.3, 10.0];
-/// Shares of the longer side at which the search starts beside the closed form.
+/// Further starts of the search besides the closed form, as shares of the longer side.
 const STARTS: [f64; 2] = [0.8, 1.5];
 
-/// A camera with its axis in the middle.
+/// A camera with its axis at the centre.
 fn centered((width, height): (u32, u32), focal_px: f64) -> PinholeCamera {
     let [cx, cy] = [width, height].map(|side| 0.5 * f64::from(side));
     PinholeCamera { width, height, fx: focal_px, fy: focal_px, cx, cy, lens: PlumbBob::NONE }
 }
 
-/// The focal length that the sheet's perspective tells; `None` where it tells nothing: seen from straight above.
+/// The focal length from the sheet's perspective; `None` if it is undetermined: seen vertically from above.
 pub fn focal_from_sheet(size: (u32, u32), board: &Board, corners: &[SeenCorner]) -> Option<FocalEstimate> {
     let longer = f64::from(size.0.max(size.1));
     let middle = centered(size, longer);
@@ -56,7 +57,7 @@ pub fn focal_from_sheet(size: (u32, u32), board: &Board, corners: &[SeenCorner])
     let closed = focal_length(&[homography], middle.cx, middle.cy);
     let starts = closed.into_iter().chain(STARTS.map(|share| share * longer));
     let plausible = FOCALS[0] * longer..FOCALS[1] * longer;
-    // The homography has eight parameters and explains all but the corners' noise, in x and in y.
+    // The homography has eight parameters and explains everything except the corners' noise, in x and in y.
     let freedom = (2 * corners.len()).checked_sub(8).filter(|freedom| *freedom > 0)? as f64;
     let noise = homography_rms_px(board, corners)? * (corners.len() as f64 / freedom).sqrt();
     let corner_sigma = noise.max(MIN_CORNER_SIGMA_PX);
@@ -72,7 +73,7 @@ pub fn focal_from_sheet(size: (u32, u32), board: &Board, corners: &[SeenCorner])
     (plausible.contains(&estimate.focal_px) && estimate.sigma_px.is_finite()).then_some(estimate)
 }
 
-/// How far corners are from where the homography puts them, root mean square: what it cannot explain is the lens.
+/// Root mean square distance of corners from the homography: the part that it cannot explain is the lens's distortion.
 pub fn homography_rms_px(board: &Board, corners: &[SeenCorner]) -> Option<f64> {
     let places = places(board, corners);
     let homography = homography::fit(&places)?;
@@ -81,20 +82,21 @@ pub fn homography_rms_px(board: &Board, corners: &[SeenCorner]) -> Option<f64> {
     Some((sum / places.len() as f64).sqrt())
 }
 
-/// By how much positions move where the focal length is wrong, in metres.
+/// Movement of positions if the focal length is wrong, in metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FocalCost {
-    /// How wrong it is assumed to be, as a share.
+    /// Its assumed relative error.
     pub focal_error: f64,
     /// The height above the sheet at which positions are compared.
     pub height_m: f64,
     /// At the sheet's centre, m.
     pub at_sheet_m: f64,
-    /// At the worst place along the picture's border, as far as it shows that plane.
+    /// At the worst point along the picture's border, as far as it shows that plane.
     pub at_border_m: f64,
 }
 
-/// Compares positions at a height with those that a longer and a shorter focal length give, the pose found anew with each.
+/// Compares positions at a height with those for a longer and a shorter focal length, with the pose computed again for
+/// each.
 ///
 /// # Errors
 /// As [`locate_sheet`].
@@ -137,7 +139,7 @@ struct Sheet<'a> {
     corners: &'a [SeenCorner],
     camera: PinholeCamera,
     camera_from_board: Isometry3<f64>,
-    /// The weight of the centre's square distance from the middle.
+    /// The weight of the squared distance of the principal point from the picture's centre.
     prior: f64,
 }
 

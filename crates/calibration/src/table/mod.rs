@@ -1,10 +1,10 @@
-//! One picture of the sheet on the table: where the camera is.
+//! One picture of the sheet on the table: the camera's pose.
 //!
 //! ```text
 //! corners ─┬─ with intrinsics: the pose that minimises reprojection, its errors        sheet_pose.rs
-//!          └─ without: homography, focal length where the tilt tells it, else a guess  focal.rs
+//!          └─ without: homography, focal length if the tilt determines it, else a guess  focal.rs
 //! ```
-//! A homography alone says what lies where on the table. For what stands above the table the focal length counts;
+//! A homography alone gives positions on the table. For positions above the table the focal length matters;
 //! [`FocalCost`] has the size of that effect.
 
 mod focal;

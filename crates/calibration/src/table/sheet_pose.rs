@@ -1,4 +1,4 @@
-//! The camera's place over the sheet, and its errors.
+//! The camera's pose over the sheet, and its errors.
 
 use nalgebra::{Isometry3, Vector3};
 use sdg_geometry::PinholeCamera;
@@ -8,22 +8,23 @@ use crate::detection::SeenCorner;
 use crate::error::CalibrationError;
 use crate::pose::board_pose;
 
-/// Where a camera is over a sheet.
+/// The pose of a camera over a sheet.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SheetPose {
-    /// From the optical frame to the sheet's frame (origin and axes as [`Board`] has them, z up from the sheet), in metres.
+    /// From the optical frame to the sheet's frame (origin and axes as in [`Board`], z up from the sheet), in metres.
     pub sheet_from_camera: Isometry3<f64>,
-    /// Root of the mean squared distance between corners and where the pose puts them.
+    /// Root of the mean squared distance between corners and their projections.
     pub rms_px: f64,
     /// Standard error of the camera's height over the sheet, metres, from the corners alone: the intrinsics count as exact.
     pub sigma_height_m: f64,
     /// Standard error of the tilt about a horizontal axis, radians.
     pub sigma_tilt_rad: f64,
-    /// The angle between the optical axis and straight down, radians.
+    /// The angle between the optical axis and the vertical, radians.
     pub tilt_rad: f64,
 }
 
-/// Beyond this angle from straight above, the horizon is near and a millimetre of the table less than a fifth of a pixel at best.
+/// Largest angle from the vertical: beyond it the horizon is close, and a millimetre of the table is at best a fifth of
+/// a pixel.
 const MAX_TILT_DEG: f64 = 75.0;
 
 /// Finds the camera over the sheet.
@@ -38,12 +39,12 @@ pub fn locate_sheet(
     let pose = board_pose(camera, board, corners).ok_or(CalibrationError::NoPose)?;
     let camera_from_sheet = pose.camera_from_board;
     let normal: Vector3<f64> = camera_from_sheet.rotation * Vector3::z();
-    // The sheet's z points to the camera, so along -z of the optical frame.
+    // The sheet's z points to the camera, that is, along -z of the optical frame.
     let tilt_rad = (-normal.z).clamp(-1.0, 1.0).acos();
     if tilt_rad.to_degrees() > MAX_TILT_DEG {
         return Err(CalibrationError::Horizon { tilt_deg: tilt_rad.to_degrees(), max_deg: MAX_TILT_DEG });
     }
-    // After a twist (v, ω) the camera's place in the sheet's frame moves by -Rᵀ v.
+    // After a twist (v, ω) the camera's position in the sheet's frame moves by -Rᵀ v.
     let of_place = pose.covariance.fixed_view::<3, 3>(0, 0);
     let sigma_height_m = (normal.transpose() * of_place * normal)[0].max(0.0).sqrt();
     let of_turn = pose.covariance.fixed_view::<3, 3>(3, 3);

@@ -1,4 +1,4 @@
-//! Cameras and where they saw the board, for the comparison with OpenCV.
+//! Cameras and their board poses, for the comparison with OpenCV.
 
 use image::GrayImage;
 use nalgebra::Isometry3;
@@ -55,7 +55,7 @@ pub fn board() -> Board {
     Board::new(9, 6, 0.025).expect("a board")
 }
 
-/// Where the board is in each picture: all over it, tilted every way by up to 40 degrees, whole.
+/// The board's pose in each picture: all over it, tilted in every direction by up to 40 degrees, completely visible.
 pub fn poses(camera: &PinholeCamera) -> Vec<Isometry3<f64>> {
     let board = board();
     let (width, height) = (f64::from(camera.width), f64::from(camera.height));

@@ -1,6 +1,7 @@
-//! Pictures of boards with the truth, the same bits on every machine: only operations that IEEE 754 rounds exactly.
+//! Pictures of boards with the truth, bit-identical on every machine: only operations that IEEE 754 rounds exactly.
 //!
-//! Every pixel is the mean over its area. The lens is undone at the pixels' corners and taken as linear within a pixel.
+//! Every pixel is the mean over its area. The lens is inverted at the pixels' corners and approximated as linear within
+//! a pixel.
 #![allow(dead_code)]
 
 pub mod cameras;
@@ -10,7 +11,7 @@ use nalgebra::{Isometry3, Point2, Point3, Quaternion, Translation3, UnitQuaterni
 use sdg_calibration::Board;
 use sdg_geometry::PinholeCamera;
 
-/// SplitMix64: a generator that no crate's next version changes.
+/// SplitMix64: a generator that does not change with a crate's version.
 #[derive(Debug, Clone)]
 pub struct Random(pub u64);
 
@@ -35,15 +36,15 @@ impl Random {
     }
 }
 
-/// How a picture is spoilt.
+/// The degradations of a picture.
 #[derive(Debug, Clone, Copy)]
 pub struct Exposure {
     /// Brightness of ink and paper, of 255.
     pub ink: f64,
     pub paper: f64,
-    /// How much darker the right border is, as a share.
+    /// Relative darkening of the right border.
     pub falloff: f64,
-    /// How often the binomial 3 × 3 kernel is applied: each adds a variance of 0.5 px².
+    /// Number of applications of the binomial 3 × 3 kernel: each adds a variance of 0.5 px².
     pub blur: u32,
     /// Deviation of the noise.
     pub noise: f64,
@@ -53,14 +54,14 @@ impl Exposure {
     pub const ORDINARY: Self = Self { ink: 35.0, paper: 215.0, falloff: 0.25, blur: 1, noise: 2.0 };
 }
 
-/// A turn about `axis` whose half angle has this tangent: no sine, which is rounded differently on other machines.
+/// A turn about `axis` whose half angle has this tangent: no sine, which other machines round differently.
 pub fn turn(axis: [f64; 3], half_tangent: f64) -> UnitQuaternion<f64> {
     let [x, y, z] = axis.map(|value| value * half_tangent);
     UnitQuaternion::from_quaternion(Quaternion::new(1.0, x, y, z))
 }
 
-/// Where the board is: its middle at `pixel` (of the pinhole without lens) and `distance_m` along the axis, turned in the picture by
-/// `roll`, then tilted about the picture's x and y; all turns as tangents of half angles.
+/// The board's pose: its centre at `pixel` (of the pinhole without lens) and `distance_m` along the axis, turned in the
+/// picture by `roll`, then tilted about the picture's x and y; all turns as tangents of half angles.
 pub fn camera_from_board(
     board: &Board,
     camera: &PinholeCamera,
@@ -89,7 +90,7 @@ pub fn render(
     render_with(&|place| board.is_inked(place), board, camera, camera_from_board, exposure, random)
 }
 
-/// As [`render`], with something else printed: `is_inked` takes places in sides of a square.
+/// As [`render`], with another print: `is_inked` takes points in sides of a square.
 pub fn render_with(
     is_inked: &dyn Fn(&Point2<f64>) -> bool,
     board: &Board,
@@ -139,7 +140,7 @@ pub fn render_with(
     })
 }
 
-/// The mean over a pixel with these corners and their brightness; 16 × 16 places where it is not the same all over.
+/// The mean over a pixel with these corners and their brightness; 16 × 16 samples if it is not uniform.
 fn mean_over(corners: [(Point2<f64>, f64); 4], brightness: &dyn Fn(&Point2<f64>) -> f64) -> f64 {
     const SIDE: usize = 16;
     let [a, b, c, d] = corners.map(|(place, _)| place);

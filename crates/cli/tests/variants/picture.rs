@@ -266,7 +266,7 @@ pub fn spoilt(dice: &mut Pcg64Mcg, photo: &RgbImage) -> (Photo, &'static [&'stat
             (
                 "the ground alone".into(),
                 encoded(&ground.into(), ImageFormat::Png),
-                &["nothing to grasp", "another photo", "hardly differs from what surrounds it"],
+                &["nothing to grasp", "another photo", "hardly differs from its surroundings"],
             )
         }
     };

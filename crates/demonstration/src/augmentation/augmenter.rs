@@ -1,4 +1,4 @@
-//! Samples by number.
+//! Samples by index.
 
 use sdg_geometry::BoundingBox;
 
@@ -13,13 +13,14 @@ use super::sample::{Sample, SampleObject};
 use super::scene::Studio;
 use crate::{Demonstration, Error, Result};
 
-/// Width and height of a window against the part's largest diameter. With less the part fits only at some turns.
+/// Width and height of a window relative to the part's largest diameter. In smaller windows the part fits only at some
+/// turns.
 const WINDOW_OVER_PART: [f64; 2] = [1.3, 1.05];
 
-/// Makes samples from demonstrations: sample *i* of seed *s* is always the same, in whatever order samples are made.
+/// Makes samples from demonstrations: sample *i* of seed *s* is always the same, in any order of calls.
 ///
-/// Everything that does not depend on the sample is worked out by [`new`](Self::new); a sample then takes `&self`
-/// alone, so that any number of threads may ask.
+/// Everything that does not depend on the sample is computed by [`new`](Self::new); a sample then needs only
+/// `&self`, so that any number of threads may call it.
 pub struct Augmenter {
     parts: Vec<Prepared>,
     others: Vec<Prepared>,
@@ -35,7 +36,7 @@ impl Augmenter {
     /// Prepares the demonstrations.
     ///
     /// # Errors
-    /// No demonstration, settings without sense, or an annotation that does not lie on its image.
+    /// No demonstration, invalid settings, or an annotation that does not lie on its image.
     pub fn new(demonstrations: &[Demonstration], config: AugmentationConfig, seed: u64) -> Result<Self> {
         config.check()?;
         let Some(first) = demonstrations.first() else {
@@ -54,10 +55,11 @@ impl Augmenter {
         Ok(Self { parts, others: Vec::new(), config, frame, seed, noises, normal })
     }
 
-    /// The same with other parts among what lies about; they have outlines, and their annotations count for nothing else.
+    /// The same with other parts among the distractors; they have outlines, and their annotations are used for nothing
+    /// else.
     ///
     /// # Errors
-    /// An annotation that does not lie on its image, or has no outline to cut the part out by.
+    /// An annotation that does not lie on its image, or has no outline for cutting out the part.
     pub fn with_other_parts(mut self, others: &[Demonstration]) -> Result<Self> {
         let mut rng = sample_rng(self.seed, Stream::OtherParts, 0);
         for other in others {
@@ -68,9 +70,9 @@ impl Augmenter {
         Ok(self)
     }
 
-    /// Only windows of the frame, just large enough for the part at any turn and size: the same scale, tables, things
-    /// and light in a smaller picture, so that most of what a network computes is about the part. Sides are multiples
-    /// of `multiple` pixels and never exceed the frame; the paper's samples stay whole.
+    /// Only windows of the frame, just large enough for the part at any turn and size: the same scale, tables,
+    /// distractors and light in a smaller picture, so that most of a network's computation concerns the part. Sides
+    /// are multiples of `multiple` pixels and at most the frame's; the paper's samples stay whole.
     pub fn windows(&self, multiple: u32) -> Windows<'_> {
         let mut size = self.frame;
         if let AugmentationStyle::Scenes(style) = &self.config.style {
@@ -80,7 +82,8 @@ impl Augmenter {
                 let least = (share * diameter).ceil().min(f64::from(frame)) as u32;
                 (least.div_ceil(multiple) * multiple).min(frame)
             };
-            // A little wider than high, as frames are; a pixel of room on each side where the part fits tightly.
+            // Slightly wider than high, like frames; with a margin of one pixel on each side where the part fits
+            // tightly.
             let [width, height] = self.frame;
             size = [side(WINDOW_OVER_PART[0], width), side(WINDOW_OVER_PART[1], height)];
         }
@@ -92,7 +95,7 @@ impl Augmenter {
         self.draw(Stream::Training, index, self.frame)
     }
 
-    /// Sample `index` of a stream that [`sample`](Self::sample) never touches, for validation.
+    /// Sample `index` of a stream separate from that of [`sample`](Self::sample), for validation.
     pub fn held_out(&self, index: u64) -> Sample {
         self.draw(Stream::HeldOut, index, self.frame)
     }
@@ -120,7 +123,7 @@ impl Augmenter {
                     image_from_demonstration: pose,
                     ..SampleObject::new(part, &Homography::from_similarity(&pose), size, demonstration_idx)
                 };
-                // The original's boxes are hulls of the turned box, whatever the outline.
+                // The original's boxes are hulls of the turned box, independent of the outline.
                 let hull = BoundingBox::around(part.drawn_box.corners().iter().map(|corner| pose.apply(corner)));
                 let bbox = hull.map_or(object.bbox, |hull| hull.clip(f64::from(width), f64::from(height)));
                 Sample { image: draw.paint(part, width, height), objects: vec![SampleObject { bbox, ..object }] }
@@ -141,7 +144,7 @@ impl Augmenter {
     }
 }
 
-/// An [`Augmenter`]'s samples, seen through windows.
+/// An [`Augmenter`]'s samples, cropped to windows.
 pub struct Windows<'a> {
     augmenter: &'a Augmenter,
     size: [u32; 2],

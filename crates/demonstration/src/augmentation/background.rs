@@ -1,4 +1,4 @@
-//! Tables and floors to lay the part on.
+//! Tables and floors under the part.
 
 use super::homography::Homography;
 use super::noise::NoiseTile;
@@ -6,9 +6,9 @@ use super::prepared::Prepared;
 use super::random::{SampleRng, chance, direction, index_below, log_uniform, uniform};
 use crate::raster::{Raster, floor, smoothstep};
 
-/// The noises that surfaces are made of, drawn once.
+/// The noises from which surfaces are made, drawn once.
 pub(crate) struct NoiseBank {
-    /// Clouds: much coarse, little fine.
+    /// Clouds: strong coarse structure, weak fine structure.
     pub cloudy: NoiseTile,
     /// Noise with nearly the same amplitude at all scales.
     pub rough: NoiseTile,
@@ -26,7 +26,7 @@ impl NoiseBank {
     }
 }
 
-/// A place, turn and scale to read a surface at.
+/// Position, turn and scale at which a surface is read.
 struct Frame {
     turn: [f32; 2],
     shift: [f32; 2],
@@ -45,7 +45,7 @@ impl Frame {
 
 /// Paints the whole canvas with one surface, or with two that meet at an edge.
 ///
-/// Texture sizes follow the frame's width, so that textures look alike at any size and in any window of it.
+/// Texture sizes follow the frame's width, so that textures look the same at any size and in any window of it.
 pub(crate) fn paint_surfaces(canvas: &mut Raster, bank: &NoiseBank, part: &Prepared, rng: &mut SampleRng) {
     paint_surface(canvas, bank, part, rng);
     if chance(rng, 0.3) {
@@ -54,7 +54,7 @@ pub(crate) fn paint_surfaces(canvas: &mut Raster, bank: &NoiseBank, part: &Prepa
         paint_surface(&mut other, bank, part, rng);
         let normal = direction(rng);
         let (cx, cy) = (width as f32 * uniform(rng, 0.15, 0.85), height as f32 * uniform(rng, 0.15, 0.85));
-        // Half of the time a strip, the other half everything beyond an edge.
+        // In half of the cases a strip, in the other half everything beyond an edge.
         let strip = if chance(rng, 0.5) { uniform(rng, 0.05, 0.3) * width as f32 } else { f32::MAX };
         let soft = uniform(rng, 0.5, 2.0);
         for y in 0..height {
@@ -85,7 +85,7 @@ fn paint_surface(canvas: &mut Raster, bank: &NoiseBank, part: &Prepared, rng: &m
             });
         }
         2 | 3 => {
-            // Wood: rings drawn out along the plank, with a fine fibre.
+            // Wood: rings stretched along the plank, with a fine fibre.
             let (rings, fibre) = (uniform(rng, 4.0, 12.0), uniform(rng, 0.1, 0.5));
             let plank = if chance(rng, 0.5) { uniform(rng, 40.0, 120.0) } else { f32::MAX };
             fill_with(canvas, dark, light, |x, y| {
@@ -162,7 +162,7 @@ fn fill_with(canvas: &mut Raster, dark: [f32; 3], light: [f32; 3], value: impl F
     }
 }
 
-/// Two colours, mostly near grey or wood, at times those of the photo's own background.
+/// Two colours, mostly near grey or wood, sometimes those of the photo's own background.
 fn draw_colors(part: &Prepared, rng: &mut SampleRng) -> [[f32; 3]; 2] {
     let level = uniform(rng, 0.05, 0.9);
     let base = match index_below(rng, 6) {
@@ -187,7 +187,7 @@ fn draw_colors(part: &Prepared, rng: &mut SampleRng) -> [[f32; 3]; 2] {
     [base, other]
 }
 
-/// Pieces of the photo's background, each turned and scaled its own way.
+/// Pieces of the photo's background, each with its own turn and scale.
 fn paint_patches(canvas: &mut Raster, part: &Prepared, rng: &mut SampleRng) {
     let cell = canvas.width as f32 * uniform(rng, 0.15, 0.5);
     let columns = (canvas.width as f32 / cell).ceil() as usize + 1;
@@ -211,7 +211,7 @@ fn paint_patches(canvas: &mut Raster, part: &Prepared, rng: &mut SampleRng) {
     }
 }
 
-/// Paints the photo, or the photo without its part, as the map shows it; beyond its borders its background goes on.
+/// Paints the photo, or the photo without its part, under the map; beyond its borders its background continues.
 pub(crate) fn paint_photo(canvas: &mut Raster, part: &Prepared, prepared_from_image: &Homography, with_part: bool) {
     let inner = if with_part { &part.photo } else { &part.background };
     let (right, bottom) = (inner.width as f32, inner.height as f32);

@@ -6,9 +6,9 @@ use crate::{Error, Result};
 #[derive(Debug, Clone, PartialEq)]
 pub struct AugmentationConfig {
     /// Width and height of the samples in pixels; `None` for the first demonstration's own size. Demonstrations of
-    /// other sizes are fitted inside.
+    /// other sizes are scaled to fit.
     pub output_size: Option<[u32; 2]>,
-    /// Which scenes are made.
+    /// The kind of scenes.
     pub style: AugmentationStyle,
 }
 
@@ -22,18 +22,18 @@ pub enum AugmentationStyle {
     Scenes(SceneStyle),
 }
 
-/// The paper's augmentation, in this order; as the published code applies it (OpenDR, `control/single_demo_grasp`).
+/// The paper's augmentation, in this order; as in the published code (OpenDR, `control/single_demo_grasp`).
 ///
 /// # Source
 /// OpenDR, `control/single_demo_grasp`: imgaug's `Affine(rotate)`, `Multiply(per_channel=0.99)`,
-/// `Affine(translate_px)`, `Affine(scale)`, each cutting off what leaves the image and filling with black.
+/// `Affine(translate_px)`, `Affine(scale)`, each cropped to the image and filled with black.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PaperStyle {
     /// Turned by a whole number of degrees in `[-max, max]`.
     pub max_rotation_deg: i32,
     /// Colour channels are multiplied by a number between these.
     pub channel_gain: [f32; 2],
-    /// Probability that each channel has a number of its own, and not all the same one.
+    /// Probability that each channel has its own factor instead of a common one.
     pub per_channel_probability: f32,
     /// Shifted by a whole number of the photo's pixels in `[-max, max]` along each axis.
     pub max_shift_px: i32,
@@ -56,31 +56,31 @@ impl Default for PaperStyle {
 /// The composed scenes; probabilities are per sample.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SceneStyle {
-    /// Share of scenes that hold the part.
+    /// Share of scenes with the part.
     pub positive_share: f32,
     /// Share of the scenes with the part that keep the photo's own background.
     pub photo_background_share: f32,
-    /// The part's size against its size in the photo (fitted to the output), between these.
+    /// Range of the part's size relative to its size in the photo (fitted to the output).
     pub scale: [f32; 2],
-    /// Greatest foreshortening, as when the camera looks at the part from the side; 0.08 is 23 degrees.
+    /// Largest foreshortening, as for an inclined camera; 0.08 corresponds to 23 degrees.
     pub max_foreshortening: f32,
-    /// Greatest change of scale across the part by perspective.
+    /// Largest change of scale across the part by perspective.
     pub max_perspective: f32,
-    /// Least share of the part inside the image.
+    /// Minimum share of the part inside the image.
     pub min_inside: f32,
-    /// Most distractors in a scene; scenes without the part have at least one.
+    /// Maximum number of distractors in a scene; scenes without the part have at least one.
     pub max_distractors: usize,
-    /// Share of the distractors that are made from pieces of the part itself.
+    /// Share of the distractors made from pieces of the part itself.
     pub mutant_share: f32,
-    /// Share of the rest that are other parts, where the augmenter was given any.
+    /// Share of the rest that are other parts, if the augmenter was given any.
     pub other_part_share: f32,
-    /// Probability that something lies over the part.
+    /// Probability that an object covers a part of the part.
     pub occlusion_probability: f32,
-    /// Greatest share of the part that may be covered.
+    /// Largest covered share of the part.
     pub max_occluded: f32,
     /// Probability of a blurred image.
     pub blur_probability: f32,
-    /// Greatest standard deviation of sensor noise, in grey values of 255.
+    /// Largest standard deviation of sensor noise, in grey values of 255.
     pub max_noise: f32,
     /// Probability of compression artefacts.
     pub jpeg_probability: f32,
@@ -125,7 +125,7 @@ impl AugmentationConfig {
         Self { output_size: Some([width, height]), ..self }
     }
 
-    /// Refuses settings that make no sense.
+    /// Refuses invalid settings.
     pub(crate) fn check(&self) -> Result<()> {
         match &self.style {
             AugmentationStyle::Paper(paper) => {
@@ -158,7 +158,7 @@ impl AugmentationConfig {
     }
 }
 
-/// Refuses sizes that no sample can have, whether they were set or are the photo's own.
+/// Refuses impossible sizes of samples, from the settings or from the photo.
 pub(crate) fn check_output_size([width, height]: [u32; 2]) -> Result<()> {
     let side = 16..=8192;
     if side.contains(&width) && side.contains(&height) {

@@ -3,10 +3,10 @@
 use nalgebra::Point2;
 use sdg_geometry::Polygon;
 
-/// Signed distances beyond this are cut off: soft edges and shadows need no more.
+/// Signed distances are clamped to this: soft edges and shadows need no more.
 pub(crate) const BAND_PX: f32 = 24.0;
 
-/// For every pixel centre of a `width` × `height` raster the distance to the outline, positive inside, confined to
+/// For every pixel centre of a `width` × `height` raster the distance to the outline, positive inside, clamped to
 /// ±[`BAND_PX`].
 pub(crate) fn signed_distance(outline: &Polygon, width: usize, height: usize) -> Vec<f32> {
     let inside = outline.rasterize(width as u32, height as u32);
@@ -15,7 +15,7 @@ pub(crate) fn signed_distance(outline: &Polygon, width: usize, height: usize) ->
         let edge = b - a;
         let length_squared = edge.norm_squared().max(f64::MIN_POSITIVE);
         let band = f64::from(BAND_PX);
-        // Only pixels in the band around the edge can be nearer to it than the band is wide.
+        // Only pixels in the band around the edge can be closer to it than the band's width.
         let low = |p: f64, q: f64, end: usize| ((p.min(q) - band).floor().max(0.0) as usize).min(end);
         let high = |p: f64, q: f64, end: usize| ((p.max(q) + band).ceil().max(0.0) as usize).min(end);
         for y in low(a.y, b.y, height)..high(a.y, b.y, height) {

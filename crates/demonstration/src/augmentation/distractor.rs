@@ -1,4 +1,4 @@
-//! Things in the scene that are not the part, drawn from figures or from pieces of the part.
+//! Distractors, drawn from figures or from pieces of the part.
 
 use nalgebra::{Point2, Rotation2, Vector2};
 
@@ -9,16 +9,16 @@ use super::prepared::Prepared;
 use super::random::{SampleRng, chance, direction, index_below, uniform};
 use crate::raster::{PixelRect, Raster, blend, smoothstep};
 
-/// Where the light of a scene comes from and how soft its shadows are.
+/// The direction of a scene's light and the softness of its shadows.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Lamp {
     /// Towards the light, in the image plane.
     pub towards: [f32; 2],
     /// Height of the light: the third component of the unit vector towards it.
     pub elevation: f32,
-    /// How much light a shadow takes, in `[0, 1]`.
+    /// Share of the light that a shadow removes, in `[0, 1]`.
     pub shadow: f32,
-    /// Pixels that a thing's shadow is moved by, for a thing of middling height.
+    /// Displacement of a shadow in pixels, for a distractor of medium height.
     pub shadow_shift_px: f32,
     /// Half the width of a shadow's edge, in pixels.
     pub shadow_softness_px: f32,
@@ -37,14 +37,14 @@ impl Lamp {
     }
 }
 
-/// What a drawn thing looks like.
+/// The surface of a drawn distractor.
 enum Material<'a> {
     Plain {
         color: [f32; 3],
         grain: f32,
         gloss: f32,
     },
-    /// The part's own surface, spread over the figure.
+    /// The part's own surface, mapped onto the figure.
     PartSurface {
         part: &'a Prepared,
     },
@@ -57,7 +57,7 @@ pub(crate) struct Distractor<'a> {
     pub center: [f32; 2],
     /// Cosine and sine of the turn.
     turn: [f32; 2],
-    /// Pixels of the canvas to a unit of the figure.
+    /// Canvas pixels per unit of the figure.
     pub size_px: f32,
     grain_at: [f32; 2],
 }
@@ -74,7 +74,7 @@ impl<'a> Distractor<'a> {
         Self { figure, material, center, turn: direction(rng), size_px, grain_at }
     }
 
-    /// Distance in pixels from a place on the canvas to the outline, negative inside.
+    /// Distance in pixels from a point on the canvas to the outline, negative inside.
     #[inline]
     pub fn distance_px(&self, x: f32, y: f32) -> f32 {
         let (u, v) = self.local(x, y);
@@ -93,7 +93,7 @@ impl<'a> Distractor<'a> {
         PixelRect::covering([x - reach, y - reach, x + reach, y + reach], margin, canvas.width, canvas.height)
     }
 
-    /// Paints the thing and its shadow.
+    /// Paints the distractor and its shadow.
     pub fn paint(&self, canvas: &mut Raster, lamp: &Lamp, noise: &NoiseTile) {
         if lamp.shadow > 0.0 {
             let (shift, soft) = (lamp.shadow_shift_px, lamp.shadow_softness_px);
@@ -123,7 +123,7 @@ impl<'a> Distractor<'a> {
     }
 
     fn color(&self, x: f32, y: f32, distance: f32, lamp: &Lamp, noise: &NoiseTile) -> [f32; 3] {
-        // The rim falls off like a quarter circle; within it the surface is flat.
+        // The rim has the profile of a quarter circle; inside it the surface is flat.
         let rim = (self.figure.rim * self.size_px).max(0.5);
         let steepness = (1.0 + distance / rim).clamp(0.0, 0.95);
         let (mut diffuse, mut shine) = (lamp.elevation, 0.0);
@@ -171,7 +171,7 @@ fn draw_color(part: &Prepared, rng: &mut SampleRng) -> [f32; 3] {
     tint.map(|c| c * level)
 }
 
-/// Paints a mutant of the part, centred at `center`, `scale` canvas pixels to a photo pixel.
+/// Paints a mutant of the part, centred at `center`, with `scale` canvas pixels per photo pixel.
 pub(crate) fn paint_mutant(
     canvas: &mut Raster,
     part: &Prepared,
@@ -185,7 +185,7 @@ pub(crate) fn paint_mutant(
     let gain: [f32; 3] = std::array::from_fn(|_| uniform(rng, 0.85, 1.15));
     let prepared = part.prepared_from_photo as f32;
     let part_center: Point2<f32> = part.center.cast();
-    // How far inside, in canvas pixels, and the prepared pixel that shows there.
+    // Distance inside, in canvas pixels, and the prepared pixel shown there.
     let look_up = |x: f32, y: f32| {
         let (source, kept) = mutant.source(photo_from_canvas * Vector2::new(x - center[0], y - center[1]));
         let at = (part_center + source) * prepared;
@@ -214,7 +214,7 @@ pub(crate) fn paint_mutant(
     for y in rect.y1..rect.y2 {
         for x in rect.x1..rect.x2 {
             let (inside, pixel) = look_up(x as f32 + 0.5, y as f32 + 0.5);
-            // Edges lie a little inside, so that no rim of the photo's background comes along.
+            // Edges lie slightly inside, so that no rim of the photo's background is included.
             let alpha = smoothstep(0.0, 1.4, inside);
             if alpha > 0.0 {
                 let color = std::array::from_fn(|k| pixel[k] * gain[k]);

@@ -1,11 +1,11 @@
-//! Outlines of things that lie about in a factory, as signed distances.
+//! Outlines of typical factory objects, as signed distances.
 
 use super::random::{SampleRng, chance, index_below, uniform};
 
-/// A simple figure in a frame of its own, in which the whole thing has a radius of about one.
+/// A simple figure in its own frame, with a radius of about one.
 #[derive(Debug, Clone, Copy)]
 enum Primitive {
-    /// All places within `radius` of the line from `a` to `b`.
+    /// All points within `radius` of the line from `a` to `b`.
     Capsule {
         a: [f32; 2],
         b: [f32; 2],
@@ -33,7 +33,7 @@ enum Primitive {
         teeth: f32,
         depth: f32,
     },
-    /// A piece of a ring, `half_angle` to either side of the x axis.
+    /// A segment of a ring, `half_angle` to both sides of the x axis.
     Arc {
         radius: f32,
         half_angle: f32,
@@ -78,18 +78,18 @@ impl Primitive {
     }
 }
 
-/// Without `hypot`'s care for overflow, which costs most of the time here.
+/// Without `hypot`'s overflow handling, which would take most of the time here.
 #[inline(always)]
 fn length(x: f32, y: f32) -> f32 {
     (x * x + y * y).sqrt()
 }
 
-/// Some figures joined, with round holes, all in the unit frame.
+/// Several joined figures, with round holes, all in the unit frame.
 #[derive(Debug, Clone)]
 pub(crate) struct Figure {
     solids: Vec<Primitive>,
     holes: Vec<[f32; 3]>,
-    /// Width of the rounded rim: as wide as half the material for a rod, narrow for a plate.
+    /// Width of the rounded rim: half of the material's width for a rod, narrow for a plate.
     pub rim: f32,
 }
 
@@ -168,7 +168,7 @@ impl Figure {
         let arm = uniform(rng, 0.1, 0.24);
         let height = uniform(rng, 0.3, 0.7);
         let foot = Primitive::Box { center: [0.0, -height + arm], half: [0.8, arm], corner: 0.03 };
-        // Where the upright stands: at the end an L, in the middle a T.
+        // Position of the upright: at the end an L, in the middle a T.
         let stand = uniform(rng, -0.8 + arm, 0.8 - arm);
         let mut solids = vec![foot, Primitive::Box { center: [stand, 0.0], half: [arm, height], corner: 0.03 }];
         if chance(rng, 0.3) {
@@ -205,7 +205,7 @@ impl Figure {
         Self { solids: vec![arc], holes: vec![], rim: half_width * uniform(rng, 0.3, 0.98) }
     }
 
-    /// Something without a name: discs run together.
+    /// An irregular shape: merged discs.
     pub fn blob(rng: &mut SampleRng) -> Self {
         let solids = (0..3 + index_below(rng, 3))
             .map(|_| {

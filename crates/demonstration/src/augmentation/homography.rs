@@ -1,4 +1,4 @@
-//! Plane to plane: a similarity, tilted a little as when the camera looks at the part from the side.
+//! Plane to plane: a similarity with a slight tilt, as for an inclined camera.
 
 use nalgebra::{Matrix3, Point2, Vector2};
 use sdg_geometry::{BoundingBox, PlanarSimilarity};
@@ -26,8 +26,8 @@ impl Homography {
         Self(Matrix3::new(c, -s, similarity.tx, s, c, similarity.ty, 0.0, 0.0, 1.0))
     }
 
-    /// Foreshortening by `1 - squeeze` along `direction`, with lines of sight meeting: `perspective` is the relative
-    /// change of scale for a pixel along it. Leaves the origin in place.
+    /// Foreshortening by `1 - squeeze` along `direction`, with converging lines of sight: `perspective` is the
+    /// relative change of scale per pixel along it. Keeps the origin.
     pub fn tilt(direction: Vector2<f64>, squeeze: f64, perspective: f64) -> Self {
         let d = direction;
         Self(Matrix3::new(
@@ -48,7 +48,7 @@ impl Homography {
         Self(self.0 * first.0)
     }
 
-    /// The way back. Panics on a map that flattens the plane, which no caller makes.
+    /// The inverse. Panics on a map that flattens the plane, which no caller makes.
     pub fn inverse(&self) -> Self {
         Self(self.0.try_inverse().expect("an augmentation never flattens the plane"))
     }
@@ -62,7 +62,7 @@ impl Homography {
         BoundingBox::around(points.iter().map(|point| self.apply(point)))
     }
 
-    /// Positive where the map keeps left and right, negative where it makes mirror images.
+    /// Positive if the map preserves orientation, negative if it mirrors.
     #[cfg(test)]
     pub fn handedness(&self, at: &Point2<f64>) -> f64 {
         let step = 1e-3;
@@ -89,7 +89,7 @@ pub(crate) struct RowMap {
 }
 
 impl RowMap {
-    /// Where the centre of the pixel in column `x` comes from.
+    /// The source position of the centre of the pixel in column `x`.
     #[inline(always)]
     pub fn at(&self, x: usize) -> (f32, f32) {
         let x = x as f32;

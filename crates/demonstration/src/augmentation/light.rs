@@ -1,15 +1,15 @@
-//! The picture under another light and another camera's colours.
+//! Changes the light of a picture and the camera's colours.
 
 use super::random::{SampleRng, chance, direction, uniform};
 use crate::raster::{Raster, smoothstep};
 
 /// Steps of a tone curve; fine enough that a step is below half a grey value.
 const CURVE_STEPS: usize = 1024;
-/// Brightest value that a curve tells apart.
+/// Brightest value that a curve distinguishes.
 const CURVE_TOP: f32 = 2.0;
 
-/// Multiplies a lighting gradient over the canvas, at times with the edge of a large shadow, then maps every channel
-/// through a tone curve of gain, gamma, contrast and cast.
+/// Multiplies a lighting gradient over the canvas, sometimes with the edge of a large shadow, then maps every
+/// channel through a tone curve of gain, gamma, contrast and cast.
 pub(crate) fn relight(canvas: &mut Raster, rng: &mut SampleRng) {
     let (width, height) = (canvas.width as f32, canvas.height as f32);
     let slope = direction(rng);
@@ -44,7 +44,7 @@ fn draw_curves(rng: &mut SampleRng) -> [[f32; CURVE_STEPS]; 3] {
     let gain = uniform(rng, -0.55, 0.35).exp();
     let gamma = uniform(rng, -0.3, 0.3).exp();
     let contrast = uniform(rng, 0.75, 1.25);
-    // Bright lamps and dark corners: at times a lifted black.
+    // Bright lamps and dark corners; sometimes a raised black level.
     let lift = uniform(rng, -0.03, 0.08);
     std::array::from_fn(|_| {
         let cast = uniform(rng, -0.12, 0.12).exp();
@@ -56,7 +56,7 @@ fn draw_curves(rng: &mut SampleRng) -> [[f32; CURVE_STEPS]; 3] {
     })
 }
 
-/// Lets highlights run out softly, as cameras do: a part that is cut off at white has no surface left to learn.
+/// Compresses highlights softly, as cameras do: a part clipped to white has no surface left to learn.
 fn shoulder(value: f32) -> f32 {
     const BEND: f32 = 0.82;
     if value <= BEND {

@@ -8,8 +8,8 @@
 //!                                            Sample ── sensor ── lens ── light ───────────┘
 //! ```
 //!
-//! Two frames: *photo* pixels, in which annotations and truths are kept, and *prepared* pixels of the reduced photo.
-//! The canvas is the output itself, so a warp is read once and its truth is exact.
+//! Two frames: *photo* pixels, in which annotations and truths are stored, and *prepared* pixels of the reduced
+//! photo. The canvas is the output itself, so that a warp is sampled once and its truth is exact.
 
 mod augmenter;
 mod background;

@@ -5,39 +5,39 @@ use sdg_geometry::Polygon;
 
 use super::random::{SampleRng, chance, index_below, log_uniform, uniform};
 
-/// Silhouettes that overlap more than this, turned and scaled at best, count as the part itself.
+/// Silhouettes whose best overlap at any turn and size exceeds this count as the part itself.
 const TOO_ALIKE_IOU: f64 = 0.8;
-/// Mutants kept for a demonstration.
+/// Maximum number of mutants per demonstration.
 const BANK_SIZE: usize = 24;
 
-/// A place-to-place map from a mutant to the part, both relative to the part's centre, in photo pixels.
+/// A map of positions from a mutant to the part, both relative to the part's centre, in photo pixels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Mutant {
     kind: Kind,
-    /// The direction along which it is changed.
+    /// The direction of the change.
     axis: Vector2<f32>,
-    /// Distance from the centre within which all of it lies, in photo pixels.
+    /// Radius around the centre that contains all of it, in photo pixels.
     pub radius: f32,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Kind {
-    /// Only what lies beyond `offset` along the axis.
+    /// Only the part beyond `offset` along the axis.
     Piece { offset: f32 },
     /// Longer or shorter along the axis.
     Stretched { factor: f32 },
     /// One half and its mirror image.
     Doubled { offset: f32 },
-    /// Moved across the axis by `bend` · (place along it)².
+    /// Moved across the axis by `bend` · (position along it)².
     Bent { bend: f32 },
     /// Left and right exchanged.
     Mirrored,
-    /// Unchanged: of use for another part alone.
+    /// Unchanged: useful only for another part.
     Whole,
 }
 
 impl Mutant {
-    /// Where the mutant's place `p` takes its colour from, and how far it is cut away there (positive: kept).
+    /// The source of the colour at the mutant's point `p`, and the distance from the cut there (positive: kept).
     #[inline(always)]
     pub fn source(&self, p: Vector2<f32>) -> (Vector2<f32>, f32) {
         const UNCUT: f32 = 1e6;
@@ -54,12 +54,13 @@ impl Mutant {
         }
     }
 
-    /// A part as it is, all of which lies within `radius` of its centre.
+    /// An unchanged part, all of which lies within `radius` of its centre.
     pub fn whole(radius: f32) -> Self {
         Self { kind: Kind::Whole, axis: Vector2::new(1.0, 0.0), radius }
     }
 
-    /// Mutants of a part that do not look like it, however turned; a symmetric part's mirror image does, and is left out.
+    /// Mutants of a part that do not look like it at any turn; the mirror image of a symmetric part does, and is left
+    /// out.
     pub fn bank(region: &Polygon, center: Point2<f64>, area_points: &[Point2<f64>], rng: &mut SampleRng) -> Vec<Self> {
         let around: Vec<Vector2<f32>> = area_points.iter().map(|p| (p - center).cast()).collect();
         let radius = region.vertices.iter().map(|v| (v - center).norm()).fold(1.0, f64::max) as f32;
@@ -102,7 +103,7 @@ impl Mutant {
     }
 }
 
-/// The direction along which the points spread most.
+/// The direction of the points' largest spread.
 fn principal_axis(points: &[Vector2<f32>]) -> Vector2<f32> {
     let (xx, xy, yy) =
         points.iter().fold((0.0, 0.0, 0.0), |(xx, xy, yy), p| (xx + p.x * p.x, xy + p.x * p.y, yy + p.y * p.y));
@@ -136,8 +137,8 @@ impl Silhouette {
         (0..GRID).contains(&x) && (0..GRID).contains(&y) && self.inside[(y * GRID + x) as usize]
     }
 
-    /// The greatest overlap of the mutant's silhouette with the part's over all turns, centres and areas made equal
-    /// as far as a camera's change of height could.
+    /// The largest overlap of the mutant's silhouette with the part's over all turns, with equal centres, and areas
+    /// equalised as far as a camera's change of height could.
     fn max_iou(&self, mutant: &Mutant) -> f64 {
         let step = mutant.radius / 30.0;
         let mut places = Vec::new();

@@ -1,4 +1,4 @@
-//! Tiles of noise, drawn once and read at any place, turn and scale.
+//! Tiles of noise, drawn once and read at any position, turn and scale.
 
 use rand::Rng;
 
@@ -10,13 +10,13 @@ const SIDE: usize = 256;
 
 /// Noise in `[0, 1]` that repeats every 256 pixels without a seam.
 pub(crate) struct NoiseTile {
-    /// An array, whose length the compiler knows: a masked place needs no check.
+    /// An array, whose length the compiler knows: a masked index needs no check.
     values: Box<[f32; SIDE * SIDE]>,
 }
 
 impl NoiseTile {
-    /// Sums octaves of smooth noise: the first has `coarsest` cells a side, each next one twice as many and `fall`
-    /// times the strength.
+    /// Sums octaves of smooth noise: the first has `coarsest` cells per side, each next one twice as many and
+    /// `fall` times the strength.
     pub fn fractal(rng: &mut SampleRng, coarsest: usize, octaves: u32, fall: f32) -> Self {
         let mut values = vec![0.0; SIDE * SIDE].into_boxed_slice();
         let mut strength = 1.0;
@@ -47,7 +47,7 @@ impl NoiseTile {
     pub fn at(&self, x: f32, y: f32) -> f32 {
         let (column, row) = (floor(x), floor(y));
         let (fx, fy) = (x - column as f32, y - row as f32);
-        // Negative places wrap as well.
+        // Negative positions also wrap.
         let (u, v) = (column as usize & (SIDE - 1), row as usize & (SIDE - 1));
         let (right, below) = ((u + 1) & (SIDE - 1), (v + 1) & (SIDE - 1));
         let top = self.values[v * SIDE + u] + (self.values[v * SIDE + right] - self.values[v * SIDE + u]) * fx;
@@ -61,7 +61,7 @@ fn ease(t: f32) -> f32 {
     t * t * (3.0 - 2.0 * t)
 }
 
-/// Normally distributed numbers, drawn once and read in runs from random places.
+/// Normally distributed numbers, drawn once and read in runs from random positions.
 pub(crate) struct NormalTable {
     values: Vec<f32>,
 }
@@ -70,12 +70,12 @@ impl NormalTable {
     const LENGTH: usize = 1 << 16;
 
     pub fn new(rng: &mut SampleRng) -> Self {
-        // Twelve uniform numbers less six have variance one and tails that reach far enough for a sensor.
+        // Twelve uniform numbers minus six have variance one and tails long enough for a sensor.
         let values = (0..Self::LENGTH).map(|_| (0..12).map(|_| rng.random::<f32>()).sum::<f32>() - 6.0).collect();
         Self { values }
     }
 
-    /// `length` numbers from the place that `address` picks.
+    /// `length` numbers from the position given by `address`.
     pub fn run(&self, address: u64, length: usize) -> &[f32] {
         let start = (address % (Self::LENGTH - length) as u64) as usize;
         &self.values[start..start + length]
@@ -91,7 +91,7 @@ mod tests {
     fn a_tile_repeats_without_a_seam() {
         let tile = NoiseTile::fractal(&mut sample_rng(3, Stream::Preparation, 0), 4, 3, 0.5);
         assert_eq!(tile.at(10.25, 20.5), tile.at(10.25 - 256.0, 20.5 + 512.0));
-        // The steepest the sum can be: each octave by 1.5 / cell.
+        // The largest slope of the sum: 1.5 / cell for each octave.
         assert!((tile.at(255.99, 7.0) - tile.at(0.01, 7.0)).abs() < 0.02);
         let mean = tile.values.iter().sum::<f32>() / tile.values.len() as f32;
         assert!((0.35..0.65).contains(&mean), "{mean}");

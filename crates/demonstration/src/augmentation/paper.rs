@@ -1,4 +1,4 @@
-//! The paper's augmentation: the photo turned, tinted, shifted and scaled, black where nothing is known.
+//! The paper's augmentation: the photo turned, tinted, shifted and scaled, black outside the photo.
 
 use image::RgbImage;
 use nalgebra::{Point2, Vector2};
@@ -44,18 +44,18 @@ impl PaperDraw {
         [rotated, shifted, scaling.compose(&shifted)]
     }
 
-    /// Output from photo: the three stages, then fitted into the output and centred there.
+    /// Output from photo: the three stages, then scaled to fit the output and centred.
     pub fn image_from_photo(&self, part: &Prepared, width: u32, height: u32) -> PlanarSimilarity {
         fitted(part, width, height).compose(&self.stages(part.photo_size)[2])
     }
 
-    /// Paints the sample. What an earlier stage has cut off stays black, even if a later one moves its place inside.
+    /// Paints the sample. Areas cropped by an earlier stage stay black, even if a later one moves them inside.
     pub fn paint(&self, part: &Prepared, width: u32, height: u32) -> RgbImage {
         let stages = self.stages(part.photo_size);
         let photo_from_image = fitted(part, width, height).compose(&stages[2]).inverse();
         let prepared_from_photo = PlanarSimilarity { scale: part.prepared_from_photo, ..PlanarSimilarity::IDENTITY };
         let prepared_from_image = RowMap::new(&prepared_from_photo.compose(&photo_from_image));
-        // Where the pixel stood in the photo and after each stage; outside the frame it was cut off.
+        // The position of the pixel in the photo and after each stage; outside the frame it was cropped.
         let frames = stages.map(|stage| RowMap::new(&stage.compose(&photo_from_image)));
         let frames = [[RowMap::new(&photo_from_image)].as_slice(), &frames].concat();
         let gains = Gains::new(self.channel_gain);
@@ -70,7 +70,7 @@ impl PaperDraw {
     }
 }
 
-/// Output from photo where the photo is fitted into the output and centred.
+/// Output from photo when the photo is scaled to fit the output and centred.
 fn fitted(part: &Prepared, width: u32, height: u32) -> PlanarSimilarity {
     PlanarSimilarity {
         scale: part.nominal_scale,
@@ -89,7 +89,7 @@ mod tests {
     use super::*;
     use crate::{Annotation, Demonstration};
 
-    /// A part on a photo of smooth colours, which tell where a pixel comes from.
+    /// A part on a photo of smooth colours, which identify the source of a pixel.
     fn prepared(output: [u32; 2]) -> Prepared {
         let image = RgbImage::from_fn(200, 150, |x, y| Rgb([(x + 40) as u8, (y + 90) as u8, (x / 2 + y) as u8]));
         let bbox = BoundingBox { x1: 60.0, y1: 50.0, x2: 140.0, y2: 100.0 };

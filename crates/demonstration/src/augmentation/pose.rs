@@ -1,4 +1,4 @@
-//! Where the part lies in a sample.
+//! The pose of the part in a sample.
 
 use nalgebra::{Point2, Vector2};
 use sdg_geometry::{Angle, BoundingBox, PlanarSimilarity};
@@ -8,9 +8,9 @@ use super::homography::Homography;
 use super::prepared::Prepared;
 use super::random::{SampleRng, chance, direction, log_uniform, uniform};
 
-/// Share of the poses in which the part may reach over the border.
+/// Share of the poses in which the part may extend beyond the border.
 const OVERHANG_SHARE: f32 = 0.15;
-/// Tries before the part is left where the photo has it.
+/// Number of attempts before the part keeps its pose in the photo.
 const TRIES: usize = 40;
 
 /// Draws a pose with at least `style.min_inside` of the part inside an image of `width` × `height`.
@@ -35,13 +35,13 @@ pub(crate) fn draw_pose(
             return pose;
         }
     }
-    // A part that fills the photo fits no other way.
+    // A part that fills the photo fits only in this way.
     let shift_x = 0.5 * (width - part.photo_size[0] * part.nominal_scale);
     let shift_y = 0.5 * (height - part.photo_size[1] * part.nominal_scale);
     Homography::translation(shift_x, shift_y).compose(&Homography::scaling(part.nominal_scale))
 }
 
-/// Turn, scale and tilt about the part's centre, which goes to the origin.
+/// Turn, scale and tilt about the part's centre, which is mapped to the origin.
 fn draw_centered(part: &Prepared, style: &SceneStyle, diagonal: f64, rng: &mut SampleRng) -> Homography {
     let angle = Angle::from_radians(f64::from(uniform(rng, -std::f32::consts::PI, std::f32::consts::PI)));
     let scale = part.nominal_scale * f64::from(log_uniform(rng, style.scale[0], style.scale[1]));
@@ -49,12 +49,12 @@ fn draw_centered(part: &Prepared, style: &SceneStyle, diagonal: f64, rng: &mut S
     let towards = direction(rng).map(f64::from);
     let squeeze = f64::from(uniform(rng, 0.0, style.max_foreshortening));
     let across_part = f64::from(uniform(rng, 0.0, style.max_perspective));
-    // Far from the part, lines of sight must not meet inside the image.
+    // Far from the part, lines of sight must not converge inside the image.
     let perspective = (0.5 * across_part / (part.radius * scale)).min(0.4 / diagonal);
     Homography::tilt(Vector2::new(towards[0], towards[1]), squeeze, perspective).compose(&turned)
 }
 
-/// The shifts that keep `[low, high]` inside `[0, length]`, or nearly so; `None` where there are none.
+/// The shifts that keep `[low, high]` inside `[0, length]`, or nearly so; `None` if there are none.
 fn room(low: f64, high: f64, length: f64, overhang: bool) -> Option<[f64; 2]> {
     let allowed = if overhang { 0.4 * (high - low) } else { -1.0 };
     let range = [-low - allowed, length - high + allowed];

@@ -1,4 +1,4 @@
-//! What is computed once for each demonstration, so that a sample takes only warps and painting.
+//! Data computed once per demonstration, so that a sample needs only warps and painting.
 
 use image::imageops::{self, FilterType};
 use nalgebra::Point2;
@@ -13,21 +13,21 @@ use crate::erase::fill;
 use crate::raster::Raster;
 use crate::{Demonstration, NUM_KEYPOINTS};
 
-/// The photo is kept at this many times the resolution it is usually shown at: sharp when shown larger, and not much
-/// to be averaged when shown smaller.
+/// The photo is stored at this many times its usual display resolution: sharp when enlarged, with little averaging
+/// when reduced.
 const OVERSAMPLING: f64 = 1.25;
 
 /// Rasters are in *prepared* pixels, points in pixels of the demonstration's photo.
 pub(crate) struct Prepared {
     /// Prepared pixels from photo pixels.
     pub prepared_from_photo: f64,
-    /// Output pixels from photo pixels where the photo is fitted into the output.
+    /// Output pixels from photo pixels when the photo is scaled to fit the output.
     pub nominal_scale: f64,
     /// Width and height of the photo.
     pub photo_size: [f64; 2],
     /// The photo; the fourth float is the signed distance to the part's outline, in prepared pixels, positive inside.
     pub photo: Raster,
-    /// The photo once more, for warps of all of it in 8 bits.
+    /// The photo again, for warps of the whole photo in 8 bits.
     pub lanes: LanePicture,
     /// The photo without the part.
     pub background: Raster,
@@ -42,11 +42,11 @@ pub(crate) struct Prepared {
     pub radius: f64,
     /// Points spread evenly over the region.
     pub area_points: Vec<Point2<f64>>,
-    /// The keypoints on the grasp line; empty where no grasp is marked.
+    /// The keypoints on the grasp line; empty if no grasp is marked.
     pub keypoints: Vec<Keypoint>,
     /// Colours of the part.
     pub colors: Vec<[f32; 3]>,
-    /// Ways to make something of the part's pieces that is not the part.
+    /// Ways to make distractors from the part's pieces.
     pub mutants: Vec<Mutant>,
 }
 
@@ -65,7 +65,7 @@ impl Prepared {
         let wanted = (nominal_scale * OVERSAMPLING).min(1.0);
         let reduced = (wanted < 1.0).then(|| {
             let side = |length: f64| ((length * wanted).round() as u32).max(1);
-            // Triangle widens with the reduction, so that fine structure is averaged and not skipped.
+            // The triangle filter widens with the reduction, so that fine structure is averaged and not skipped.
             imageops::resize(image, side(photo_size[0]), side(photo_size[1]), FilterType::Triangle)
         });
         let kept = reduced.as_ref().unwrap_or(image);
@@ -86,7 +86,7 @@ impl Prepared {
         );
         let radius = region.vertices.iter().map(|v| (v - center).norm()).fold(1.0, f64::max);
 
-        // Outlines are drawn a little inside as often as outside, and the part throws a shadow.
+        // Outlines are drawn inside as often as outside, and the part casts a shadow.
         let margin = (0.06 * radius * prepared_from_photo).clamp(2.0, 12.0) as f32;
         let hole: Vec<bool> = distance.iter().map(|&d| d > -margin).collect();
         let background = fill(&photo, &hole);
@@ -124,7 +124,7 @@ impl Prepared {
     }
 }
 
-/// About 200 points evenly spread over the inside of a polygon.
+/// About 200 points distributed evenly over the inside of a polygon.
 fn spread(region: &Polygon) -> Vec<Point2<f64>> {
     const WANTED: f64 = 200.0;
     let bounds = region.bounds();
@@ -143,7 +143,7 @@ fn spread(region: &Polygon) -> Vec<Point2<f64>> {
             }
             y += step;
         }
-        // A sliver may slip through the grid.
+        // A narrow polygon may contain no grid point.
         if points.len() >= 20 {
             return points;
         }

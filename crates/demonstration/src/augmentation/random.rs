@@ -1,4 +1,4 @@
-//! Random numbers by index: every sample has its own generator, made from (seed, stream, index).
+//! Random numbers by index: every sample has its own generator, derived from (seed, stream, index).
 
 use rand::Rng;
 use rand_pcg::Pcg64Mcg;
@@ -9,30 +9,30 @@ pub(crate) use crate::random::scramble;
 /// The generator of one sample.
 pub(crate) type SampleRng = Pcg64Mcg;
 
-/// Streams of one seed never meet.
+/// Separate streams of one seed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Stream {
-    /// What a model is taught with.
+    /// Training samples.
     Training = 1,
     /// Samples for validation.
     HeldOut = 2,
-    /// What is drawn once, when the augmenter is made.
+    /// Values drawn once, when the augmenter is made.
     Preparation = 3,
-    /// What is drawn once for other parts.
+    /// Values drawn once for other parts.
     OtherParts = 4,
 }
 
-/// The generator of sample `index`, the same in whatever order samples are made.
+/// The generator of sample `index`, the same in any order of calls.
 pub(crate) fn sample_rng(seed: u64, stream: Stream, index: u64) -> SampleRng {
     generator_at(seed, stream as u64, index)
 }
 
-/// Uniform in `[low, high)`, or `low` where the two agree.
+/// Uniform in `[low, high)`, or `low` if the two are equal.
 pub(crate) fn uniform(rng: &mut SampleRng, low: f32, high: f32) -> f32 {
     low + (high - low) * rng.random::<f32>()
 }
 
-/// A factor between `low` and `high` that is as often above as below their geometric mean.
+/// A factor between `low` and `high`, as often above as below their geometric mean.
 pub(crate) fn log_uniform(rng: &mut SampleRng, low: f32, high: f32) -> f32 {
     uniform(rng, low.ln(), high.ln()).exp()
 }

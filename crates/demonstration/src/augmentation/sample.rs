@@ -8,7 +8,7 @@ use super::homography::Homography;
 use super::prepared::Prepared;
 use crate::Annotation;
 
-/// A picture to learn from, and what is on it.
+/// A training picture with its truth.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sample {
     /// The picture.
@@ -20,16 +20,16 @@ pub struct Sample {
 /// One part on a [`Sample`], in pixels of the sample.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SampleObject {
-    /// The box, cut off at the image's border: tight around the outline, or, without one, around the turned box.
+    /// The box, clipped at the image's border: tight around the outline or, without one, around the turned box.
     pub bbox: BoundingBox,
-    /// The [`NUM_KEYPOINTS`](crate::NUM_KEYPOINTS) keypoints of the grasp line, start to end; unlabelled where they
-    /// are outside the image, occluded where something covers them. Empty where no grasp is marked.
+    /// The [`NUM_KEYPOINTS`](crate::NUM_KEYPOINTS) keypoints of the grasp line, start to end; unlabelled outside
+    /// the image, occluded where something covers them. Empty if no grasp is marked.
     pub keypoints: Vec<Keypoint>,
-    /// The outline, not cut off; `None` where none was drawn.
+    /// The outline, not clipped; `None` if none was drawn.
     pub outline: Option<Polygon>,
-    /// Where the demonstration lies in the sample: the similarity nearest to the warp, which also tilts a little.
+    /// The pose of the demonstration in the sample: the similarity nearest to the warp, which is also slightly tilted.
     pub image_from_demonstration: PlanarSimilarity,
-    /// Index of the demonstration that it shows.
+    /// Index of its demonstration.
     pub demonstration_idx: usize,
 }
 
@@ -38,7 +38,7 @@ impl SampleObject {
         let [width, height] = size.map(f64::from);
         let warped = Polygon { vertices: part.region.vertices.iter().map(|vertex| pose.apply(vertex)).collect() };
         let seen = warped.clip(width, height);
-        // The clipped polygon's box, since the box's own clip would keep what only hidden vertices reach.
+        // The clipped polygon's box, because the clipped box would include areas of hidden vertices.
         let bbox = if seen.vertices.is_empty() { warped.bounds().clip(width, height) } else { seen.bounds() };
         let image = BoundingBox { x1: 0.0, y1: 0.0, x2: width, y2: height };
         let keypoints = part
@@ -65,7 +65,7 @@ impl SampleObject {
 
     /// The object as an annotation of the sample, for writing it down.
     ///
-    /// The outline is cut off at the border, as the box is; a grasp line that leaves the image is left out.
+    /// The outline is clipped at the border, like the box; a grasp line that leaves the image is left out.
     pub fn annotation(&self, label: &str, sample: &RgbImage) -> Annotation {
         let (width, height) = (f64::from(sample.width()), f64::from(sample.height()));
         let ends = [self.keypoints.first(), self.keypoints.last()];

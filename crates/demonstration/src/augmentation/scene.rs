@@ -1,4 +1,4 @@
-//! One composed scene: table, distractors, the part, what covers it, light, lens, sensor.
+//! One composed scene: table, distractors, the part, covering objects, light, lens, sensor.
 
 use image::RgbImage;
 use nalgebra::{Matrix3, Point2};
@@ -19,10 +19,10 @@ use super::sample::{Sample, SampleObject};
 use super::sensor::{blur, expose};
 use crate::raster::{PixelRect, Raster, blend, smoothstep};
 
-/// Size of other parts over that of the part: what is much larger or smaller is refused by its size.
+/// Size range of other parts relative to the part: much larger or smaller ones are refused by their size.
 const OTHER_PART_SIZE: [f32; 2] = [0.6, 1.5];
 
-/// What every scene is made with.
+/// The common data of all scenes.
 pub(crate) struct Studio<'a> {
     pub parts: &'a [Prepared],
     /// Other parts, which lie beside the part or in its place.
@@ -30,9 +30,9 @@ pub(crate) struct Studio<'a> {
     pub style: &'a SceneStyle,
     pub noises: &'a NoiseBank,
     pub normal: &'a NormalTable,
-    /// Width and height of what is painted.
+    /// Width and height of the painted picture.
     pub size: [u32; 2],
-    /// Width and height of the frame that it is a window of.
+    /// Width and height of the frame of which it is a window.
     pub frame: [u32; 2],
 }
 
@@ -48,7 +48,7 @@ impl Studio<'_> {
         let lamp = Lamp::draw(rng, self.frame[0] as f32 / 320.0);
         let pose = draw_pose(part, self.style, f64::from(width), f64::from(height), rng);
 
-        // Without an outline there is no cut-out to lay on another table.
+        // Without an outline there is no cut-out for another table.
         let own_table = !part.has_outline || chance(rng, self.style.photo_background_share);
         if own_table {
             paint_photo(&mut canvas, part, &part.prepared_from_image(&pose), positive);
@@ -84,7 +84,7 @@ impl Studio<'_> {
         let least = if positive { 0 } else { 1 };
         let most =
             if positive && own_table { self.style.max_distractors.div_ceil(2) } else { self.style.max_distractors };
-        // As many on a length as in the whole frame: in a window, fewer, but still some beside the part.
+        // The same number per length as in the whole frame: fewer in a window, but still some beside the part.
         let share = f64::from(self.size[0] * self.size[1]) / f64::from(self.frame[0] * self.frame[1]);
         let most = ((most as f64 * share.sqrt()).ceil() as usize).max(least);
         let count = least + index_below(rng, most + 1 - least);
@@ -110,7 +110,7 @@ impl Studio<'_> {
         }
     }
 
-    /// Lays the cut-out on the canvas, on its own table without a shadow of its own: the photo has one.
+    /// Paints the cut-out on the canvas; on its own table without an additional shadow, because the photo has one.
     fn paint_part(
         &self,
         canvas: &mut Raster,
@@ -123,7 +123,7 @@ impl Studio<'_> {
         let Some(bounds) = pose.bounds(&part.region.vertices) else { return };
         let bounds = [bounds.x1, bounds.y1, bounds.x2, bounds.y2].map(|v| v as f32);
         let prepared_from_image = part.prepared_from_image(pose);
-        // Distances in the raster are prepared pixels; edges and shadows are meant in canvas pixels.
+        // Distances in the raster are in prepared pixels; edges and shadows are defined in canvas pixels.
         let canvas_from_prepared = (scale_at(pose, &part.center) / part.prepared_from_photo) as f32;
         if !own_table && lamp.shadow > 0.0 {
             let (shift, soft) = (lamp.shadow_shift_px, lamp.shadow_softness_px);
@@ -143,7 +143,7 @@ impl Studio<'_> {
                 }
             }
         }
-        // The same light as the photo's where the photo is around it, a little of its own elsewhere.
+        // The photo's light if the photo is around it, otherwise a slightly different one.
         let gain: [f32; 3] = if own_table { [1.0; 3] } else { std::array::from_fn(|_| uniform(rng, 0.9, 1.1)) };
         let level = if own_table { 1.0 } else { uniform(rng, 0.75, 1.15) };
         let (edge, feather) = (uniform(rng, -0.3, 1.2), uniform(rng, 0.5, 1.6));
@@ -162,7 +162,7 @@ impl Studio<'_> {
         }
     }
 
-    /// Lays something over the part that hides no more of it than the style allows.
+    /// Lays an object over the part that hides at most as much of it as the style allows.
     fn cover(
         &self,
         canvas: &mut Raster,
@@ -208,7 +208,7 @@ impl Studio<'_> {
     }
 }
 
-/// Lengths on the canvas to lengths on the photo, around a place.
+/// Ratio of lengths on the photo to lengths on the canvas, around a point.
 fn scale_at(pose: &Homography, place: &Point2<f64>) -> f64 {
     let here = pose.apply(place);
     let right = pose.apply(&Point2::new(place.x + 1.0, place.y)) - here;

@@ -11,7 +11,7 @@ use super::noise::NormalTable;
 use super::random::{SampleRng, chance, direction, scramble, uniform};
 use crate::raster::Raster;
 
-/// Blurs at times: out of focus or moved.
+/// Blurs sometimes: defocus or motion.
 pub(crate) fn blur(canvas: &mut Raster, style: &SceneStyle, rng: &mut SampleRng) {
     if !chance(rng, style.blur_probability) {
         return;
@@ -26,7 +26,7 @@ pub(crate) fn blur(canvas: &mut Raster, style: &SceneStyle, rng: &mut SampleRng)
     }
 }
 
-/// A normal blur, one axis after the other.
+/// A Gaussian blur, one axis after the other.
 fn gaussian(canvas: &mut Raster, sigma: f32) {
     let radius = ((2.5 * sigma).ceil() as usize).max(1);
     let weights: Vec<f32> = (0..=radius).map(|d| (-0.5 * (d as f32 / sigma).powi(2)).exp()).collect();
@@ -88,7 +88,7 @@ fn motion(canvas: &mut Raster, dx: f32, dy: f32) {
         for &(ox, oy) in &offsets {
             let v = (y as isize + oy).clamp(0, height - 1);
             let row = &source[(v * width) as usize..((v + 1) * width) as usize];
-            // Columns that see the row's beginning, its inside, and its end.
+            // Columns at the row's beginning, in its interior, and at its end.
             let left = (-ox).clamp(0, width);
             let right = (width - ox).clamp(left, width);
             let (beginning, rest) = out.split_at_mut(left as usize);
@@ -111,12 +111,12 @@ fn add(sum: &mut [f32; 4], pixel: &[f32; 4]) {
     }
 }
 
-/// Rounds to 8 bits, with noise that grows with brightness, and at times compresses as a camera would.
+/// Rounds to 8 bits, with noise that grows with brightness, and sometimes compresses like a camera.
 pub(crate) fn expose(canvas: &Raster, normal: &NormalTable, style: &SceneStyle, rng: &mut SampleRng) -> RgbImage {
     let sigma = uniform(rng, 0.0, style.max_noise) * uniform(rng, 0.2, 1.0);
     let address: u64 = rng.random();
     let mut bytes = vec![0u8; canvas.width * canvas.height * 3];
-    // Runs of the table start at random places and overlap from row to row, which no eye or network sees.
+    // Runs of the table start at random positions and overlap from row to row, which is not visible.
     for (y, (row, out)) in
         canvas.pixels.chunks_exact(canvas.width).zip(bytes.chunks_exact_mut(3 * canvas.width)).enumerate()
     {
@@ -137,7 +137,7 @@ pub(crate) fn expose(canvas: &Raster, normal: &NormalTable, style: &SceneStyle, 
     compressed(&image, quality).unwrap_or(image)
 }
 
-/// The picture after a round through a JPEG file; `None` where the codec refuses its size.
+/// The picture after JPEG encoding and decoding; `None` if the codec refuses its size.
 fn compressed(image: &RgbImage, quality: u8) -> Option<RgbImage> {
     let mut bytes = Cursor::new(Vec::new());
     image.write_with_encoder(JpegEncoder::new_with_quality(&mut bytes, quality)).ok()?;
@@ -172,7 +172,7 @@ mod tests {
         let mut raster = dot(41, 31);
         gaussian(&mut raster, 2.0);
         let [sum, xx, yy] = moments(&raster);
-        // The tails beyond 2.5 sigma are cut off, which takes some of the variance.
+        // The tails beyond 2.5 sigma are cut off, which reduces the variance slightly.
         assert!((sum - 1.0).abs() < 1e-4 && (3.4..4.0).contains(&xx) && (xx - yy).abs() < 1e-3, "{sum} {xx} {yy}");
     }
 

@@ -11,7 +11,7 @@ use super::random::{Stream, sample_rng};
 use super::*;
 use crate::{Annotation, Demonstration, NUM_KEYPOINTS};
 
-/// Distance within which a drawn dot must land at its keypoint: half a pixel, blur and noise included.
+/// Tolerance between a drawn dot and its keypoint: half a pixel, blur and noise included.
 const DOT_TOLERANCE_PX: f64 = 0.5;
 
 /// A red L with white dots at both ends of its grasp line, on a dark grey table.
@@ -71,7 +71,7 @@ fn a_sample_is_the_same_in_any_order_and_by_any_augmenter() {
     assert!(other_seed.sample(4).image != forward[4].image);
 }
 
-/// Mean place of the pixels around `near` that are as white as the dot's middle, in the sense of all channels alike.
+/// Mean position of the pixels around `near` that are as white as the dot's centre, which means equal channels.
 fn dot_center(image: &RgbImage, near: Point2<f64>) -> Option<Point2<f64>> {
     const REACH: i64 = 5;
     let mut sum = [0.0; 3];
@@ -81,7 +81,7 @@ fn dot_center(image: &RgbImage, near: Point2<f64>) -> Option<Point2<f64>> {
             if x < 0 || y < 0 || x >= i64::from(image.width()) || y >= i64::from(image.height()) {
                 return None;
             }
-            // The part is red: green tells the dot from it, however lit.
+            // The part is red: green distinguishes the dot from it under any light.
             let green = f64::from(image.get_pixel(x as u32, y as u32)[1]);
             let center = image.get_pixel(near.x as u32, near.y as u32)[1];
             let weight = (green - 0.5 * f64::from(center)).max(0.0);
@@ -131,14 +131,14 @@ fn red_box(image: &RgbImage) -> Option<BoundingBox> {
 #[test]
 fn boxes_are_tight_around_the_part() {
     let mut checked = 0;
-    // On its own table only: elsewhere other things may be red.
+    // Only on its own table: elsewhere other objects may be red.
     let augmenter = augmenter(SceneStyle { photo_background_share: 1.0, ..plain() });
     for index in 0..40 {
         let sample = augmenter.sample(index);
         let Some(red) = red_box(&sample.image) else { continue };
         let bbox = sample.objects[0].bbox;
         let gap = [red.x1 - bbox.x1, red.y1 - bbox.y1, bbox.x2 - red.x2, bbox.y2 - red.y2];
-        // A distractor with the part's colour makes the red box larger; such samples say nothing.
+        // A distractor with the part's colour enlarges the red box; such samples are skipped.
         if gap.iter().all(|&g| g > -1.5) {
             assert!(gap.iter().all(|&g| g < 2.5), "sample {index}: {red:?} in {bbox:?}");
             checked += 1;
@@ -151,7 +151,7 @@ fn boxes_are_tight_around_the_part() {
 fn scenes_without_the_part_have_no_object_and_show_none_of_it() {
     let augmenter = augmenter(SceneStyle { positive_share: 0.0, ..SceneStyle::default() });
     assert!((0..20).all(|index| augmenter.sample(index).objects.is_empty()));
-    // Erased from its own photo, none of its red is left.
+    // After erasing it from its own photo, no red is left.
     let part = Prepared::new(&demonstration(true), [320, 240], &mut sample_rng(1, Stream::Preparation, 0));
     assert!(part.background.pixels.iter().all(|p| p[0] < 1.5 * p[1]), "red remains");
     let share = {
@@ -189,7 +189,7 @@ fn poses_keep_the_part_in_view_and_never_mirror_it() {
         assert!(part.region.vertices.iter().all(|vertex| pose.handedness(vertex) > 0.0), "mirrored");
         let object = SampleObject::new(&part, &pose, [320, 240], 0);
         let similarity = object.image_from_demonstration;
-        // Half size; the tilt takes a few percent.
+        // Half size; the tilt changes it by a few percent.
         assert!((0.36..0.63).contains(&similarity.scale), "{}", similarity.scale);
         let center = similarity.apply(&part.center) - pose.apply(&part.center);
         assert!(center.norm() < 2.0, "similarity is {} px off the warp", center.norm());

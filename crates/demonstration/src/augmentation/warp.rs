@@ -1,8 +1,8 @@
-//! Similarity warps of 8-bit pictures in fixed point: what a picture in full resolution can afford for every sample.
+//! Similarity warps of 8-bit pictures in fixed point: fast enough for a picture of full resolution in every sample.
 //!
 //! A pixel is one 64-bit word of four 16-bit lanes (red, green, blue, nothing), so that bilinear interpolation of all
-//! channels is four loads and three multiplications of plain integers. Places along a row are sums of one step, and
-//! rows are read in runs that lie inside the picture, so that the inner loop has no conditions.
+//! channels is four loads and three multiplications of plain integers. Positions along a row are sums of one step,
+//! and rows are read in runs that lie inside the picture, so that the inner loop has no conditions.
 //!
 //! ```text
 //! row ── place, step ── run: columns inside ── blocks of words, 8.8 bits a lane ── gain ── bytes
@@ -13,20 +13,20 @@ use std::ops::Range;
 use image::RgbImage;
 use sdg_geometry::PlanarSimilarity;
 
-/// Fractional bits of a place.
+/// Fractional bits of a position.
 const FRACTION_BITS: u32 = 32;
-/// Fractional bits that weights are made of. Weights then sum to 256, and 255 · 256 still fits a lane.
+/// Fractional bits used for weights. Weights then sum to 256, and 255 · 256 still fits a lane.
 const WEIGHT_BITS: u32 = 8;
-/// Fractional bits of a gain: below 16, which it may not reach.
+/// Fractional bits of a gain, which must be below 16.
 const GAIN_BITS: u32 = 12;
-/// Pixels that pass from interpolation to gain at a time; they stay in the nearest cache.
+/// Pixels passed from interpolation to gain at a time; they stay in the nearest cache.
 const BLOCK: usize = 64;
 
 /// A picture with its border repeated once around it.
 #[derive(Debug, Clone)]
 pub(crate) struct LanePicture {
     words: Vec<u64>,
-    /// Words from one row to the next.
+    /// Words per row.
     stride: usize,
     width: usize,
     height: usize,
@@ -49,7 +49,7 @@ impl LanePicture {
         Self { words, stride, width, height }
     }
 
-    /// Bilinear at a place: every lane is a grey value times 256.
+    /// Bilinear at a position: every lane is a grey value times 256.
     #[inline(always)]
     fn bilinear(&self, place: Place) -> u64 {
         let (column, row) = ((place.u >> FRACTION_BITS) as usize, (place.v >> FRACTION_BITS) as usize);
@@ -77,8 +77,8 @@ impl LanePicture {
         Place { u: confine(place.u, self.width), v: confine(place.v, self.height) }
     }
 
-    /// Reads the columns of one row of the target, multiplied by the gains, into `out`: three bytes a column. Beyond
-    /// the border the border goes on.
+    /// Reads the columns of one row of the target, multiplied by the gains, into `out`: three bytes per column.
+    /// Beyond the border its pixels are repeated.
     pub fn read(&self, row: &RowLine, columns: Range<usize>, gains: &Gains, out: &mut [u8]) {
         assert_eq!(out.len(), 3 * columns.len(), "three bytes a column");
         if columns.is_empty() {
@@ -86,7 +86,7 @@ impl LanePicture {
         }
         let row = row.fixed();
         let (mut place, end) = (row.at(columns.start), row.at(columns.end - 1));
-        // Along a line, what lies between two places inside is inside.
+        // On a line, all points between two inside points are inside.
         let inside = self.holds(place) && self.holds(end);
         let mut block = [[0u16; 4]; BLOCK];
         for out in out.chunks_mut(3 * BLOCK) {
@@ -111,7 +111,7 @@ fn lanes(r: u8, g: u8, b: u8) -> u64 {
     u64::from(r) | (u64::from(g) << 16) | (u64::from(b) << 32)
 }
 
-/// A place in the bordered picture, or a step there, with [`FRACTION_BITS`].
+/// A position in the bordered picture, or a step there, with [`FRACTION_BITS`].
 #[derive(Debug, Clone, Copy)]
 struct Place {
     u: i64,
@@ -119,7 +119,7 @@ struct Place {
 }
 
 impl Place {
-    /// The place, which then takes a step.
+    /// The position, which then advances by a step.
     #[inline(always)]
     fn pass(&mut self, step: Self) -> Self {
         let here = *self;
@@ -128,7 +128,7 @@ impl Place {
     }
 }
 
-/// Where the pixels of one row of the target come from: the place of the first one's centre, and from one to the next.
+/// The source positions of one row of the target: that of the first pixel's centre, and the step to the next.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct RowLine {
     start: [f64; 2],
@@ -136,7 +136,7 @@ pub(crate) struct RowLine {
 }
 
 impl RowLine {
-    /// The columns of `columns` whose centres come from `[0, size]`.
+    /// The columns in `columns` whose centres come from `[0, size]`.
     pub fn inside(&self, size: [f64; 2], columns: Range<usize>) -> Range<usize> {
         let nothing = columns.start..columns.start;
         let (mut low, mut high) = (columns.start as f64, columns.end as f64 - 1.0);
@@ -158,7 +158,7 @@ impl RowLine {
     fn fixed(&self) -> FixedLine {
         let one = 2f64.powi(FRACTION_BITS as i32);
         let place = |[u, v]: [f64; 2]| Place { u: (u * one).round() as i64, v: (v * one).round() as i64 };
-        // Half a pixel back to the corner of the four, one forth for the border, and half a weight to round it.
+        // Half a pixel back to the corner of the four, one forward for the border, and half a weight for rounding.
         let origin = 0.5 + 0.5 / f64::from(1 << WEIGHT_BITS);
         FixedLine { start: place(self.start.map(|along| along + origin)), step: place(self.step) }
     }
@@ -176,7 +176,7 @@ impl FixedLine {
     }
 }
 
-/// A similarity between two pictures, `source_from_target`, ready to be read row by row.
+/// A similarity between two pictures, `source_from_target`, prepared for reading row by row.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct RowMap {
     /// First column of the matrix; the second is that turned by a quarter.
@@ -199,7 +199,7 @@ impl RowMap {
     }
 }
 
-/// What each channel is multiplied by.
+/// The factor of each channel.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Gains {
     /// For two pixels, so that eight lanes are multiplied at once.
@@ -214,7 +214,7 @@ impl Gains {
         Self { factors: [r, g, b, 0, r, g, b, 0] }
     }
 
-    /// Multiplies, rounds, and confines to bytes.
+    /// Multiplies, rounds, and clamps to bytes.
     #[inline]
     fn apply(&self, block: &[[u16; 4]], out: &mut [u8]) {
         const LEFT_BITS: u32 = WEIGHT_BITS + GAIN_BITS - 16;
@@ -268,14 +268,14 @@ mod tests {
 
     use super::*;
 
-    /// Weights in steps of 1/256 on each axis, half a step off at most, and the rounding of a byte.
+    /// Weights in steps of 1/256 on each axis, with an error of at most half a step, and the rounding of a byte.
     const TOLERANCE: f64 = 2.0;
 
     fn similarity(scale: f64, degrees: f64, tx: f64, ty: f64) -> PlanarSimilarity {
         PlanarSimilarity { scale, angle: Angle::from_degrees(degrees), tx, ty }
     }
 
-    /// The hardest picture for an interpolation: neighbours that share nothing.
+    /// The most difficult picture for interpolation: unrelated neighbours.
     fn speckle(width: u32, height: u32) -> RgbImage {
         RgbImage::from_fn(width, height, |x, y| {
             let at = |k: u64| super::super::random::scramble((u64::from(x) << 40) | (u64::from(y) << 8) | k) as u8;
@@ -313,7 +313,7 @@ mod tests {
                     let p = map.apply(&Point2::new(x as f64 + 0.5, y as f64 + 0.5));
                     for k in 0..3 {
                         let exact = (reference(&image, p.x, p.y, k) * f64::from(gains[k])).min(255.0);
-                        // A gain above one magnifies what was off before.
+                        // A gain above one magnifies the error before it.
                         let off = (f64::from(pixel[k]) - exact).abs() / f64::from(gains[k]).max(1.0);
                         worst = worst.max(off);
                     }
@@ -337,7 +337,7 @@ mod tests {
 
     #[test]
     fn the_centre_of_a_disc_moves_as_its_point_does() {
-        // Both over- and undersampled, at places that no pixel grid knows.
+        // Both over- and undersampled, at positions off the pixel grid.
         const TOLERANCE_PX: f64 = 0.02;
         let center = Point2::new(100.37, 80.81);
         let disc = |x: f64, y: f64| (20.5 - (x - center.x).hypot(y - center.y)).clamp(0.0, 1.0);

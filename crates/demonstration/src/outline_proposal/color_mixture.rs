@@ -1,32 +1,32 @@
-//! How likely a colour is on one side of an outline: a mixture of Gaussians.
+//! The likelihood of a colour on one side of an outline: a mixture of Gaussians.
 
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
 use super::lab::Lab;
 
-/// Gaussians of a mixture.
+/// Number of Gaussians of a mixture.
 const NUM_COMPONENTS: usize = 5;
-/// Added to every variance, in squared units of L*a*b*: no camera tells colours apart better.
+/// Added to every variance, in squared units of L*a*b*: no camera distinguishes colours better.
 const MIN_VARIANCE: f64 = 1.0;
-/// Fewer samples make no Gaussian.
+/// Minimum number of samples of a Gaussian.
 const MIN_SAMPLES: usize = 4;
 /// Squared distances, in variances, within which 99 % of a Gaussian's samples lie in three dimensions.
 const EXPLAINED: f32 = 11.3;
-/// A Gaussian of fewer samples casts no shadow of its own.
+/// Minimum number of samples of a Gaussian for a shadow of its own.
 const MIN_SHADED_WEIGHT: f32 = 0.05;
-/// How much of the lightness a shadow leaves at least.
+/// Minimum share of the lightness that remains in a shadow.
 const DARKEST_SHADE: f32 = 0.5;
-/// Variance of hue in a shadow, beyond that in the light: other lamps reach into it.
+/// Variance of hue in a shadow, in addition to that in the light: other lamps light it, too.
 const SHADE_VARIANCE: f32 = 0.3;
-/// The same where a person said that it is a shadow.
+/// The same where a person marked a shadow.
 const DARKEST_SHADE_SAID: f32 = 0.3;
-/// What is hardly darker than the surroundings is no shadow.
+/// A colour hardly darker than the surroundings is not a shadow.
 const BRIGHTEST_SAID: f32 = 0.92;
-/// Other light in a shadow that a person pointed out moves a* and b* by at most so much.
+/// Largest change of a* and b* by other light in a marked shadow.
 const MAX_TINT: f32 = 14.0;
-/// Variance beside that of the colours in the light, in a shadow that a person pointed out: its depth and tint change from place to place.
+/// Additional variance in a marked shadow relative to that in the light: its depth and tint vary.
 const SAID_VARIANCE: f32 = 0.8;
-/// L* of a colour of no light, in units in which a shadow scales L*, a* and b* alike.
+/// L* of a colour of no light, in units in which a shadow scales L*, a* and b* by the same factor.
 const BLACK: f32 = 16.0;
 
 struct Component {
@@ -66,8 +66,8 @@ impl Component {
         self.log_peak - 0.5 * self.distance_squared(color)
     }
 
-    /// Whether the colour is this one with less light on it: L*, a* and b* are then all smaller by one factor, since all
-    /// go with the cube root of the light.
+    /// Whether the colour is this one with less light: L*, a* and b* are then all smaller by one factor, because all
+    /// are proportional to the cube root of the light.
     fn explains_shaded(&self, color: &Vector3<f32>) -> bool {
         let shade = (color.x + BLACK) / (self.mean.x + BLACK);
         let brightest = 1.0 + 3.0 * self.covariance.m11.sqrt() / (self.mean.x + BLACK);
@@ -90,7 +90,7 @@ impl Component {
         let lit = self.mean;
         let dark = (lit - black) * shade.factor + black + Vector3::new(0.0, shade.tint[0], shade.tint[1]);
         let way = dark - lit;
-        // A shadow is a little darker than where it was pointed out, too.
+        // A shadow may also be slightly darker than at the marked place.
         let along = ((color - lit).dot(&way) / way.norm_squared().max(1.0)).clamp(0.0, 1.15);
         let off = color - (lit + way * along);
         let scale = 1.0 - along * (1.0 - shade.factor.min(1.0));
@@ -99,7 +99,8 @@ impl Component {
     }
 }
 
-/// What a shadow does to a colour: L* above [`BLACK`], a* and b* are scaled, and a* and b* moved by the other light in the shadow.
+/// The effect of a shadow on a colour: L* above [`BLACK`], a* and b* are scaled, and a* and b* are shifted by the other
+/// light in the shadow.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Shade {
     factor: f32,
@@ -120,8 +121,8 @@ pub(crate) struct ColorMixture {
 }
 
 impl ColorMixture {
-    /// Learns from nothing: colours are split in two across their longest extent until there are as many groups as
-    /// Gaussians. `None` for fewer than a few colours.
+    /// Learns without a previous state: colours are split in two across their largest extent until there are as
+    /// many groups as Gaussians. `None` for too few colours.
     ///
     /// # Source
     /// Orchard and Bouman, "Color quantization of images", 1991, which GrabCut starts from as well. It needs no random
@@ -142,11 +143,11 @@ impl ColorMixture {
             let (above, below) = group.into_iter().partition(|color| (color - mean).dot(&axis) > 0.0);
             groups.extend([above, below]);
         }
-        // Splits are planes; what lies beside them often belongs to the other side.
+        // Splits are planes; colours near them often belong to the other side.
         Self::fit(&groups, colors.len())?.relearn(colors)
     }
 
-    /// Learns again from colours that are mostly those known: each goes to the Gaussian under which it is likeliest.
+    /// Learns again from mostly known colours: each is assigned to its most likely Gaussian.
     pub fn relearn(&self, colors: &[Lab]) -> Option<Self> {
         let mut groups = vec![Vec::new(); self.components.len()];
         for color in colors {
@@ -169,22 +170,22 @@ impl ColorMixture {
         (!components.is_empty()).then_some(Self { components })
     }
 
-    /// Logarithm of the density, but for a constant that is the same in all mixtures.
+    /// Logarithm of the density, except a constant that is equal in all mixtures.
     pub fn log_density(&self, color: &Lab) -> f32 {
         let color = vector(color);
         let densities = || self.components.iter().map(|component| component.log_density(&color));
-        // The largest is taken out, or all of them could vanish.
+        // The largest is factored out, because otherwise all of them could underflow.
         let largest = densities().fold(f32::NEG_INFINITY, f32::max);
         largest + densities().map(|density| (density - largest).exp()).sum::<f32>().ln()
     }
 
-    /// Whether the colour is among those learnt from.
+    /// Whether the colour is among the learnt ones.
     pub fn explains(&self, color: &Lab) -> bool {
         let color = vector(color);
         self.components.iter().any(|component| component.distance_squared(&color) < EXPLAINED)
     }
 
-    /// The shadow in which one of the colours learnt from looks like this one: the Gaussian that needs the least tint for it.
+    /// The shadow in which a learnt colour looks like this one: with the Gaussian that needs the smallest tint for it.
     pub fn shade_of(&self, color: &Lab) -> Option<Shade> {
         let color = vector(color);
         let shades =
@@ -197,13 +198,13 @@ impl ColorMixture {
         possible.filter(|shade| tint(shade) <= MAX_TINT).min_by(|a, b| tint(a).total_cmp(&tint(b)))
     }
 
-    /// Whether the colour is one of those learnt from in this shadow, or in less of it.
+    /// Whether the colour is a learnt one in this shadow, or in a weaker one.
     pub fn explains_under(&self, color: &Lab, shade: &Shade) -> bool {
         let color = vector(color);
         self.components.iter().any(|component| component.explains_under(&color, shade))
     }
 
-    /// Whether the colour is one of those learnt from in a shadow.
+    /// Whether the colour is a learnt one in a shadow.
     pub fn explains_shaded(&self, color: &Lab) -> bool {
         let color = vector(color);
         self.components.iter().any(|component| component.explains_shaded(&color))
@@ -237,7 +238,7 @@ mod tests {
         let mixture = ColorMixture::learn(&colors()).unwrap();
         assert!(mixture.explains(&Lab([71.0, -1.0, 3.0])) && mixture.explains(&Lab([20.0, 30.0, 0.0])));
         assert!(!mixture.explains(&Lab([45.0, 15.0, 1.0])), "between the groups");
-        // Nine times as many of the one as of the other: ln 9 = 2.2 apart.
+        // Nine times as many of the one as of the other: a difference of ln 9 = 2.2.
         let apart = mixture.log_density(&Lab([71.0, -1.0, 3.0])) - mixture.log_density(&Lab([20.0, 30.0, 0.0]));
         assert!((apart - 2.2).abs() < 0.5, "{apart}");
     }

@@ -1,4 +1,4 @@
-//! The box and its surroundings, small enough to be cut in time.
+//! The box and its surroundings, reduced for speed.
 
 use image::{RgbImage, imageops};
 use nalgebra::Point2;
@@ -13,21 +13,21 @@ use super::stroke::{OutlineStroke, Stroke};
 const MARGIN_SHARE: f64 = 0.2;
 /// … and at least, in pixels of the photo.
 const MIN_MARGIN_PX: f64 = 12.0;
-/// No pixel's colour alone decides: shadows, highlights and noise have the colours of the other side.
+/// No pixel's colour alone decides, because shadows, highlights and noise have the colours of the other side.
 const MAX_EVIDENCE: f32 = 10.0;
 
-/// The box and its surroundings, in pixels of their own.
+/// The box and its surroundings, in their own pixels.
 pub(crate) struct Frame {
     pub width: usize,
     pub colors: Vec<Lab>,
-    /// The pixels that may be the part's: those whose centres lie in the box. The others are surroundings.
+    /// The pixels that may belong to the part: those whose centres lie in the box. The others are surroundings.
     pub candidates: Vec<bool>,
-    /// Colours of the whole photo outside the box, thinned out.
+    /// Colours of the whole photo outside the box, subsampled.
     pub elsewhere: Vec<Lab>,
     pub edges: Edges,
     /// Upper left corner in the photo.
     origin: [f64; 2],
-    /// Pixels of the photo for one of the frame, across and down.
+    /// Photo pixels per pixel of the frame, across and down.
     scale: [f64; 2],
 }
 
@@ -59,7 +59,7 @@ impl Frame {
                 bbox.contains(&Point2::new(photo_x, photo_y))
             }));
         }
-        // Every n-th pixel each way: some ten thousand of them.
+        // Every n-th pixel in both directions: about ten thousand of them.
         let step = (image.width().max(image.height()) / 128).max(1) as usize;
         let mut elsewhere = Vec::new();
         for y in (0..image.height()).step_by(step) {
@@ -85,7 +85,7 @@ impl Frame {
         self.colors.len() / self.width
     }
 
-    /// The stroke in pixels of the frame, as far as it runs in the box; `None` beside the box.
+    /// The stroke in pixels of the frame, as far as it lies in the box; `None` outside the box.
     pub fn stroke(&self, stroke: &OutlineStroke) -> Option<Stroke> {
         let in_frame = |at: &Point2<f64>| {
             Point2::new((at.x - self.origin[0]) / self.scale[0], (at.y - self.origin[1]) / self.scale[1])
@@ -94,7 +94,7 @@ impl Frame {
         let mut pixels = Vec::new();
         let (first, last) = (points.first()?, points.last()?);
         for (from, to) in points.iter().zip(points.iter().skip(1)).chain([(first, first), (last, last)]) {
-            // Two steps a pixel leave none out.
+            // Two steps per pixel, so that none is skipped.
             let steps = (2.0 * (to - from).norm()).ceil().min(2.0 * (self.width + self.height()) as f64) as usize;
             for step in 0..=steps {
                 let at = from + (to - from) * (step as f64 / steps.max(1) as f64);
@@ -114,8 +114,8 @@ impl Frame {
         Mask::from_fn(self.width as u32, self.height() as u32, |x, y| in_part[y as usize * self.width + x as usize])
     }
 
-    /// Learns colours from a division into part and surroundings, cuts by them, and so on; what is pinned stays on its side.
-    /// `elsewhere` has colours of surroundings beyond the frame. `None` for too few colours.
+    /// Alternately learns colours from a division into part and surroundings, and cuts by them; pinned pixels stay on
+    /// their side. `elsewhere` has colours of surroundings beyond the frame. `None` for too few colours.
     pub fn cut(
         &self,
         mut in_part: Vec<bool>,
@@ -192,7 +192,7 @@ impl Frame {
     }
 }
 
-/// Where the box is the whole photo, what touches its edge stands for the surroundings.
+/// If the box is the whole photo, pixels at its edge serve as surroundings.
 fn without_edge_of_photo(mut in_box: Vec<bool>, width: usize) -> Vec<bool> {
     if in_box.iter().all(|&inside| inside) {
         let height = in_box.len() / width;

@@ -1,4 +1,4 @@
-//! Several guesses of the part, each cut, and which of the cuts a person meant with the box.
+//! Several guesses of the part, each cut, and the choice of the cut that a person meant with the box.
 //!
 //! The constants of the choice were fitted on 30 pictures of generated parts (seeds from 2^51, boxes as drawn and looser by a twelfth), on the
 //! shipped demonstrations, and on the five photographs that docs/comparison-with-tools.md reports; not on the tests' pictures.
@@ -8,22 +8,22 @@ use super::frame::Frame;
 use super::lab::Lab;
 use super::pieces::pieces;
 
-/// Where less of the box than this is left when shadows are taken out, the part itself has a shadow's colour. A thin tube fills
-/// some twentieth of its box.
+/// Minimum share of the box that remains without shadows; below it the part itself has a shadow's colour. A thin tube
+/// fills about a twentieth of its box.
 const MIN_UNSHADED_SHARE: f64 = 0.02;
-/// A person's box reaches beyond the part by this share of its side on each side, at most.
+/// Largest distance of a person's box from the part, as a share of its side, on each side.
 const MAX_GAP: f64 = 0.1;
-/// Cost of a side on which the part ends farther from the box than that, for each share of the box's side.
+/// Cost of a side on which the part ends farther from the box than that, per share of the box's side.
 const GAP_COST: f64 = 2.0;
-/// In favour of the guess that leaves shadows out: a shadow's border is an edge, too, and reaches the box.
+/// Bonus of the guess without shadows: a shadow's border is an edge, too, and reaches the box.
 const UNSHADED_BONUS: f64 = 0.15;
-/// More for the cut that knows the colours of the whole photo, where both run along edges. Of 0, 0.05 and 0.1 the shipped pneumatic cylinder's
-/// overlap was 0.846, 0.871, 0.871.
+/// Bonus of the cut that uses the colours of the whole photo, if both follow edges. With 0, 0.05 and 0.1 the shipped
+/// pneumatic cylinder's overlap was 0.846, 0.871, 0.871.
 const ELSEWHERE_BONUS: f64 = 0.05;
-/// A cut along fewer edges of the picture is no part: noise can be cut, too.
+/// Minimum share of a cut along edges of the picture for a part: noise can be cut, too.
 const MIN_SCORE: f64 = 0.2;
 
-/// The likeliest part, cut; `None` where nothing stands out.
+/// The most likely part, cut; `None` if nothing stands out.
 pub(crate) fn likeliest_cut(frame: &Frame, rounds: usize) -> Option<Vec<bool>> {
     let free = vec![None; frame.colors.len()];
     let mut best: Option<(f64, Vec<bool>)> = None;
@@ -37,8 +37,9 @@ pub(crate) fn likeliest_cut(frame: &Frame, rounds: usize) -> Option<Vec<bool>> {
     best.map(|(_, part)| part)
 }
 
-/// First divisions of the frame, each with what speaks for it beforehand, and the colours besides the frame's that surroundings have:
-/// those of the whole photo tell a shadow, but of something else that looks like the part they make the part surroundings.
+/// Initial divisions of the frame, each with its prior bonus, and additional colours of the surroundings: those of the
+/// whole photo identify a shadow, but colours of another object that resembles the part would make the part
+/// surroundings.
 fn guesses(frame: &Frame) -> Vec<(Vec<bool>, f64, &[Lab])> {
     let among = |is_part: &dyn Fn(&Lab) -> bool| -> Vec<bool> {
         frame.colors.iter().zip(&frame.candidates).map(|(color, &candidate)| candidate && is_part(color)).collect()
@@ -61,7 +62,7 @@ fn guesses(frame: &Frame) -> Vec<(Vec<bool>, f64, &[Lab])> {
     guesses
 }
 
-/// The lightness that divides the box's pixels into two groups which differ most.
+/// The lightness that divides the box's pixels into the two most different groups.
 ///
 /// # Source
 /// Otsu, "A threshold selection method from gray-level histograms", 1979.
@@ -90,8 +91,8 @@ fn lightness_threshold(frame: &Frame) -> f32 {
     (best.1 + 1) as f32 * BIN
 }
 
-/// How well the largest piece of a cut suits what a person meant with the box: the share of its border that runs along edges of
-/// the picture, in [0, 1], less what it leaves empty of the box. With that piece.
+/// The score of the largest piece of a cut: the share of its border that runs along edges of the picture, in [0, 1],
+/// minus the unused part of the box. Returned with that piece.
 fn score(frame: &Frame, cut: &[bool]) -> Option<(f64, Vec<bool>)> {
     let width = frame.width;
     let piece = pieces(cut, width).into_iter().max_by_key(Vec::len)?;

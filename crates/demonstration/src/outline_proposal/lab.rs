@@ -1,4 +1,4 @@
-//! Colours in CIE L*a*b*, where equal distances look about equally different.
+//! Colours in CIE L*a*b*, where equal distances correspond to about equal perceived differences.
 
 use std::sync::LazyLock;
 
@@ -42,7 +42,7 @@ mod tests {
 
     #[test]
     fn known_colors() {
-        // Values of sRGB's primaries and grey as every colour table gives them, to a tenth.
+        // Values of sRGB's primaries and grey from colour tables, to a tenth.
         for (rgb, lab) in [
             ([255, 255, 255], [100.0, 0.0, 0.0]),
             ([0, 0, 0], [0.0, 0.0, 0.0]),

@@ -1,7 +1,7 @@
-//! The cut of least cost through a picture, as a convex problem.
+//! The cut of minimum cost through a picture, as a convex problem.
 //!
-//! Minimises Σ weight · |∇share| + Σ evidence · share over shares in [0, 1]. Shares above one half of any minimiser are a
-//! cut of least cost among all cuts (Chan, Esedoglu, Nikolova 2006).
+//! Minimises Σ weight · |∇share| + Σ evidence · share over shares in [0, 1]. Shares above one half of any minimiser are
+//! a cut of minimum cost among all cuts (Chan, Esedoglu, Nikolova 2006).
 //!
 //! # Source
 //! Chambolle and Pock, "A first-order primal-dual algorithm for convex problems with applications to imaging", 2011,
@@ -9,18 +9,18 @@
 
 use super::lab::Lab;
 
-/// Evidence of a pixel that no colour can make the part's.
+/// Evidence of a pixel that cannot belong to the part, for any colour.
 pub(crate) const SURELY_OUTSIDE: f32 = 1e3;
-/// Cost of a boundary where the picture is flat, for each pixel of its length.
+/// Cost of a boundary in a flat area of the picture, per pixel of its length.
 const BOUNDARY_COST: f32 = 10.0;
-/// Share of that cost which is left on the strongest edges: keeps outlines smooth.
+/// Share of that cost that remains on the strongest edges; it keeps outlines smooth.
 const MIN_COST_SHARE: f32 = 0.05;
 /// Number of passes over the picture.
 const PASSES: usize = 60;
 /// Step length of both variables, 1 / √8.
 const STEP: f32 = 0.353_553_4;
 
-/// What a boundary costs at each pixel: little where the picture has an edge.
+/// The cost of a boundary at each pixel: low at edges of the picture.
 pub(crate) struct Edges {
     width: usize,
     cost: Vec<f32>,
@@ -29,7 +29,7 @@ pub(crate) struct Edges {
 impl Edges {
     /// From the colours of a picture, row by row.
     pub fn new(colors: &[Lab], width: usize) -> Self {
-        // To the right and down, as the gradient of shares is taken.
+        // To the right and down, like the gradient of the shares.
         let contrast = |at: usize| {
             let right =
                 if !(at + 1).is_multiple_of(width) { colors[at].distance_squared(&colors[at + 1]) } else { 0.0 };
@@ -46,13 +46,13 @@ impl Edges {
         Self { width, cost }
     }
 
-    /// How strong the edge at a pixel is, in [0, 1].
+    /// The strength of the edge at a pixel, in [0, 1].
     pub fn strength(&self, at: usize) -> f32 {
         (1.0 - self.cost[at] / BOUNDARY_COST) / (1.0 - MIN_COST_SHARE)
     }
 }
 
-/// Moves `share` to the cut of least cost; starts from what it holds.
+/// Moves `share` to the cut of minimum cost, starting from its present values.
 pub(crate) fn minimal_cut(evidence: &[f32], edges: &Edges, share: &mut [f32]) {
     let (width, count) = (edges.width, share.len());
     let mut dual_x = vec![0.0f32; count];

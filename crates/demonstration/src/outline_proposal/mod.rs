@@ -3,7 +3,7 @@
 //! ```text
 //! photo, box ─ frame: box and surroundings, shrunk ─ L*a*b*
 //!    │
-//!    └─ guesses of the part: what the surroundings do not explain, lit or in shadow; what is light; what is dark
+//!    └─ guesses of the part: areas not explained by the surroundings, lit or in shadow; light areas; dark areas
 //!         │
 //!         ├─▶ two ColorMixtures ─ evidence of each pixel ─ minimal_cut ─┐   a few rounds for each guess
 //!         └───────────────────────────◀─────────────────────────────────┤
@@ -11,14 +11,15 @@
 //! strokes ─ the pieces of the picture that they mean stay on their side while what is around them is cut again
 //! ```
 //!
-//! The energy is that of GrabCut (Rother, Kolmogorov, Blake 2004): how badly each pixel's colour suits its side, and the
-//! boundary's length, cheaper along edges of the picture. Three things differ. A part's shadow is mostly inside the box and
-//! would be learnt as the part's colour, so that a guess leaves out what the surroundings look like in shadow. No single guess
-//! suits every photo, so that several are cut and compared by what a person meant with the box: the part's outline runs along
-//! edges, and reaches the box. And the cut is found as a convex problem, whose boundaries have no preference for the pixels'
-//! axes, in some dozen passes over the picture, instead of by a maximum flow.
+//! The energy is that of GrabCut (Rother, Kolmogorov, Blake 2004): the mismatch of each pixel's colour with its side,
+//! and the boundary's length, which is cheaper along edges of the picture. There are three differences. A part's shadow
+//! is mostly inside the box and would be learnt as the part's colour, so that one guess excludes colours of the
+//! surroundings in shadow. No single guess suits every photo, so that several are cut and compared by the meaning of a
+//! person's box: the part's outline runs along edges, and reaches the box. The cut is found as a convex problem, whose
+//! boundaries have no preference for the pixels' axes, in some dozen passes over the picture, instead of by a maximum
+//! flow.
 //!
-//! Absent: any knowledge of parts, and randomness. The same photo and box give the same outline.
+//! It uses no knowledge of parts, and no randomness. The same photo and box give the same outline.
 
 mod color_mixture;
 mod frame;
@@ -36,16 +37,16 @@ use frame::Frame;
 pub use stroke::OutlineStroke;
 use strokes::Correction;
 
-/// Pixels of the frame that is cut; larger ones are shrunk. Bounds the time.
+/// Maximum number of pixels of the frame; larger ones are reduced. Limits the time.
 const MAX_PIXELS: f64 = 60_000.0;
-/// How often colours are learnt again from the last cut, for each guess.
+/// Number of times that colours are learnt again from the last cut, for each guess.
 const ROUNDS: usize = 4;
-/// A piece smaller than this share of the box is no part.
+/// Minimum share of the box for a piece to be a part.
 const MIN_AREA_SHARE: f64 = 0.02;
 
-/// Proposes the outline of the part that a person drew a box around.
+/// Proposes the outline of the part inside a person's box.
 ///
-/// The outline lies in the box. Where nothing in the box differs from its surroundings, the box itself is proposed.
+/// The outline lies in the box. If nothing in the box differs from its surroundings, the box itself is proposed.
 ///
 /// # Units and frames
 /// Pixels of the photo; the centre of the first pixel is (0.5, 0.5).
@@ -53,15 +54,15 @@ pub fn propose_outline(image: &RgbImage, bbox: &BoundingBox) -> Polygon {
     propose_outline_with(image, bbox, &[])
 }
 
-/// The same, corrected by strokes, in the order in which they were drawn: each means the piece of the picture that it lies on. Strokes
-/// outside the box count for nothing.
+/// The same, corrected by strokes in drawing order: each selects the piece of the picture on which it lies. Strokes
+/// outside the box are ignored.
 pub fn propose_outline_with(image: &RgbImage, bbox: &BoundingBox, strokes: &[OutlineStroke]) -> Polygon {
     let inside = bbox.clip(f64::from(image.width()), f64::from(image.height()));
     let nothing_found = || Polygon::from_box(&if inside.area() > 0.0 { inside } else { *bbox });
     let Some(frame) = Frame::cut_out(image, &inside, MAX_PIXELS) else { return nothing_found() };
     let Some(in_part) = segment(&frame, strokes) else { return nothing_found() };
     let Some(outline) = outer_outline(&frame.mask(&in_part)) else { return nothing_found() };
-    // Pieces of the mask reach the edges of whole pixels, the box may lie within one.
+    // Pieces of the mask extend to the edges of whole pixels; the box may end within one.
     let outline = frame.in_photo(&outline, &inside);
     if outline.area() >= MIN_AREA_SHARE * inside.area() && !outline.crosses_itself() {
         outline
@@ -70,14 +71,14 @@ pub fn propose_outline_with(image: &RgbImage, bbox: &BoundingBox, strokes: &[Out
     }
 }
 
-/// The part's pixels; `None` where nothing stands out.
+/// The part's pixels; `None` if nothing stands out.
 fn segment(frame: &Frame, strokes: &[OutlineStroke]) -> Option<Vec<bool>> {
     let found = guesses::likeliest_cut(frame, ROUNDS);
     let strokes: Vec<_> = strokes.iter().filter_map(|stroke| frame.stroke(stroke)).collect();
     if strokes.is_empty() {
         return found;
     }
-    // Without anything that stands out, what a stroke means does.
+    // If nothing stands out, the strokes' regions are used.
     let mut correction = Correction::new(frame, found.unwrap_or_else(|| vec![false; frame.colors.len()]));
     strokes.iter().for_each(|stroke| correction.apply(stroke));
     Some(correction.in_part)
@@ -118,7 +119,7 @@ mod tests {
 
     #[test]
     fn a_dark_part_beside_something_as_dark_is_found() {
-        // What lies below the box has the part's colour, so that the surroundings explain all of the part.
+        // The area below the box has the part's colour, so that the surroundings explain all of the part.
         let image = RgbImage::from_fn(200, 180, |x, y| {
             let dark = (60..140).contains(&x) && ((50..110).contains(&y) || y >= 118);
             let noise = (x * 7 + y * 13) as u8 % 5;
@@ -135,7 +136,7 @@ mod tests {
         let outline = propose_outline(&image, &bbox);
         for vertex in &outline.vertices {
             let radius = (vertex - Point2::new(800.0, 800.0)).norm();
-            // A pixel of the shrunk picture is some seven of the photo.
+            // A pixel of the reduced picture covers about seven of the photo.
             assert!((radius - 600.0).abs() < 10.0, "{vertex}: {radius}");
         }
     }

@@ -1,13 +1,13 @@
-//! One stroke: in pixels of the photo, and in those of the picture that is cut.
+//! One stroke: in pixels of the photo, and in those of the frame.
 
 use nalgebra::Point2;
 
-/// A line that a person drew over a photo where a proposed outline was wrong; a click is a line of one point.
+/// A line that a person drew over a wrong area of a proposed outline; a click is a line of one point.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OutlineStroke {
-    /// In pixels of the photo, in the order in which they were drawn.
+    /// In pixels of the photo, in drawing order.
     pub points: Vec<Point2<f64>>,
-    /// Whether what lies under it belongs to the part.
+    /// Whether the area under it belongs to the part.
     pub is_inside: bool,
 }
 
@@ -27,7 +27,7 @@ pub(crate) struct Stroke {
 }
 
 impl Stroke {
-    /// The distance of the nearest pixel of the stroke, for every pixel of a picture of this size.
+    /// The distance to the nearest pixel of the stroke, for every pixel of a picture of this size.
     pub(crate) fn distances(&self, width: usize, count: usize) -> Vec<f32> {
         let places: Vec<(f32, f32)> = self.pixels.iter().map(|at| ((at % width) as f32, (at / width) as f32)).collect();
         let nearest = |at: usize| {

@@ -1,9 +1,10 @@
-//! Strokes over places that belong to the part or do not: the region that a stroke means, and the part corrected by it.
+//! Strokes that mark areas as part or not: the region that a stroke selects, and the correction of the part.
 //!
-//! A stroke over a place that the cut has on the wrong side means the whole piece of the picture there: what is reached from the stroke
-//! over small steps of colour, without leaving the wrong side. A stroke over a shadow means the whole shadow: what the surroundings look
-//! like in as much shadow as under the stroke, and in less. The part is then cut anew, and what changes near the stroke is taken over.
-//! People draw into the middle of what is wrong, so that the way from the stroke to the part's border tells how large that is.
+//! A stroke on the wrong side of the cut selects the whole piece of the picture there: the pixels reached from the
+//! stroke by small steps of colour, without leaving the wrong side. A stroke over a shadow selects the whole shadow:
+//! colours of the surroundings in the shadow under the stroke, and in weaker ones. The part is then cut again, and the
+//! changes near the stroke are applied. People draw into the middle of the wrong area, so that the distance from the
+//! stroke to the part's border indicates its size.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -14,42 +15,45 @@ use super::lab::Lab;
 use super::pieces::{neighbours, pieces};
 use super::stroke::Stroke;
 
-/// The colours on the way to a pixel of the region differ by at most so much in sum, in units of L*a*b*. Chosen by hand: a shadow's
-/// edge is some 20 units wide, the steps of an even surface sum to less than 10.
+/// Largest sum of colour differences on the path to a pixel of the region, in units of L*a*b*. Chosen by hand: a
+/// shadow's edge is about 20 units wide; the steps of an even surface sum to less than 10.
 const MAX_WAY: f32 = 14.0;
-/// A pixel of the region differs from the stroke's colour by at most so much.
+/// Largest difference of a region's pixel from the stroke's colour.
 const MAX_DIFFERENCE: f32 = 24.0;
-/// Length of a step in the same units: near pixels come first, and noise does not lead across the whole picture.
+/// Length of a step in the same units: close pixels come first, and noise does not lead across the whole picture.
 const STEP: f32 = 0.05;
-/// The stroke's own surroundings belong to its region, as a share of the frame's diagonal.
+/// Size of the stroke's own surroundings, which belong to its region, as a share of the frame's diagonal.
 const RADIUS_SHARE: f64 = 0.012;
-/// A stroke changes what lies within so many of its distances to the part's border: what is wrong is often longer than wide.
+/// A stroke changes pixels within this many times its distance to the part's border: wrong areas are often longer than
+/// wide.
 const REACH: f32 = 5.0;
-/// That distance is at least so many pixels.
+/// Minimum value of that distance, in pixels.
 const MIN_DISTANCE_PX: f32 = 2.0;
-/// A shadow that a stroke means ends at edges of at least one of these strengths: at that which leaves a part that runs along edges.
+/// Minimum edge strengths at which a selected shadow ends; the one that leaves a part along edges is used.
 const MAX_EDGES: [f32; 3] = [1.1, 0.9, 0.6];
-/// A stroke over a shadow lies so far from the outline, in pixels: nearer to it, pixels are mixed of part and table, which looks like shadow.
+/// Minimum distance of a shadow stroke from the outline, in pixels: closer pixels mix part and table, which looks like
+/// shadow.
 const MIN_SHADOW_PX: f32 = 3.0;
-/// A shadow leaves so much of an outline, and most of that in one piece; otherwise the part has the shadow's colour.
+/// Minimum share of an outline that remains without a shadow, mostly in one piece; otherwise the part has the shadow's
+/// colour.
 const MIN_LEFT: f64 = 0.12;
 const MIN_IN_ONE_PIECE: f64 = 0.6;
-/// Another piece of the same shadow has at least this share of the part's area.
+/// Minimum share of the part's area for another piece of the same shadow.
 const MIN_PIECE_SHARE: f64 = 0.005;
-/// Its mean colour differs from that under the stroke by at most so much, in units of L*a*b*.
+/// Largest difference of its mean colour from that under the stroke, in units of L*a*b*.
 const MAX_PIECE_DIFFERENCE: f32 = 14.0;
-/// How often colours are learnt again after a stroke.
+/// Number of times that colours are learnt again after a stroke.
 const ROUNDS: usize = 3;
 
-/// A part as far as it was corrected, and what was said.
+/// The corrected part, and the strokes so far.
 pub(crate) struct Correction<'a> {
     frame: &'a Frame,
     /// Colours around the box, and of the whole photo.
     surroundings: Option<ColorMixture>,
     pub in_part: Vec<bool>,
-    /// On which side a pixel stays, where that was said.
+    /// The fixed side of a pixel, if a stroke set it.
     pinned: Vec<Option<bool>>,
-    /// What the strokes may change.
+    /// The pixels that the strokes may change.
     reached: Vec<bool>,
 }
 
@@ -62,7 +66,7 @@ impl<'a> Correction<'a> {
         Self { frame, surroundings, in_part, pinned: vec![None; count], reached: vec![false; count] }
     }
 
-    /// Corrects the part by a further stroke. What is right far from it stays as it is.
+    /// Corrects the part by a further stroke. Distant pixels are not changed.
     pub fn apply(&mut self, stroke: &Stroke) {
         let count = self.in_part.len();
         let distances = stroke.distances(self.frame.width, count);
@@ -73,7 +77,7 @@ impl<'a> Correction<'a> {
                 for at in 0..count {
                     self.reached[at] |= around[at];
                     if shadow[at] || distances[at] <= self.radius() {
-                        // What was said before stays.
+                        // Earlier strokes stay in force.
                         self.pinned[at].get_or_insert(false);
                     }
                 }
@@ -91,13 +95,13 @@ impl<'a> Correction<'a> {
         }
     }
 
-    /// A stroke's own surroundings reach so far, in pixels.
+    /// Radius of a stroke's own surroundings, in pixels.
     fn radius(&self) -> f32 {
         (RADIUS_SHARE * (self.frame.width as f64).hypot(self.frame.height() as f64)) as f32
     }
 
-    /// All of the part that is the shadow which a stroke runs over, on both sides of the part, and the share along edges of what is left;
-    /// `None` where it runs over none.
+    /// All of the part that belongs to the shadow under a stroke, on both sides of the part, and the share along edges
+    /// of the remaining part; `None` if there is no shadow under it.
     fn shadow(&self, stroke: &Stroke, max_edge: f32) -> Option<(f64, Vec<bool>)> {
         let Self { frame, in_part, pinned, .. } = self;
         let surroundings = self.surroundings.as_ref().filter(|_| !stroke.is_inside)?;
@@ -121,7 +125,8 @@ impl<'a> Correction<'a> {
         for piece in pieces(&marked, frame.width) {
             let is_under = piece.iter().any(|at| stroke.pixels.contains(at));
             let is_large = piece.len() as f64 >= MIN_PIECE_SHARE * part as f64;
-            // Dark places in the middle of a part are the part's, and so is what has only something of the shadow's colour.
+            // Dark areas in the middle of a part belong to the part, and so do areas that only partly have the shadow's
+            // colour.
             if is_under || (is_large && touches_outside(&piece) && looks_alike(&piece)) {
                 piece.iter().for_each(|&at| shadow[at] = true);
             }
@@ -134,7 +139,7 @@ impl<'a> Correction<'a> {
         (is_under && is_enough).then(|| (frame.share_along_edges(&left), shadow))
     }
 
-    /// Marks what a stroke means by its colour alone, and what it may change.
+    /// Marks the region that a stroke selects by its colour alone, and the pixels that it may change.
     fn pin_alike(&mut self, stroke: &Stroke, distances: &[f32]) {
         let radius = self.radius();
         let Self { frame, in_part, pinned, reached, .. } = self;
@@ -151,7 +156,7 @@ impl<'a> Correction<'a> {
     }
 }
 
-/// How deep a stroke lies in what is wrong, in pixels: its point that is farthest from the side that it means.
+/// Depth of a stroke in the wrong area, in pixels: at its point farthest from the right side.
 fn depth(stroke: &Stroke, in_part: &[bool], width: usize) -> f32 {
     let of_its_side: Vec<usize> = (0..in_part.len()).filter(|&at| in_part[at] == stroke.is_inside).collect();
     let to_side = |&pixel: &usize| {
@@ -159,7 +164,7 @@ fn depth(stroke: &Stroke, in_part: &[bool], width: usize) -> f32 {
         let away = |&at: &usize| ((at % width) as f32 - x).hypot((at / width) as f32 - y);
         of_its_side.iter().map(away).fold(f32::INFINITY, f32::min)
     };
-    // Some of a long stroke's pixels tell as much as all.
+    // A sample of a long stroke's pixels is sufficient.
     let some = stroke.pixels.iter().step_by(1 + stroke.pixels.len() / 32);
     some.map(to_side).fold(0.0, f32::max)
 }
@@ -173,7 +178,7 @@ fn mean<'a>(colors: impl Iterator<Item = &'a Lab>) -> Lab {
     Lab(sum.map(|sum| sum / count.max(1.0)))
 }
 
-/// The marked pixels and those around them, across and down, so many steps away.
+/// The marked pixels and those around them, across and down, up to this many steps away.
 fn grown(marked: &[bool], width: usize, steps: usize) -> Vec<bool> {
     let mut grown = marked.to_vec();
     let mut rim: Vec<usize> = (0..marked.len()).filter(|&at| marked[at]).collect();
@@ -190,7 +195,7 @@ fn grown(marked: &[bool], width: usize, steps: usize) -> Vec<bool> {
     grown
 }
 
-/// The pixels that look like the surroundings in as much shadow as there is under a stroke, or in less.
+/// The pixels that look like the surroundings in the shadow under a stroke, or in a weaker one.
 fn shadow_under(stroke: &Stroke, surroundings: &ColorMixture, colors: &[Lab]) -> Vec<bool> {
     let shades: Vec<_> = stroke
         .pixels
@@ -201,9 +206,10 @@ fn shadow_under(stroke: &Stroke, surroundings: &ColorMixture, colors: &[Lab]) ->
     colors.iter().map(|color| shades.iter().any(|shade| surroundings.explains_under(color, shade))).collect()
 }
 
-/// Marks the pixels that a stroke means in `pinned`: inside, or outside.
+/// Marks the selected pixels of a stroke in `pinned`: inside, or outside.
 fn pin(stroke: &Stroke, colors: &[Lab], width: usize, in_part: &[bool], pinned: &mut [Option<bool>]) {
-    // Costs in thousandths, so that they can be ordered. Each pixel is compared with that of the stroke that it was reached from.
+    // Costs in thousandths, so that they can be ordered. Each pixel is compared with the stroke's pixel from which it
+    // was reached.
     let mut cost = vec![u32::MAX; colors.len()];
     let mut open: BinaryHeap<_> = stroke.pixels.iter().map(|&start| Reverse((0u32, start, start))).collect();
     stroke.pixels.iter().for_each(|&start| cost[start] = 0);
@@ -212,7 +218,7 @@ fn pin(stroke: &Stroke, colors: &[Lab], width: usize, in_part: &[bool], pinned: 
         if so_far > cost[at] {
             continue;
         }
-        // Another stroke's region is not taken back.
+        // Another stroke's region is not reverted.
         if pinned[at] != Some(!stroke.is_inside) {
             pinned[at] = Some(stroke.is_inside);
         }
@@ -253,7 +259,7 @@ mod tests {
         for (at, pinned) in pinned.iter().enumerate() {
             assert_eq!(*pinned, (at % width >= 20).then_some(false), "{at}");
         }
-        // On the right side already, it means its own surroundings alone.
+        // If it is already on the right side, it selects only its own surroundings.
         let mut pinned = vec![None; colors.len()];
         pin_all(click(5, 10, true), &mut pinned);
         assert_eq!(pinned.iter().filter(|pinned| pinned.is_some()).count(), 1);

@@ -1,6 +1,7 @@
-//! Photos of parts with a shadow that a proposed outline takes in, made of photos whose outline is known.
+//! Photos of parts with a shadow that a proposed outline includes, made from photos with a known outline.
 //!
-//! The shadow is the outline moved away from the lamp, blurred, and bluer than the light: other lamps and the sky reach into it.
+//! The shadow is the outline moved away from the lamp, blurred, and bluer than the light, because other lamps and the
+//! sky light it.
 
 use image::{Rgb, RgbImage};
 use nalgebra::{Point2, Vector2};
@@ -9,15 +10,15 @@ use sdg_geometry::{BoundingBox, Mask, Polygon};
 /// A photo with a shadow.
 pub struct Shaded {
     pub image: RgbImage,
-    /// Around part and shadow, as a person draws it who takes the shadow for the part's.
+    /// Around part and shadow, as drawn by a person who mistakes the shadow for the part.
     pub bbox: BoundingBox,
     pub part: Mask,
-    /// Where the shadow is strong and no part is.
+    /// Area with a strong shadow and without the part.
     pub shadow: Mask,
 }
 
 impl Shaded {
-    /// How much of the shadow, and how much of the part, an outline holds.
+    /// Shares of the shadow and of the part inside an outline.
     pub fn shares(&self, outline: &Polygon) -> [f64; 2] {
         let held = outline.rasterize(self.part.width(), self.part.height());
         [&self.shadow, &self.part].map(|of| {
@@ -28,14 +29,14 @@ impl Shaded {
     }
 }
 
-/// How much of the light is left in a shadow, and its colour.
+/// Remaining light in a shadow, and its colour.
 #[derive(Debug, Clone, Copy)]
 pub struct Lamp {
-    /// Towards which the shadow falls, in radians.
+    /// Direction of the shadow, in radians.
     pub direction: f64,
     /// Length of the shadow as a share of the part's diagonal.
     pub length: f64,
-    /// Light that is left, for red, green and blue.
+    /// Remaining light, for red, green and blue.
     pub left: [f64; 3],
 }
 
@@ -46,7 +47,7 @@ pub fn cast(photo: &RgbImage, truth: &Polygon, lamp: &Lamp) -> Shaded {
     let length = lamp.length * bounds.width().hypot(bounds.height());
     let shift = Vector2::new(lamp.direction.cos(), lamp.direction.sin()) * length;
     let part = truth.rasterize(width, height);
-    // All that the part sweeps on its way: a shadow begins at the part.
+    // Everything that the part sweeps on its path: a shadow starts at the part.
     let steps = length.ceil().max(1.0) as usize;
     let mut swept = Mask::empty(width, height);
     for step in 0..=steps {
@@ -84,7 +85,7 @@ pub fn cast(photo: &RgbImage, truth: &Polygon, lamp: &Lamp) -> Shaded {
     Shaded { image, bbox: bbox.clip(f64::from(width), f64::from(height)), part, shadow }
 }
 
-/// A mask as shares, averaged over squares of this radius twice.
+/// A mask as shares, averaged twice over squares of this radius.
 fn blurred(mask: &Mask, radius: usize) -> Vec<f64> {
     let (width, height) = (mask.width() as usize, mask.height() as usize);
     let mut values: Vec<f64> = (0..height)

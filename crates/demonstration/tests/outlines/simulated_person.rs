@@ -8,7 +8,7 @@ use sdg_geometry::{BoundingBox, Mask, Polygon};
 
 use image::RgbImage;
 
-/// An outline against the true one.
+/// An outline compared with the true one.
 #[derive(Debug, Clone, Copy)]
 pub struct Agreement {
     /// Overlap of the areas.
@@ -44,14 +44,14 @@ pub fn outlines(image: &RgbImage, bbox: &BoundingBox, truth: &Polygon, num_click
     outlines
 }
 
-/// A stroke of so many points along the largest wrong piece, through its widest part; of one point, a click there.
+/// A stroke of this many points along the largest wrong piece, through its widest part; with one point, a click there.
 pub fn stroke(proposed: &Polygon, truth: &Mask, bbox: &BoundingBox, num_points: usize) -> Option<OutlineStroke> {
     let proposed = proposed.rasterize(truth.width(), truth.height());
     let (place, piece) = widest_of_largest_error(&proposed, truth, bbox)?;
     let at = |[x, y]: [u32; 2]| Point2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
     let is_inside = truth.get(place[0], place[1]);
     let middle = at(place);
-    // Along the piece: towards where most of it lies from its widest part, on both sides, as far as the piece goes.
+    // Along the piece: from its widest part in both directions, towards most of its area, as far as the piece extends.
     let scatter = piece.iter().map(|&pixel| at(pixel) - middle).map(|off| off * off.transpose()).sum::<Matrix2<f64>>();
     let eigen = SymmetricEigen::new(scatter);
     let along = eigen.eigenvectors.column(eigen.eigenvalues.imax()).into_owned();
@@ -72,7 +72,7 @@ pub fn stroke(proposed: &Polygon, truth: &Mask, bbox: &BoundingBox, num_points: 
 
 type Pixel = [u32; 2];
 
-/// The largest connected wrong piece of one kind, after its pixel that is farthest from its border.
+/// The largest connected wrong piece of one kind, starting with its pixel that is farthest from its border.
 fn widest_of_largest_error(proposed: &Mask, truth: &Mask, bbox: &BoundingBox) -> Option<(Pixel, HashSet<Pixel>)> {
     let (width, height) = (truth.width(), truth.height());
     let kind = |x: u32, y: u32| {
@@ -107,7 +107,7 @@ fn widest_of_largest_error(proposed: &Mask, truth: &Mask, bbox: &BoundingBox) ->
             largest = piece;
         }
     }
-    // Peeled layer by layer: the last pixel left is the widest place.
+    // Peeled layer by layer: the last remaining pixel is the widest place.
     let place = |at: usize| [(at % width as usize) as u32, (at / width as usize) as u32];
     let piece = largest.iter().map(|&at| place(at)).collect();
     let mut left = vec![false; kinds.len()];

@@ -4,10 +4,11 @@ use serde::{Deserialize, Serialize};
 
 use super::roi_pooler::RoiPoolerConfig;
 
-/// From an object's outline to what its mask logits should be.
+/// From an object's outline to the target of its mask logits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum MaskTargets {
-    /// Polygons are drawn into the box by COCO's rasteriser; bitmaps are pooled and cut at one half: Detectron2.
+    /// Polygons are drawn into the box by COCO's rasteriser; bitmaps are pooled and thresholded at one half:
+    /// Detectron2.
     Rasterized,
     /// The mask of the whole image is pooled by ROIAlign in the legacy alignment, fractions kept: torchvision.
     Pooled,
@@ -16,29 +17,28 @@ pub enum MaskTargets {
 /// From the mask of a box to a mask of the image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum MaskPasting {
-    /// Every pixel's centre is looked up in the box, zeros outside: Detectron2.
+    /// Every pixel's centre is looked up in the box; zeros outside: Detectron2.
     PixelCenters,
     /// The mask, one zero cell wider on each side, is resized to the box in whole pixels: torchvision.
     WholePixels,
 }
 
-/// What a cell of the part weighs in the loss against one beside it.
+/// Weight in the loss of a cell of the part relative to a cell beside it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum MaskBalance {
-    /// As much: Detectron2 and torchvision.
+    /// Equal: Detectron2 and torchvision.
     #[default]
     Cells,
-    /// More where the part fills little of its box: the root of how many cells there are beside it for one of it, at most
-    /// [`MaskBalance::MAX`]. A pipe fills a tenth of its box, and a head taught for 300 steps learnt that nothing is
-    /// ever part of it.
+    /// Larger if the part fills little of its box: the root of the number of cells beside it per cell of it, at most
+    /// [`MaskBalance::MAX`]. A pipe fills a tenth of its box, and a head trained for 300 steps learnt to mark no cell.
     ThinParts,
 }
 
 impl MaskBalance {
-    /// The most that a cell of the part weighs.
+    /// The largest weight of a cell of the part.
     pub const MAX: f32 = 4.0;
 
-    /// The weight of a cell of the part, by how many of all `cells` are.
+    /// The weight of a cell of the part, from the number of its cells among all `cells`.
     pub(crate) fn weight(self, inside: f32, cells: usize) -> f32 {
         match self {
             Self::Cells => 1.0,
@@ -56,18 +56,18 @@ pub struct MaskHeadConfig {
     pub conv_channels: Vec<usize>,
     /// Channels of the transposed convolution.
     pub deconv_channels: usize,
-    /// Most positive proposals an image that go through the head while training.
+    /// Maximum number of positive proposals per image that go through the head in training.
     pub max_train_rois_per_image: Option<usize>,
     /// Factor on the mask loss.
     pub loss_weight: f64,
-    /// What cells weigh in it.
+    /// Weights of the cells in it.
     #[serde(default)]
     pub balance: MaskBalance,
-    /// What the logits are taught.
+    /// The targets of the logits.
     pub targets: MaskTargets,
-    /// How a mask gets into the image.
+    /// Method of pasting a mask into the image.
     pub pasting: MaskPasting,
-    /// Least probability of a pixel inside.
+    /// Minimum probability of a pixel inside.
     pub threshold: f64,
 }
 

@@ -1,17 +1,17 @@
-//! How boxes become squares of features.
+//! Pooling of boxes into squares of features.
 
 use serde::{Deserialize, Serialize};
 
-/// Where the samples of ROIAlign lie.
+/// Positions of ROIAlign's samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum RoiAlignment {
-    /// Shifted by half a cell so that the pixel model is right: Detectron2's `aligned`.
+    /// Shifted by half a cell, which is right for this pixel model: Detectron2's `aligned`.
     HalfPixel,
     /// Not shifted: torchvision's detectors.
     Legacy,
 }
 
-/// Samples a bin of ROIAlign averages.
+/// Number of samples that a bin of ROIAlign averages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum SamplingRatio {
     /// `ceil(roi size / output size)` along each axis.
@@ -20,7 +20,7 @@ pub enum SamplingRatio {
     Fixed(usize),
 }
 
-/// Where the small number stands that keeps `log2` from rounding down on exact powers.
+/// Position of the small number that prevents `log2` from rounding down on exact powers.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum LevelEpsilon {
     /// `floor(canonical_level + log2(s / canonical_size + eps))`: Detectron2, 1e-8.

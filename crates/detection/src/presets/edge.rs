@@ -8,12 +8,12 @@ pub fn edge(num_keypoints: usize) -> RcnnConfig {
     edge_of(RcnnKind::Keypoint { num_keypoints })
 }
 
-/// The default: a small detector for two CPU cores, trained from nothing in a few minutes.
+/// The default: a small detector for two CPU cores, trained from random values in a few minutes.
 ///
-/// Half-width ResNet-18 with group norm, a pyramid of 64 channels, 256-wide box head and four
-/// 128-wide keypoint or 64-wide mask convolutions, at 320×240 px: 4.4 million parameters with keypoints. Anchors and pooling
-/// levels are laid out for parts of 20 to 250 px. Few proposals and ROIs are kept, because one
-/// image shows at most a handful of parts.
+/// Half-width ResNet-18 with group norm, a pyramid of 64 channels, 256-wide box head and four 128-wide keypoint or
+/// 64-wide mask convolutions, at 320×240 px: 4.4 million parameters with keypoints. Anchors and pooling levels are
+/// chosen for parts of 20 to 250 px. Few proposals and ROIs are kept, because one image shows at most a handful of
+/// parts.
 pub fn edge_of(kind: RcnnKind) -> RcnnConfig {
     let pooler = |output_size| RoiPoolerConfig {
         output_size,

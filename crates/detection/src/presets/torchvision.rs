@@ -6,8 +6,8 @@ use crate::config::*;
 
 /// torchvision's R50-FPN with its numerics, for imported weights.
 ///
-/// The layers are those of [`r50_detectron2`]; what differs is written here. The frozen norms add nothing to the
-/// variance, as torchvision sets them when it loads its COCO weights.
+/// The layers are those of [`r50_detectron2`]; this file contains the differences. The frozen norms add nothing
+/// to the variance, as in torchvision with its COCO weights.
 ///
 /// # Source
 /// `torchvision.models.detection`: `fasterrcnn_resnet50_fpn`, `maskrcnn_resnet50_fpn`, `keypointrcnn_resnet50_fpn`.

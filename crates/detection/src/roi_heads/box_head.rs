@@ -17,7 +17,7 @@ use crate::rpn::ImageSize;
 use super::roi::{RoiClass, RoiDetection, SampledRoi};
 use crate::target::ResizedTarget;
 
-/// Standard deviations of the predictors' first weights: small, so that training starts from
+/// Standard deviations of the predictors' initial weights: small, so that training starts from
 /// undecided classes and unmoved boxes.
 const SCORE_STD: f64 = 0.01;
 const DELTA_STD: f64 = 0.001;
@@ -45,7 +45,7 @@ impl BoxHead {
         }
     }
 
-    /// Gives the hidden values `[R, F]`.
+    /// Returns the hidden values `[R, F]`.
     pub fn forward(&self, features: &[Tensor<4>; 5], rois: &[Roi]) -> Tensor<2> {
         let pooled = pool(features, rois, &self.pooler);
         let [r, c, s, _] = pooled.dims();
@@ -110,7 +110,7 @@ impl BoxPredictor {
         }
     }
 
-    /// Gives the losses on classes and deltas, each divided by the number of sampled ROIs.
+    /// Returns the losses on classes and deltas, each divided by the number of sampled ROIs.
     ///
     /// # Shapes
     /// - `hidden`: `[R, F]`
@@ -142,7 +142,7 @@ impl BoxPredictor {
         [cls, reg]
     }
 
-    /// Gives the detections of each image, best first, without keypoints.
+    /// Returns the detections of each image, best first, without keypoints.
     pub async fn detect(&self, hidden: Tensor<2>, rois: &[Roi], image_sizes: &[ImageSize]) -> Vec<Vec<RoiDetection>> {
         let scores = activation::softmax(self.cls_score.forward(hidden.clone()), 1);
         let [scores, deltas] = read_both(scores, self.bbox_pred.forward(hidden)).await;

@@ -1,4 +1,4 @@
-//! The 3×3 convolutions with which keypoint and mask head begin.
+//! The first 3×3 convolutions of the keypoint and mask heads.
 
 use sdg_layers::{Conv2d, Conv2dShape, Distribution, Initializer};
 

@@ -1,14 +1,14 @@
 //! Keypoints as heatmaps over a box, and back.
 //!
-//! A heatmap is a square of `S×S` cells stretched over a box. A keypoint is taught as the one cell
-//! that it falls into; it is read as a position inside the box from all cells.
+//! A heatmap is a square of `S×S` cells stretched over a box. The target of a keypoint is the one
+//! cell that contains it; in inference its position inside the box is computed from all cells.
 
 use sdg_geometry::Keypoint;
 
 use crate::boxes::Corners;
 use crate::config::{KeypointReadout, KeypointScore};
 
-/// The cell `y·S + x` of a keypoint in a box, or `None` where it is unlabelled or outside.
+/// The cell `y·S + x` of a keypoint in a box, or `None` if it is unlabelled or outside.
 ///
 /// `keypoint` and `roi` are in pixels of the resized image. A keypoint exactly on the right or
 /// lower edge belongs to the last cell.
@@ -40,7 +40,7 @@ pub struct ReadKeypoint {
     pub x: f32,
     /// Pixels, y down.
     pub y: f32,
-    /// As [`KeypointScore`] says.
+    /// See [`KeypointScore`].
     pub score: f32,
 }
 
@@ -107,7 +107,7 @@ fn local_mean(logits: &[f32], size: usize, best: usize, radius: usize) -> (f32, 
 /// The parameter of the cubic convolution kernel: PyTorch's -0.75.
 const CUBIC: f32 = -0.75;
 
-/// Four cubic weights for a point `t` of the way from the second to the third sample.
+/// Four cubic weights for a point at share `t` between the second and the third sample.
 fn cubic_weights(t: f32) -> [f32; 4] {
     let near = |d: f32| ((CUBIC + 2.0) * d - (CUBIC + 3.0)) * d * d + 1.0;
     let far = |d: f32| ((CUBIC * d - 5.0 * CUBIC) * d + 8.0 * CUBIC) * d - 4.0 * CUBIC;
@@ -163,7 +163,7 @@ mod tests {
 
     #[test]
     fn cells_by_hand() {
-        // 56 cells over 56x112 px: one pixel and two pixels a cell.
+        // 56 cells over 56x112 px: one pixel and two pixels per cell.
         assert_eq!(encode(&keypoint(10.5, 23.0), &ROI, 56), Some(56));
         assert_eq!(encode(&keypoint(66.0, 132.0), &ROI, 56), Some(56 * 56 - 1));
         assert_eq!(encode(&keypoint(9.9, 30.0), &ROI, 56), None);
@@ -176,7 +176,7 @@ mod tests {
     fn cubic_weights_sum_to_one_and_hit_samples() {
         assert_eq!(cubic_weights(0.0), [0.0, 1.0, 0.0, 0.0]);
         assert!((cubic_weights(0.3).iter().sum::<f32>() - 1.0).abs() < 1e-6);
-        // At the middle: -0.09375, 0.59375, 0.59375, -0.09375 for a = -0.75.
+        // In the middle: -0.09375, 0.59375, 0.59375, -0.09375 for a = -0.75.
         assert!((cubic_weights(0.5)[0] + 0.09375).abs() < 1e-6);
     }
 
@@ -209,8 +209,8 @@ mod tests {
         ) {
             let roi = [30.0, 40.0, 30.0 + w, 40.0 + h];
             let point = keypoint(30.0 + fx * f64::from(w), 40.0 + fy * f64::from(h));
-            // A hill around the taught cell: resizing to fewer pixels than cells, which has no
-            // antialiasing, would step over a single high cell.
+            // A hill around the target cell: resizing to fewer pixels than cells has no
+            // antialiasing and would miss a single high cell.
             let cell = encode(&point, &roi, 56).unwrap();
             let (row, column) = ((cell / 56) as f32, (cell % 56) as f32);
             let logits: Vec<f32> = (0..56 * 56)

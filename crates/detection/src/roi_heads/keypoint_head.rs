@@ -25,7 +25,7 @@ use crate::target::ResizedTarget;
 pub struct KeypointHead {
     /// 3×3 convolutions; Detectron2's `conv_fcn1` is number 0.
     pub conv_fcn: Vec<Conv2d>,
-    /// Transposed convolution to one map a keypoint.
+    /// Transposed convolution to one map per keypoint.
     pub score_lowres: ConvTranspose2x,
     #[module(skip)]
     config: KeypointHeadConfig,
@@ -43,23 +43,24 @@ impl KeypointHead {
         }
     }
 
-    /// Most ROIs an image while training.
+    /// Maximum number of ROIs per image in training.
     pub(super) fn max_train_rois_per_image(&self) -> Option<usize> {
         self.config.max_train_rois_per_image
     }
 
-    /// Gives heatmap logits `[R, K, S, S]`.
+    /// Returns heatmap logits `[R, K, S, S]`.
     pub fn forward(&self, features: &[Tensor<4>; 5], rois: &[Roi]) -> Tensor<4> {
         upsample_bilinear_2x(self.score_lowres.forward(self.hidden(features, rois)))
     }
 
-    /// Gives the maps `[R, C, P, P]` that the heatmaps are made of, `C` those of the last convolution.
+    /// Returns the maps `[R, C, P, P]` from which the heatmaps are computed; `C` are the channels of the last
+    /// convolution.
     pub fn hidden(&self, features: &[Tensor<4>; 5], rois: &[Roi]) -> Tensor<4> {
         let pooled = pool(features, rois, &self.config.pooler);
         self.conv_fcn.iter().fold(pooled, |x, conv| conv.forward_relu(x))
     }
 
-    /// Gives the cross-entropy over the cells, divided by the keypoints that have a cell.
+    /// Returns the cross-entropy over the cells, divided by the number of keypoints with a cell.
     pub fn loss(&self, features: &[Tensor<4>; 5], rois: &[SampledRoi], targets: &[ResizedTarget]) -> Tensor<1> {
         let size = self.config.heatmap_size();
         let cells: Vec<Option<usize>> = rois

@@ -1,6 +1,6 @@
-//! The mask head: which part of a box its object covers.
+//! The mask head: the area of a box that its object covers.
 //!
-//! Shapes: R ROIs, C channels, P side of the pooled square, K maps (one a class), S = 2·P side of a mask.
+//! Shapes: R ROIs, C channels, P side of the pooled square, K maps (one per class), S = 2·P side of a mask.
 //!
 //! ```text
 //! pooled [R, C, P, P] ─ 3×3 convolutions ─ transposed [R, C', S, S] ─ 1×1 [R, K, S, S]
@@ -22,7 +22,7 @@ use super::mask_target::encode;
 use super::roi::{RoiClass, RoiDetection, SampledRoi};
 use crate::target::ResizedTarget;
 
-/// Standard deviation of the predictor's first weights: small, so that training starts undecided.
+/// Standard deviation of the predictor's initial weights: small, so that training starts undecided.
 const PREDICTOR_STD: f64 = 0.001;
 
 /// Convolutions, a transposed and a 1×1 convolution: mask logits of each class.
@@ -32,9 +32,9 @@ pub struct MaskHead {
     pub mask_fcn: Vec<Conv2d>,
     /// Transposed convolution, kernel 2, that doubles the side.
     pub deconv: ConvTranspose2x,
-    /// 1×1 to one map a class.
+    /// 1×1 to one map per class.
     pub predictor: Conv2d,
-    /// Maps before that of class 0: one where the background stands first.
+    /// Number of maps before that of class 0: one if the background comes first.
     first_class_map: usize,
     #[module(skip)]
     config: MaskHeadConfig,
@@ -43,7 +43,7 @@ pub struct MaskHead {
 impl MaskHead {
     /// Draws the parameters for a pyramid of `channels` channels.
     ///
-    /// Where the background stands first it has a map too, which nothing uses: torchvision.
+    /// If the background comes first it also has an unused map: torchvision.
     pub fn init(
         config: &MaskHeadConfig,
         channels: usize,
@@ -76,7 +76,7 @@ impl MaskHead {
         &self.config
     }
 
-    /// Gives mask logits `[R, K, S, S]`.
+    /// Returns mask logits `[R, K, S, S]`.
     pub fn forward(&self, features: &[Tensor<4>; 5], rois: &[Roi]) -> Tensor<4> {
         let pooled = pool(features, rois, &self.config.pooler);
         let hidden = self.mask_fcn.iter().fold(pooled, |x, conv| conv.forward_relu(x));
@@ -93,9 +93,9 @@ impl MaskHead {
         logits.reshape([r * k, s * s]).select(0, maps)
     }
 
-    /// Gives the binary cross-entropy of the true class's map, averaged over all cells of all ROIs.
+    /// Returns the binary cross-entropy of the true class's map, averaged over all cells of all ROIs.
     ///
-    /// `rois` are objects, at least one; `image_sizes` those of the resized images.
+    /// `rois` are on objects, at least one; `image_sizes` are those of the resized images.
     pub fn loss(
         &self,
         features: &[Tensor<4>; 5],

@@ -14,7 +14,7 @@ pub struct BoxMask {
 }
 
 impl BoxMask {
-    /// The mask on an image of `width × height` pixels: those where it reaches `threshold`.
+    /// The mask on an image of `width × height` pixels: the pixels at or above `threshold`.
     ///
     /// `bounds` in pixels of that image.
     pub fn paste(&self, bounds: &BoundingBox, width: u32, height: u32, threshold: f64, pasting: MaskPasting) -> Mask {
@@ -50,7 +50,7 @@ impl BoxMask {
         mask
     }
 
-    /// The value at a place in cells (centres at whole numbers); cells outside are zero.
+    /// The value at a position in cells (centres at whole numbers); cells outside are zero.
     fn bilinear_or_zero(&self, column: f32, row: f32) -> f32 {
         let (left, top) = (column.floor(), row.floor());
         let (fx, fy) = (column - left, row - top);
@@ -63,8 +63,8 @@ impl BoxMask {
     }
 
     /// # Source
-    /// torchvision's `paste_masks_in_image`: the padded mask over the box enlarged alike and cut to whole
-    /// pixels, last ones included; above the threshold, as its examples say.
+    /// torchvision's `paste_masks_in_image`: the padded mask over the box enlarged by the same factor and
+    /// truncated to whole pixels, last ones included; above the threshold, as in its examples.
     fn paste_whole_pixels(&self, bounds: &BoundingBox, width: u32, height: u32, threshold: f32) -> Mask {
         let padded = self.padded();
         let enlarged = padded.size as f32 / self.size as f32;
@@ -114,9 +114,9 @@ impl BoxMask {
     }
 }
 
-/// Between four cells, upper left first: `fx` of the way to the right ones, `fy` of the way to the lower ones.
+/// Between four cells, upper left first: at share `fx` towards the right ones and `fy` towards the lower ones.
 ///
-/// Both originals sum in this order; a cell of probability is one number, not a pixel of three bytes as in `sdg-shape`.
+/// Both originals sum in this order; a cell is one probability, not a pixel of three bytes as in `sdg-shape`.
 fn blend([a, b, c, d]: [f32; 4], fx: f32, fy: f32) -> f32 {
     (a * (1.0 - fx) + b * fx) * (1.0 - fy) + (c * (1.0 - fx) + d * fx) * fy
 }
@@ -140,7 +140,7 @@ mod tests {
     #[test]
     fn whole_pixels_take_the_last_one_in() {
         // The padded box is 10·30/28 wide: from 3 (3.64) to 14 (14.36), 12 pixels for 30 cells; the outermost are
-        // a quarter and less of a cell inside and read 0.75. In y likewise from 5 to 10.
+        // at most a quarter of a cell inside and read 0.75. In y likewise from 5 to 10.
         let mask = full().paste(&BOUNDS, 20, 20, 0.5, MaskPasting::WholePixels);
         assert_eq!(mask.bounds(), Some(BoundingBox { x1: 3.0, y1: 5.0, x2: 15.0, y2: 11.0 }));
     }

@@ -1,4 +1,4 @@
-//! What the mask head is taught: an object's outline as a square over a box.
+//! The target of the mask head: an object's outline as a square over a box.
 //!
 //! Shapes: S side of a mask, R ROIs.
 
@@ -11,15 +11,15 @@ use crate::config::MaskTargets;
 use crate::host::host_values;
 use crate::target::{ObjectMask, union};
 
-/// Sub-cells of a cell along each axis on which COCO's rasteriser walks.
+/// Sub-cells of a cell along each axis in COCO's rasteriser.
 const SUBCELLS: f64 = 5.0;
 
-/// The least side of a box, pixels, that a mask is stretched over; smaller ones would blow up.
+/// The minimum side of a box, pixels, over which a mask is stretched; smaller ones would give huge factors.
 const MIN_SIDE_PX: f32 = 0.1;
 
-/// Gives the wanted mask of an object over a box, `S·S` values from 0 to 1, row by row.
+/// Returns the target mask of an object over a box, `S·S` values from 0 to 1, row by row.
 ///
-/// `mask` and `roi` in pixels of the resized image, which is `[height, width]` large.
+/// `mask` and `roi` in pixels of the resized image, which has `[height, width]` pixels.
 ///
 /// # Source
 /// Detectron2's `PolygonMasks.crop_and_resize` and `BitMasks.crop_and_resize`; torchvision's
@@ -60,7 +60,7 @@ fn pool_mask(mask: &Mask, roi: &Corners, size: usize, alignment: RoiAlignment) -
     host_values(roi_align(map, rois, params))
 }
 
-/// Draws polygons, stretched from a box to `S×S` cells, as the union of what each covers.
+/// Draws polygons, stretched from a box to `S×S` cells, as the union of their areas.
 fn rasterize_in_box(polygons: &[Polygon], roi: &Corners, size: usize) -> Vec<bool> {
     let scale = |low: f32, high: f32| f64::from(size as f32 / (high - low).max(MIN_SIDE_PX));
     let (scale_x, scale_y) = (scale(roi[0], roi[2]), scale(roi[1], roi[3]));
@@ -79,10 +79,10 @@ fn rasterize_in_box(polygons: &[Polygon], roi: &Corners, size: usize) -> Vec<boo
 /// Fills a polygon given in cells as COCO's run-length coder does, by the even-odd rule along columns.
 ///
 /// Vertices are rounded to a grid of fifths of a cell and joined by digital lines. Where a line steps
-/// across the middle of a column, the column turns from outside to inside or back.
+/// across the centre of a column, the column changes between outside and inside.
 ///
 /// # Source
-/// The behaviour of COCO's `rleFrPoly`, rounding towards zero included, on which Detectron2's mask loss stands.
+/// The behaviour of COCO's `rleFrPoly`, including rounding towards zero, on which Detectron2's mask loss is based.
 fn fill_as_coco(vertices: &[[f64; 2]], size: usize, inside: &mut [bool]) {
     let grid: Vec<[i64; 2]> = vertices.iter().map(|v| v.map(|x| (SUBCELLS * x + 0.5) as i64)).collect();
     let mut turns: Vec<Vec<usize>> = vec![Vec::new(); size];
@@ -102,7 +102,7 @@ fn fill_as_coco(vertices: &[[f64; 2]], size: usize, inside: &mut [bool]) {
     }
 }
 
-/// Walks from one grid point to another, one step at a time along the longer axis, and gives each step's ends.
+/// Steps from one grid point to another along the longer axis, and returns each step's ends.
 fn digital_line(from: [i64; 2], to: [i64; 2], mut step: impl FnMut([i64; 2], [i64; 2])) {
     let lengths = [0, 1].map(|axis| (to[axis] - from[axis]).abs());
     let (long, short) = if lengths[0] >= lengths[1] { (0, 1) } else { (1, 0) };
@@ -122,7 +122,7 @@ fn digital_line(from: [i64; 2], to: [i64; 2], mut step: impl FnMut([i64; 2], [i6
     }
 }
 
-/// Notes the row at which a step across the middle of a column turns it.
+/// Records the row at which a step across the centre of a column changes it.
 fn note_turn(before: [i64; 2], after: [i64; 2], size: usize, turns: &mut [Vec<usize>]) {
     if before[0] == after[0] {
         return;
@@ -187,7 +187,7 @@ mod tests {
         let bitmap = ObjectMask::Bitmap(Mask::from_fn(8, 8, |x, _| x < 2));
         let roi = [0.0, 0.0, 8.0, 8.0];
         let legacy = encode(&bitmap, &roi, [8, 8], 2, MaskTargets::Pooled);
-        // Legacy samples stand at corners: 0.5, 1.5, 2.5, 3.5 read 1, 0.5, 0, 0.
+        // Legacy samples are at corners: 0.5, 1.5, 2.5, 3.5 read 1, 0.5, 0, 0.
         assert_eq!(legacy, [0.375, 0.0, 0.375, 0.0]);
         assert_eq!(encode(&bitmap, &roi, [8, 8], 2, MaskTargets::Rasterized), [1.0, 0.0, 1.0, 0.0]);
         let polygon = ObjectMask::Polygons(vec![square(0.0, 0.0, 2.0, 8.0)]);

@@ -1,4 +1,4 @@
-//! The second stage: what each proposal is, and where exactly.
+//! The second stage: the class of each proposal, and its exact box.
 //!
 //! ```text
 //! proposals ─ sample (training) ─ box_head ─┬─ losses             (training)
@@ -44,9 +44,9 @@ pub struct RoiHeads {
     pub box_head: BoxHead,
     /// From the box head's features to classes and box deltas.
     pub box_predictor: BoxPredictor,
-    /// Head for keypoints, where the model has one.
+    /// Head for keypoints, if the model has one.
     pub keypoint_head: Option<KeypointHead>,
-    /// Head for masks, where the model has one.
+    /// Head for masks, if the model has one.
     pub mask_head: Option<MaskHead>,
     #[module(skip)]
     config: RoiHeadsConfig,
@@ -80,7 +80,7 @@ impl RoiHeads {
         }
     }
 
-    /// Matches proposals and objects, and draws those that take part in the losses.
+    /// Matches proposals and objects, and draws those in the losses.
     ///
     /// The objects' own boxes are among the candidates, so that there are positives from the start.
     pub fn sample_rois(
@@ -106,7 +106,7 @@ impl RoiHeads {
         rois
     }
 
-    /// Gives the losses of the drawn proposals.
+    /// Returns the losses of the drawn proposals.
     ///
     /// `image_sizes` are those of the resized images, without padding.
     pub fn losses(
@@ -147,7 +147,7 @@ impl RoiHeads {
         RoiLosses { cls, box_reg, keypoint, mask }
     }
 
-    /// Gives the detections of each image, best first.
+    /// Returns the detections of each image, best first.
     pub async fn detect(
         &self,
         features: &[Tensor<4>; 5],
@@ -176,8 +176,8 @@ impl RoiHeads {
     }
 }
 
-/// The proposals on objects that go through a head while training: those that are `fit` for it (given the
-/// object's index in its image), at most `max` an image.
+/// The proposals on objects that go through a head in training: those that are `fit` for it (given the
+/// object's index in its image), at most `max` per image.
 fn choose_objects(
     rois: &[SampledRoi],
     max: Option<usize>,

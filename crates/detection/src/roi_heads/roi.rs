@@ -6,7 +6,7 @@ use crate::roi_pooler::Roi;
 use super::heatmap::ReadKeypoint;
 use super::mask_paste::BoxMask;
 
-/// A proposal that takes part in the losses.
+/// A proposal in the losses.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SampledRoi {
     /// Box and image.
@@ -15,7 +15,7 @@ pub struct SampledRoi {
     pub class: RoiClass,
 }
 
-/// What a sampled proposal stands for.
+/// The match of a sampled proposal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RoiClass {
     /// No object.

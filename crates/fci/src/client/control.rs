@@ -1,4 +1,4 @@
-//! Control loops: a closure that answers every state, once a millisecond.
+//! Control loops: a closure that answers every state, once per millisecond.
 //!
 //! A closure returns [`ControlFlow::Continue`] with the next command, or [`ControlFlow::Break`] with the last one, which
 //! should leave the arm at rest: the robot ends a motion that still moves with an error.
@@ -14,10 +14,10 @@ use crate::wire::{
     RobotMode, RobotState, Status, Transform, Version,
 };
 
-/// Deviations that no motion of ours comes near: 10 m, 3.12 rad (libfranka's own default).
+/// Deviations larger than any of our motions: 10 m, 3.12 rad (libfranka's own default).
 const ANY_DEVIATION: Deviation = Deviation { translation: 10.0, rotation: 3.12, elbow: 2.0 * std::f64::consts::PI };
 
-/// Which of the robot's own controllers follows the references.
+/// The robot's own controller that follows the references.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum InternalController {
     /// Impedance in the joints.
@@ -35,17 +35,17 @@ impl From<InternalController> for ControllerMode {
     }
 }
 
-/// What a closure answers: the next value or the last one.
+/// The answer of a closure: the next value or the last one.
 pub type Answer<T> = ControlFlow<T, T>;
 
 impl Robot {
     /// Follows joint positions (rad), one for each state.
     ///
-    /// The closure gets the state and the robot's time since the last one (zero at first); the first command must be
-    /// `state.q_desired` but for a small step.
+    /// The closure gets the state and the robot's time since the last one (zero at first); the first command may
+    /// differ from `state.q_desired` only by a small step.
     ///
     /// # Errors
-    /// [`FciError::Motion`] where the robot ended the motion, with its errors; [`FciError::Refused`] where it did not start;
+    /// [`FciError::Motion`] if the robot ended the motion, with its errors; [`FciError::Refused`] if it did not start;
     /// [`FciError::Command`] for a command that is not finite, which ends the motion; the errors of the connection.
     pub fn control_joint_positions(
         &mut self,
@@ -75,7 +75,7 @@ impl Robot {
     /// [`Robot::control_joint_positions`].
     ///
     /// # Errors
-    /// As [`Robot::control_joint_positions`], and [`FciError::Command`] for a matrix that is no pose.
+    /// As [`Robot::control_joint_positions`], and [`FciError::Command`] for a matrix that is not a pose.
     pub fn control_poses(
         &mut self,
         controller: InternalController,
@@ -102,7 +102,7 @@ impl Robot {
         })
     }
 
-    /// Commands torques (N·m), to which the robot adds what gravity needs; see [`Robot::control_joint_positions`].
+    /// Commands torques (N·m), to which the robot adds gravity compensation; see [`Robot::control_joint_positions`].
     ///
     /// # Errors
     /// As [`Robot::control_joint_positions`].
@@ -110,7 +110,7 @@ impl Robot {
         &mut self,
         mut controller: impl FnMut(&RobotState, Duration) -> Answer<[f64; 7]>,
     ) -> Result<RobotState> {
-        // Version 5 has no torques alone: a generator of zero velocities runs beside them.
+        // Version 5 has no pure torque mode: a generator of zero velocities runs in parallel.
         let generator = match self.version {
             Version::V5 => MotionGeneratorMode::JointVelocity,
             Version::V10 => MotionGeneratorMode::None,
@@ -139,8 +139,8 @@ impl Robot {
         })
     }
 
-    /// As [`Robot::control`] without a look at the commands, and `None` leaves a state without an answer: for tests of servers.
-    /// An error of the closure ends the motion.
+    /// As [`Robot::control`] without checks of the commands; `None` leaves a state without an answer: for tests of
+    /// servers. An error of the closure ends the motion.
     #[doc(hidden)]
     pub fn control_unchecked(
         &mut self,
@@ -206,7 +206,7 @@ impl Robot {
             && state.motion_generator_mode == generator
     }
 
-    /// A robot that has left the motion tells why in a second answer to the Move.
+    /// A robot that has left the motion gives the reason in a second answer to the Move.
     fn check_motion(&mut self, id: u32, controller: ControllerMode, generator: MotionGeneratorMode) -> Result<()> {
         if self.runs(controller, generator) {
             return Ok(());
@@ -220,13 +220,14 @@ impl Robot {
             Ok(response) => response,
             Err(error) => return error,
         };
-        // The last state has left the motion, and its rate is zero; what was lost since the one before lowers that one's.
+        // The last state is outside the motion, and its rate is zero; commands lost since the state before reduce that
+        // state's rate.
         let success_rate =
             self.recent.iter().rev().find(|state| state.robot_mode == RobotMode::Move).map_or(0.0, |last| {
                 let num_lost = self.state.message_id.saturating_sub(last.message_id + 1);
                 last.control_command_success_rate * (1.0 - num_lost as f64 / 100.0).max(0.0)
             });
-        // Both tell the same on a Panda; there are servers whose reasons pile up over motions.
+        // On a Panda both are equal; some servers accumulate the reasons over several motions.
         let errors = if self.state.errors.is_empty() { self.state.reflex_reason } else { self.state.errors };
         FciError::Motion { status: response.status, errors, success_rate }
     }
@@ -258,7 +259,7 @@ impl Robot {
         }
     }
 
-    /// Ends a motion whose closure failed; what the robot says to it does not matter beside that failure.
+    /// Ends a motion whose closure failed; the robot's answer is ignored because of that failure.
     fn cancel_motion(&mut self, id: u32) {
         if self.stop().is_ok() {
             let _ = self.session.wait_for(id, "answer to the end of a motion", Some(self.session.timeout()));
@@ -277,7 +278,7 @@ fn with_motion(motion: MotionCommand) -> RobotCommand {
     RobotCommand { motion, ..RobotCommand::default() }
 }
 
-/// Refuses what no robot must be sent.
+/// Refuses commands that no robot may receive.
 fn check(command: &RobotCommand, controller: ControllerMode, generator: MotionGeneratorMode) -> Result<()> {
     let finite = |field: &'static str, values: &[f64]| match values.iter().find(|value| !value.is_finite()) {
         None => Ok(()),

@@ -17,7 +17,7 @@ const MOTION_TIMEOUT: Duration = Duration::from_secs(60);
 pub struct HandConfig {
     /// TCP port of the hand.
     pub port: u16,
-    /// Bounds every wait for a state.
+    /// Limits every wait for a state.
     pub timeout: Duration,
 }
 
@@ -27,7 +27,7 @@ impl Default for HandConfig {
     }
 }
 
-/// A hand, connected. Its calls return when the fingers have stopped.
+/// A connected hand. Its calls return when the fingers have stopped.
 #[derive(Debug)]
 pub struct Hand {
     session: Session,
@@ -40,10 +40,10 @@ pub struct HandStopHandle {
 }
 
 impl HandStopHandle {
-    /// Asks the hand to stop; the call that waits for its motion ends.
+    /// Asks the hand to stop; the call that waits for its motion returns.
     ///
     /// # Errors
-    /// [`FciError::Socket`] where the hand is gone.
+    /// [`FciError::Socket`] if the hand is disconnected.
     pub fn stop(&self) -> Result<()> {
         self.sending.send(|id| HandRequest::Stop.encode(id)).map(drop)
     }
@@ -75,7 +75,7 @@ impl Hand {
     /// Waits for the hand's next state.
     ///
     /// # Errors
-    /// [`FciError::Timeout`] or [`FciError::Closed`] where the hand is gone.
+    /// [`FciError::Timeout`] or [`FciError::Closed`] if the hand is disconnected.
     pub fn read_state(&mut self) -> Result<HandState> {
         self.session.receive(STATE_SIZE, true, HandState::decode)
     }
@@ -83,7 +83,7 @@ impl Hand {
     /// Finds the fingers' range.
     ///
     /// # Errors
-    /// [`FciError::Refused`] where the hand fails or is stopped, and the errors of the connection.
+    /// [`FciError::Refused`] if the hand fails or is stopped, and the errors of the connection.
     pub fn homing(&mut self) -> Result<bool> {
         self.execute(&HandRequest::Homing)
     }
@@ -96,8 +96,8 @@ impl Hand {
         self.execute(&HandRequest::Move { width, speed })
     }
 
-    /// Closes or opens towards a width (m) at a speed (m/s) and presses with a force (N); true where the fingers then stand
-    /// between `width - epsilon_inner` and `width + epsilon_outer` on something.
+    /// Closes or opens towards a width (m) at a speed (m/s) and presses with a force (N); true if the fingers then
+    /// press on something at a width between `width - epsilon_inner` and `width + epsilon_outer`.
     ///
     /// # Errors
     /// As [`Hand::homing`].
@@ -112,7 +112,7 @@ impl Hand {
         self.execute(&HandRequest::Grasp { width, epsilon_inner, epsilon_outer, speed, force })
     }
 
-    /// Stops the fingers and lets go.
+    /// Stops the fingers and releases the part.
     ///
     /// # Errors
     /// As [`Hand::homing`].
@@ -120,7 +120,7 @@ impl Hand {
         self.execute(&HandRequest::Stop)
     }
 
-    /// For another thread, to stop what this one waits for.
+    /// For another thread, to stop the motion for which this one waits.
     pub fn stop_handle(&self) -> HandStopHandle {
         HandStopHandle { sending: self.session.sending.clone() }
     }

@@ -1,18 +1,18 @@
-//! Commands within the robot's limits, whatever was asked for.
+//! Keeps commands within the robot's limits.
 //!
 //! # Source
-//! `limitRate` of libfranka (`rate_limiting.h`), which limits from the robot's last reference: after commands that were lost, the
-//! reference is where the robot went without them, and not where the client wanted it.
+//! `limitRate` of libfranka (`rate_limiting.h`), which limits from the robot's last reference: after lost commands, the
+//! reference is the robot's position without them, not the client's intended position.
 
 use crate::limits::Limits;
 use crate::wire::RobotState;
 
 /// One cycle in seconds.
 const PERIOD_SECS: f64 = 1e-3;
-/// How far below each limit commands stay (rad/s, rad/s², rad/s³), as libfranka's do.
+/// Margin of commands below each limit (rad/s, rad/s², rad/s³), as in libfranka.
 const MARGIN: f64 = 1e-3;
-/// Velocities stay so far below their limits that the robot, which bridges a lost command at constant acceleration, keeps to them
-/// for so many of them, as libfranka 0.9.2 has it.
+/// Number of lost commands for which velocities keep a margin: the robot bridges lost commands at constant acceleration
+/// and must stay within its limits, as in libfranka 0.9.2.
 const NUM_LOST_BEFORE_LIMIT: f64 = 3.0;
 
 /// The joint positions (rad) nearest to `q` that the robot accepts after `state`: velocity, acceleration and jerk within `limits`,
@@ -26,13 +26,13 @@ pub fn limit_joint_positions(limits: &Limits, state: &RobotState, q: &[f64; 7]) 
         let (min_velocity, max_velocity) = ((min_velocity + margin).min(0.0), (max_velocity - margin).max(0.0));
         let acceleration = ((q[joint] - last_q) / PERIOD_SECS - last_dq) / PERIOD_SECS;
         let step = max_jerk * PERIOD_SECS;
-        // Near the velocity's limit, no more acceleration than can be taken back before it.
+        // Near the velocity limit, the acceleration may be no larger than can be reduced before the limit.
         let braking = max_jerk / max_acceleration;
         let largest = (braking * (max_velocity - last_dq)).min(max_acceleration);
         let smallest = (braking * (min_velocity - last_dq)).max(-max_acceleration);
         let acceleration = acceleration.min(largest).max(smallest).clamp(-max_acceleration, max_acceleration);
-        // The jerk comes last, other than in libfranka: the velocity's limit of an FR3 falls on the way to a joint's end, and
-        // following it at once would be a jerk beyond the limit. The margin has room for that.
+        // Unlike in libfranka, the jerk is limited last: the velocity limit of an FR3 decreases towards a joint's end,
+        // and following it at once would require a jerk beyond the limit. The margin is sufficient for that.
         let acceleration = acceleration.clamp(last_ddq - step, last_ddq + step);
         last_q + (last_dq + acceleration * PERIOD_SECS) * PERIOD_SECS
     })
@@ -73,14 +73,15 @@ mod tests {
             let mut state = RobotState { q_desired: [0.0, 0.0, 0.0, -1.5, 0.0, 1.5, 0.0], ..RobotState::default() };
             let (mut fastest, mut hardest) = ([0.0_f64; 7], [0.0_f64; 7]);
             for cycle in 0..6000 {
-                // From one end of the ranges to the other and back, as fast as may be.
+                // From one end of the ranges to the other and back, as fast as allowed.
                 let goal = if cycle % 3000 < 1500 { limits.q_max } else { limits.q_min };
                 let limited = limit_joint_positions(&limits, &state, &goal);
                 let [ddq, jerk] = accept(&mut state, &limited);
                 for joint in 0..7 {
                     let dq = state.dq_desired[joint];
                     let [min, max] = limits.velocity_range(joint, state.q_desired[joint]);
-                    // What limits an FR3's joints 5 and 7 near their ends falls faster than they may brake: that takes a plan.
+                    // The velocity limit of an FR3's joints 5 and 7 near their ends decreases faster than they may
+                    // brake: that requires planning.
                     let can_brake = limits.velocity_near_ends.is_none_or(|near| near[joint].slope < 20.0);
                     assert!(
                         !can_brake || (min..=max).contains(&dq),
@@ -93,7 +94,7 @@ mod tests {
                     hardest[joint] = hardest[joint].max(ddq[joint].abs());
                 }
             }
-            // The limits are used: they are not kept by standing still.
+            // The limits are used: standing still would not pass the test.
             for joint in 0..7 {
                 assert!(fastest[joint] > 0.9 * limits.velocity[joint], "joint {joint}: {}", fastest[joint]);
                 assert!(hardest[joint] > 0.9 * limits.acceleration[joint], "joint {joint}: {}", hardest[joint]);

@@ -1,4 +1,4 @@
-//! A connection to a robot: its state, what can be set, stop and recovery.
+//! A connection to a robot: its state, its settings, stop and recovery.
 
 use std::collections::VecDeque;
 use std::net::{SocketAddr, ToSocketAddrs};
@@ -12,9 +12,9 @@ use crate::wire::{
     STATE_SIZE_V10, Status, Transform, Version,
 };
 
-/// Number of states that are kept for a look back: a second of them.
+/// Number of stored past states: one second.
 const NUM_RECENT_STATES: usize = 1000;
-/// How long a recovery may take.
+/// Maximum duration of a recovery.
 const RECOVERY_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// How to connect.
@@ -22,9 +22,9 @@ const RECOVERY_TIMEOUT: Duration = Duration::from_secs(10);
 pub struct RobotConfig {
     /// TCP port of the robot.
     pub port: u16,
-    /// The version to speak; `None` asks the robot, first with 5, then with what it says.
+    /// The protocol version; `None` asks the robot, first with 5, then with its answer.
     pub version: Option<Version>,
-    /// Bounds every wait for a response or a state.
+    /// Limits every wait for a response or a state.
     pub timeout: Duration,
 }
 
@@ -34,9 +34,9 @@ impl Default for RobotConfig {
     }
 }
 
-/// A robot, connected. Motions stand in `control`: [`Robot::control_joint_positions`] and those beside it.
+/// A connected robot. Motions are in `control`: [`Robot::control_joint_positions`] and the related functions.
 ///
-/// Dropping it closes the connection, and the robot stops a motion that runs.
+/// Dropping it closes the connection, and the robot stops a running motion.
 #[derive(Debug)]
 pub struct Robot {
     pub(super) session: Session,
@@ -54,10 +54,10 @@ pub struct StopHandle {
 }
 
 impl StopHandle {
-    /// Asks the robot to stop; the control loop that runs ends with [`Status::Preempted`].
+    /// Asks the robot to stop; the running control loop ends with [`Status::Preempted`].
     ///
     /// # Errors
-    /// [`FciError::Socket`] where the robot is gone.
+    /// [`FciError::Socket`] if the robot is disconnected.
     pub fn stop(&self) -> Result<()> {
         self.sending.send(|id| Request::StopMove.encode(id, self.version).unwrap_or_default()).map(drop)
     }
@@ -67,8 +67,8 @@ impl Robot {
     /// Connects to a robot by name or IP address (`HOST` or `HOST:PORT`) and waits for its first state.
     ///
     /// # Errors
-    /// [`FciError::Socket`], [`FciError::Version`] for a robot of another version, [`FciError::Timeout`] where no state
-    /// arrives (often a firewall before UDP).
+    /// [`FciError::Socket`], [`FciError::Version`] for a robot of another version, [`FciError::Timeout`] if no state
+    /// arrives (often because a firewall blocks UDP).
     pub fn connect(host: &str, config: &RobotConfig) -> Result<Self> {
         let address = resolve(host, config.port)?;
         match config.version {
@@ -90,7 +90,7 @@ impl Robot {
             [low, high, ..] => u16::from_le_bytes([low, high]),
             _ => 0,
         };
-        // There are servers that welcome every version and go on in their own.
+        // Some servers accept every version and continue in their own.
         if response.status != Status::Success || found != version.number() {
             return Err(FciError::Version { peer: "robot", expected: "5 (Panda) or 10 (FR3)".into(), found });
         }
@@ -105,7 +105,7 @@ impl Robot {
         Ok(robot)
     }
 
-    /// The version that is spoken.
+    /// The protocol version in use.
     pub fn version(&self) -> Version {
         self.version
     }
@@ -120,7 +120,7 @@ impl Robot {
         self.recent.iter()
     }
 
-    /// How the last motion's loop kept its time.
+    /// The timing of the last motion's loop.
     pub fn statistics(&self) -> &ControlStatistics {
         &self.statistics
     }
@@ -128,7 +128,8 @@ impl Robot {
     /// Waits for the next state.
     ///
     /// # Errors
-    /// [`FciError::Timeout`] or [`FciError::Closed`] where the robot is gone, [`FciError::Wire`] for a state that is none.
+    /// [`FciError::Timeout`] or [`FciError::Closed`] if the robot is disconnected, [`FciError::Wire`] for an invalid
+    /// state.
     pub fn read_state(&mut self) -> Result<&RobotState> {
         self.receive(true)?;
         Ok(&self.state)
@@ -139,7 +140,7 @@ impl Robot {
         StopHandle { sending: self.session.sending.clone(), version: self.version }
     }
 
-    /// Stops whatever moves.
+    /// Stops every motion.
     ///
     /// # Errors
     /// [`FciError::Refused`] and the errors of the connection.
@@ -147,7 +148,7 @@ impl Robot {
         self.execute(&Request::StopMove, Some(RECOVERY_TIMEOUT))
     }
 
-    /// Clears the errors after a reflex, at a person's request; nothing moves by it.
+    /// Clears the errors after a reflex, at a person's request, without moving the arm.
     ///
     /// # Errors
     /// [`FciError::Refused`] and the errors of the connection.
@@ -155,7 +156,7 @@ impl Robot {
         self.execute(&Request::AutomaticErrorRecovery, Some(RECOVERY_TIMEOUT))
     }
 
-    /// Sets from when on contacts are reported and collisions stop the robot; not during a motion.
+    /// Sets the thresholds at which contacts are reported and collisions stop the robot; not during a motion.
     ///
     /// # Errors
     /// [`FciError::Refused`] and the errors of the connection.
@@ -179,7 +180,7 @@ impl Robot {
         self.set(&Request::SetCartesianImpedance(*stiffness))
     }
 
-    /// Tells the robot what it carries besides its end effector.
+    /// Tells the robot its load besides its end effector.
     ///
     /// # Errors
     /// [`FciError::Refused`] and the errors of the connection.
@@ -187,7 +188,7 @@ impl Robot {
         self.set(&Request::SetLoad(*load))
     }
 
-    /// Sets the end effector's frame on the nominal one.
+    /// Sets the end effector's frame relative to the nominal one.
     ///
     /// # Errors
     /// [`FciError::Refused`] and the errors of the connection.
@@ -195,7 +196,7 @@ impl Robot {
         self.set(&Request::SetNeToEe(*ne_from_ee))
     }
 
-    /// Sets the frame of external forces and Cartesian stiffness, on the end effector.
+    /// Sets the frame of external forces and Cartesian stiffness, relative to the end effector.
     ///
     /// # Errors
     /// [`FciError::Refused`] and the errors of the connection.
@@ -213,7 +214,7 @@ impl Robot {
         accept(&response, request.command())
     }
 
-    /// Takes the newest state that is newer than the last one: a datagram that the network repeats or delivers late is none.
+    /// Takes the newest state that is newer than the last one; repeated or late datagrams are ignored.
     pub(super) fn receive(&mut self, discard_waiting: bool) -> Result<()> {
         let version = self.version;
         let size = match version {
@@ -221,7 +222,7 @@ impl Robot {
             Version::V10 => STATE_SIZE_V10,
         };
         let mut discard_waiting = discard_waiting;
-        // A number that leapt ahead by mistake would let all later states look old.
+        // A number that is too large by error would make all later states look old.
         let deadline = Instant::now() + self.session.timeout();
         loop {
             let state = self.session.receive(size, discard_waiting, |bytes| RobotState::decode(bytes, version))?;
@@ -270,7 +271,7 @@ fn accept(response: &Response, command: Command) -> Result<()> {
     }
 }
 
-/// The first address of a host, or of a host and a port of its own (`HOST:PORT`).
+/// The first address of a host, or of a host with its own port (`HOST:PORT`).
 pub(super) fn resolve(host: &str, port: u16) -> Result<SocketAddr> {
     let (host, port) = match host.rsplit_once(':').map(|(name, port)| (name, port.parse())) {
         // An IPv6 address has more than one colon.

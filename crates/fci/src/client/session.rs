@@ -22,7 +22,7 @@ pub(crate) struct Sending {
 }
 
 impl Sending {
-    /// Sends the message that `encode` makes of a fresh command number, and returns the number.
+    /// Sends the message that `encode` makes with a new command number, and returns the number.
     pub(crate) fn send(&self, encode: impl FnOnce(u32) -> Vec<u8>) -> Result<u32> {
         let id = self.next_id.fetch_add(1, Ordering::Relaxed);
         let mut stream = self.stream.lock().unwrap_or_else(PoisonError::into_inner);
@@ -31,10 +31,10 @@ impl Sending {
     }
 }
 
-/// What the reading thread hands over: a response, or why there will be no more.
+/// The output of the reading thread: a response, or the reason for its end.
 type Incoming = std::result::Result<(Header, Vec<u8>), WireError>;
 
-/// A connection; dropping it ends the connection.
+/// A connection; dropping it closes it.
 #[derive(Debug)]
 pub(crate) struct Session {
     pub(crate) address: SocketAddr,
@@ -48,7 +48,7 @@ pub(crate) struct Session {
 }
 
 impl Session {
-    /// Connects; `timeout` bounds every wait for a response or a state.
+    /// Connects; `timeout` limits every wait for a response or a state.
     pub(crate) fn connect(address: SocketAddr, kind: HeaderKind, timeout: Duration) -> Result<Self> {
         let stream = TcpStream::connect_timeout(&address, timeout)
             .map_err(|source| socket_error("connect to", address, source))?;
@@ -79,7 +79,7 @@ impl Session {
         })
     }
 
-    /// The port that states shall be sent to.
+    /// The port to which states are sent.
     pub(crate) fn udp_port(&self) -> Result<u16> {
         let local = self.udp.local_addr().map_err(|source| socket_error("open sockets for", self.address, source))?;
         Ok(local.port())
@@ -108,26 +108,26 @@ impl Session {
         }
     }
 
-    /// How long to wait for a response that takes no motion.
+    /// Timeout of a response that involves no motion.
     pub(crate) fn timeout(&self) -> Duration {
         self.timeout
     }
 
-    /// The response of a command, if it is there.
+    /// The response of a command, if it has arrived.
     pub(crate) fn poll(&mut self, id: u32) -> Result<Option<Vec<u8>>> {
         self.fetch()?;
         Ok(self.take_kept(id))
     }
 
-    /// Drops responses that no call waits for.
+    /// Drops responses for which no call waits.
     pub(crate) fn forget_responses(&mut self) {
         self.kept.clear();
     }
 
-    /// Takes over what has arrived.
+    /// Processes the received messages.
     ///
     /// # Errors
-    /// [`FciError::Closed`] where the peer is gone.
+    /// [`FciError::Closed`] if the peer is disconnected.
     fn fetch(&mut self) -> Result<()> {
         loop {
             match self.incoming.try_recv() {
@@ -144,17 +144,17 @@ impl Session {
         Some(self.kept.remove(index).1)
     }
 
-    /// Waits for a datagram of the peer and hands the newest one out.
+    /// Waits for a datagram of the peer and returns the newest one.
     ///
-    /// `decode` turns bytes into a state; a datagram that it refuses is an error. Where `discard_waiting` is set,
-    /// datagrams that lay waiting before the call do not count.
+    /// `decode` turns bytes into a state; a datagram that it refuses is an error. If `discard_waiting` is set,
+    /// datagrams received before the call are ignored.
     pub(crate) fn receive<T>(
         &mut self,
         size: usize,
         discard_waiting: bool,
         mut decode: impl FnMut(&[u8]) -> std::result::Result<T, WireError>,
     ) -> Result<T> {
-        // One byte more than a state shows those that are too long.
+        // One byte more than a state, to detect datagrams that are too long.
         let mut buffer = vec![0; size + 1];
         if discard_waiting {
             while self.receive_waiting(&mut buffer)?.is_some() {}
@@ -168,7 +168,7 @@ impl Session {
                 Err(source) => return Err(socket_error("receive from", self.address, source)),
             }
             if newest.is_none() && Instant::now() >= deadline {
-                // The end of the robot's connection has an error of its own.
+                // The end of the robot's connection has its own error.
                 self.fetch()?;
                 return Err(FciError::Timeout { what: "state", address: self.address, waited: self.timeout });
             }
@@ -182,7 +182,7 @@ impl Session {
         state.map_err(|source| FciError::Wire { address: self.address, source })
     }
 
-    /// A datagram that is there already.
+    /// A datagram that has already arrived.
     fn receive_waiting(&mut self, buffer: &mut [u8]) -> Result<Option<usize>> {
         let address = self.address;
         let failed = |source| socket_error("receive from", address, source);
@@ -211,7 +211,7 @@ impl Session {
         Some(length)
     }
 
-    /// Answers where the states come from.
+    /// Answers to the sender of the states.
     pub(crate) fn answer(&self, datagram: &[u8]) -> Result<()> {
         let peer = self.udp_peer.unwrap_or(self.address);
         self.udp.send_to(datagram, peer).map_err(|source| socket_error("send to", peer, source))?;
@@ -222,7 +222,7 @@ impl Session {
 impl Drop for Session {
     fn drop(&mut self) {
         let stream = self.sending.stream.lock().unwrap_or_else(PoisonError::into_inner);
-        // Where the peer is gone there is nothing left to end.
+        // If the peer is disconnected, nothing remains to be closed.
         let _ = stream.shutdown(Shutdown::Both);
         drop(stream);
         if let Some(reader) = self.reader.take() {
@@ -234,7 +234,7 @@ impl Drop for Session {
 fn read_responses(mut stream: impl Read, kind: HeaderKind, sender: &Sender<Incoming>) {
     loop {
         match read_message(&mut stream, kind) {
-            // An error of the socket is its end, as its closing is.
+            // An error of the socket counts as its end, like a closed connection.
             Err(_) => return,
             Ok(message) => {
                 let is_end = message.is_err();

@@ -1,24 +1,24 @@
-//! How a control loop keeps its time.
+//! The timing of a control loop.
 
 use std::time::{Duration, Instant};
 
-/// A gap between states that is longer is a stall.
+/// A longer gap between states is a stall.
 const STALL: Duration = Duration::from_millis(20);
-/// Answers slower than this share the last bin.
+/// Slower answers are counted in the last bin.
 const NUM_BINS: usize = 5000;
 
 /// Times of one motion's loop.
 #[derive(Debug, Clone)]
 pub struct ControlStatistics {
-    /// States that were answered.
+    /// Number of answered states.
     pub num_answers: u64,
     /// Milliseconds of the robot between the first and the last answered state without an answer: states that came too late.
     pub num_skipped: u64,
     /// Longest time between two states, by this computer's clock.
     pub max_gap: Duration,
-    /// How many such times were longer than 20 ms.
+    /// Number of such times longer than 20 ms.
     pub num_stalls: u64,
-    /// How many answers took so many microseconds, from receiving the state to having sent the command.
+    /// Number of answers by time in microseconds, from receiving the state to having sent the command.
     answer_us: Vec<u32>,
     max_answer: Duration,
     last_received: Option<(Instant, u64)>,
@@ -45,7 +45,7 @@ impl ControlStatistics {
         *self = Self { answer_us: std::mem::take(&mut self.answer_us), ..Self::default() };
     }
 
-    /// Notes that a state has arrived.
+    /// Records that a state has arrived.
     pub(super) fn received(&mut self, message_id: u64) {
         let now = Instant::now();
         if let Some((last, last_id)) = self.last_received {
@@ -56,7 +56,7 @@ impl ControlStatistics {
         self.last_received = Some((now, message_id));
     }
 
-    /// Notes that it was answered.
+    /// Records that it was answered.
     pub(super) fn answered(&mut self) {
         let Some((received, _)) = self.last_received else { return };
         let took = received.elapsed();

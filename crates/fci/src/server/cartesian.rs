@@ -1,4 +1,4 @@
-//! Poses, twists and the elbow: what a command makes of the last one, its limits, and the joints that it needs.
+//! Poses, twists and the elbow: the next reference from a command, its limits, and the joint motion that it needs.
 
 use nalgebra::{Isometry3, SMatrix, Vector6};
 
@@ -9,12 +9,12 @@ use crate::pose::{difference, is_rigid, isometry, moved};
 use crate::wire::MotionCommand;
 use crate::wire::robot_error::{RobotError, RobotErrors};
 
-/// The first pose of a motion may be this far from where the end effector is; what libfranka does not publish, as franka-sim has it.
+/// Largest distance of a motion's first pose from the end effector; not published by libfranka, as in franka-sim.
 const START_TRANSLATION_M: f64 = 0.05;
 const START_ROTATION_RAD: f64 = 0.1;
-/// The first elbow may be this far from the measured one; likewise.
+/// Largest distance of the first elbow from the measured one; likewise.
 const START_ELBOW_RAD: f64 = 0.1;
-/// Below this smallest singular value of the Jacobian no Cartesian motion starts; likewise.
+/// Smallest singular value of the Jacobian at which a Cartesian motion may start; likewise.
 pub const MIN_SINGULAR_VALUE: f64 = 0.05;
 /// Keeps the inverse bounded near singular poses; at 1e-3 a pose is still followed to a micrometre in the next cycle.
 const DAMPING: f64 = 1e-3;
@@ -37,7 +37,7 @@ pub struct CartesianReference {
 }
 
 impl CartesianReference {
-    /// Standing where the joints are.
+    /// At rest at the joints' positions.
     pub fn at_rest(pose: Isometry3<f64>, q: &JointVector) -> Self {
         Self {
             pose,
@@ -49,7 +49,7 @@ impl CartesianReference {
         }
     }
 
-    /// The reference after a commanded pose, or what the robot stops for.
+    /// The reference after a commanded pose, or the error for which the robot stops.
     pub fn after_pose(&self, command: &MotionCommand, is_first: bool, limits: &Limits) -> Result<Self, RobotErrors> {
         if !is_rigid(&command.base_from_ee) {
             return Err(RobotError::CartesianPositionMotionGeneratorInvalidFrameFlag.into());
@@ -66,10 +66,10 @@ impl CartesianReference {
         self.to(pose, motion / PERIOD_SECS, acceleration_error, command, is_first, limits)
     }
 
-    /// The reference after a commanded twist, or what the robot stops for.
+    /// The reference after a commanded twist, or the error for which the robot stops.
     pub fn after_twist(&self, command: &MotionCommand, is_first: bool, limits: &Limits) -> Result<Self, RobotErrors> {
         let twist = Vector6::from(command.twist);
-        // Named after the interface: what is commanded here is the velocity.
+        // The error is named after the interface: the command here is the velocity.
         let acceleration_error = RobotError::CartesianMotionGeneratorAccelerationDiscontinuity;
         self.to(moved(&self.pose, &(twist * PERIOD_SECS)), twist, acceleration_error, command, is_first, limits)
     }
@@ -150,13 +150,13 @@ pub fn smallest_singular_value(jacobian: &Jacobian) -> f64 {
     values.min().max(0.0).sqrt()
 }
 
-/// The joints' step that moves the end effector by `motion` (m and rad in the base frame), and joint 3 by `elbow_step` where
-/// it is commanded; the smallest of all steps where it is not.
+/// The joints' step that moves the end effector by `motion` (m and rad in the base frame), and joint 3 by `elbow_step`
+/// if it is commanded, otherwise the smallest possible step.
 pub fn joint_step(jacobian: &Jacobian, motion: &Vector6<f64>, elbow_step: Option<f64>) -> JointVector {
     match elbow_step {
         None => damped_step(jacobian, motion),
         Some(elbow_step) => {
-            // What joint 3 does is given; the other six do the rest.
+            // The motion of joint 3 is given; the other six do the rest.
             let given = jacobian.column(2) * elbow_step;
             let mut others = *jacobian;
             others.column_mut(2).fill(0.0);
@@ -169,6 +169,6 @@ pub fn joint_step(jacobian: &Jacobian, motion: &Vector6<f64>, elbow_step: Option
 
 fn damped_step(jacobian: &Jacobian, motion: &Vector6<f64>) -> JointVector {
     let square = jacobian * jacobian.transpose() + SMatrix::<f64, 6, 6>::identity() * (DAMPING * DAMPING);
-    // The sum is positive definite, so there is a factor.
+    // The sum is positive definite, so that a factor exists.
     square.cholesky().map_or_else(JointVector::zeros, |factor| jacobian.transpose() * factor.solve(motion))
 }

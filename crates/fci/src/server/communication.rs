@@ -1,13 +1,13 @@
-//! Which cycles were answered.
+//! Records which cycles were answered.
 
 use std::collections::VecDeque;
 
-/// After so many lost commands in a row the robot stops.
+/// Number of successive lost commands after which the robot stops.
 pub const MAX_LOST_IN_A_ROW: u32 = 20;
-/// The success rate counts the last so many cycles.
+/// Number of last cycles in the success rate.
 const WINDOW: usize = 100;
 /// Cycles that a client has for its first command: libfranka leaves some states unanswered while a motion starts. Not
-/// published; without a bound a client that never answers would hold the robot in a motion for ever.
+/// published; without a limit a client that never answers would keep the robot in a motion forever.
 const MAX_CYCLES_TO_START: u32 = 200;
 
 /// Counts the answers of one motion.
@@ -19,7 +19,7 @@ pub struct Communication {
 }
 
 impl Communication {
-    /// Notes whether a cycle was answered.
+    /// Records whether a cycle was answered.
     pub fn count(&mut self, is_answered: bool) {
         self.lost_in_a_row = if is_answered { 0 } else { self.lost_in_a_row + 1 };
         self.has_started |= is_answered;
@@ -37,7 +37,7 @@ impl Communication {
         self.has_started
     }
 
-    /// Whether the robot stops for want of commands.
+    /// Whether the robot stops because of missing commands.
     pub fn is_violated(&self) -> bool {
         self.lost_in_a_row >= if self.has_started { MAX_LOST_IN_A_ROW } else { MAX_CYCLES_TO_START }
     }

@@ -1,4 +1,4 @@
-//! Where a server listens, and when its cycles begin.
+//! The addresses of a server, and the timing of its cycles.
 
 use std::net::{IpAddr, Ipv4Addr};
 use std::time::Duration;
@@ -6,15 +6,15 @@ use std::time::Duration;
 use crate::limits::Limits;
 use crate::wire::{HAND_PORT, ROBOT_PORT};
 
-/// When a cycle begins.
+/// The start of a cycle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Pace {
-    /// A thousand times a second, as a robot does; a command that comes later is lost.
+    /// A thousand times per second, as on a robot; later commands are lost.
     RealTime,
-    /// In motions after the client's answer, or after `max_wait` as a lost command. Time passes in motions and while arm
-    /// or fingers move, so that a run is the same on every machine.
+    /// During motions after the client's answer, or after `max_wait` as a lost command. Time advances during motions
+    /// and while arm or fingers move, so that a run is the same on every machine.
     Lockstep {
-        /// How long a client may take for an answer.
+        /// Maximum time of a client for an answer.
         max_wait: Duration,
     },
 }
@@ -24,7 +24,7 @@ impl Pace {
     pub const LOCKSTEP: Pace = Pace::Lockstep { max_wait: Duration::from_millis(500) };
 }
 
-/// Where and how to serve.
+/// The server's addresses and its timing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ServerConfig {
     /// Address to listen on.
@@ -33,14 +33,14 @@ pub struct ServerConfig {
     pub robot_port: u16,
     /// TCP port of the hand; 0 for a free one.
     pub hand_port: u16,
-    /// When a cycle begins.
+    /// The start of a cycle.
     pub pace: Pace,
-    /// What the client is held to.
+    /// The limits applied to the client.
     pub limits: Limits,
 }
 
 impl Default for ServerConfig {
-    /// A Panda on this computer alone, in real time, on the robot's own ports.
+    /// A Panda on this computer only, in real time, on the robot's own ports.
     fn default() -> Self {
         Self {
             ip: Ipv4Addr::LOCALHOST.into(),

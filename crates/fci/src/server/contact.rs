@@ -1,4 +1,4 @@
-//! External torques as the robot estimates them, and what it calls a contact or a collision.
+//! External torques as the robot estimates them, and the thresholds for contacts and collisions.
 
 use nalgebra::{Isometry3, SMatrix, Vector6};
 
@@ -9,10 +9,10 @@ use crate::wire::robot_error::{RobotError, RobotErrors};
 
 /// Cut-off of the estimate's low-pass filter.
 const CUTOFF_HZ: f64 = 30.0;
-/// Above this reference acceleration of a joint, rad/s², the thresholds for accelerating count.
+/// Above this reference acceleration of a joint, rad/s², the thresholds for acceleration apply.
 const ACCELERATING: f64 = 0.05;
 
-/// The estimate and what it means.
+/// The estimate and its interpretation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Contacts {
     /// External joint torques, N·m.
@@ -46,7 +46,8 @@ impl Default for Contacts {
 }
 
 impl Contacts {
-    /// The estimate one cycle on: `torque` is what acts now, `jacobian` that of the stiffness frame's origin.
+    /// The estimate after one cycle: `torque` is the present external torque, `jacobian` that of the stiffness frame's
+    /// origin.
     pub fn update(
         &mut self,
         torque: &JointVector,
@@ -88,7 +89,7 @@ impl Contacts {
         self.cartesian_collision = std::array::from_fn(|axis| self.wrench_in_stiffness[axis].abs() > upper_force[axis]);
     }
 
-    /// The reflexes that the collisions are.
+    /// The reflexes caused by the collisions.
     pub fn reflexes(&self) -> RobotErrors {
         let joint = self.joint_collision.contains(&true).then_some(RobotError::JointReflex);
         let cartesian = self.cartesian_collision.contains(&true).then_some(RobotError::CartesianReflex);

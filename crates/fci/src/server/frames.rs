@@ -1,4 +1,4 @@
-//! Frames that stand on the flange.
+//! Frames fixed to the flange.
 
 use nalgebra::Isometry3;
 
@@ -14,7 +14,7 @@ pub fn end_effector_at(
     (flange * flange_from_ee, shifted(&jacobian, &flange, flange_from_ee))
 }
 
-/// The Jacobian of a point that stands on the flange.
+/// The Jacobian of a point fixed to the flange.
 pub fn shifted(
     flange_jacobian: &Jacobian,
     base_from_flange: &Isometry3<f64>,

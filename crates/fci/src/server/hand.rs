@@ -1,4 +1,4 @@
-//! The simulated hand: requests in, responses and states out, a cycle at a time. No socket, no clock.
+//! The simulated hand: requests in, responses and states out, cycle by cycle. It has no socket and no clock.
 
 use super::plant::Plant;
 use crate::wire::{HandCommand, HandRequest, HandState, HandStatus};
@@ -8,20 +8,20 @@ pub const HAND_MAX_WIDTH_M: f64 = 0.08;
 /// Its largest speed and continuous force.
 const MAX_SPEED_M_S: f64 = 0.1;
 const MAX_FORCE_N: f64 = 70.0;
-/// Force of motions that grasp nothing.
+/// Force of motions without a grasp.
 const MOVING_FORCE_N: f64 = 30.0;
-/// A width this near is reached.
+/// Tolerance of a reached width.
 const WIDTH_TOLERANCE_M: f64 = 1e-3;
-/// Fingers slower than this for so many cycles have stopped.
+/// Fingers slower than this for this many cycles have stopped.
 const STANDING_M_S: f64 = 2e-3;
 const STANDING_CYCLES: u32 = 100;
-/// No motion takes longer than this many cycles.
+/// Maximum number of cycles of a motion.
 const MAX_CYCLES: u32 = 20_000;
-/// Homing moves at its own speed.
+/// Homing has its own speed.
 const HOMING_SPEED_M_S: f64 = 0.05;
-/// A target beyond this presses on whatever is there.
+/// A target beyond this presses on any object between the fingers.
 const PRESSING_WIDTH_M: f64 = -0.03;
-/// Temperature that the hand reports, °C.
+/// Reported temperature of the hand, °C.
 const TEMPERATURE: u16 = 30;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -52,11 +52,11 @@ pub struct HandOutgoing {
     pub status: HandStatus,
 }
 
-/// A hand and what it does.
+/// A hand and its present action.
 #[derive(Debug, Default)]
 pub struct HandCore {
     running: Option<Running>,
-    /// Between these widths the last grasp holds a part.
+    /// The widths between which the last grasp holds a part.
     grasped: Option<(f64, f64)>,
     time_ms: u32,
     fails: bool,
@@ -64,12 +64,12 @@ pub struct HandCore {
 }
 
 impl HandCore {
-    /// Lets the hand fail from now on, as a broken one does, or work again.
+    /// Makes the hand fail from now on, as a defective one does, or work again.
     pub fn set_failing(&mut self, fails: bool) {
         self.fails = fails;
     }
 
-    /// Responses that are due.
+    /// The due responses.
     pub fn take_responses(&mut self) -> Vec<HandOutgoing> {
         std::mem::take(&mut self.outbox)
     }
@@ -79,7 +79,7 @@ impl HandCore {
         self.running.is_some()
     }
 
-    /// Starts what a client asks, all but Connect; what ran before is aborted.
+    /// Starts a client's request, except Connect; the previous one is aborted.
     pub fn request(&mut self, plant: &mut dyn Plant, command_id: u32, request: &HandRequest) {
         let command = request.command();
         if let Some(running) = self.running.take() {
@@ -122,7 +122,7 @@ impl HandCore {
         }
     }
 
-    /// The client is gone: the fingers stop.
+    /// The client is disconnected: the fingers stop.
     pub fn disconnect(&mut self, plant: &mut dyn Plant) {
         if self.running.take().is_some() {
             plant.move_hand(plant.hand_width().0, MAX_SPEED_M_S, MOVING_FORCE_N);
@@ -130,7 +130,7 @@ impl HandCore {
         self.outbox.clear();
     }
 
-    /// Looks at the fingers after a millisecond.
+    /// Checks the fingers after a millisecond.
     pub fn cycle(&mut self, plant: &mut dyn Plant) {
         self.time_ms = self.time_ms.wrapping_add(1);
         let (width, speed) = plant.hand_width();

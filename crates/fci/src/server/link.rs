@@ -1,4 +1,4 @@
-//! The server's sockets: who is connected, what arrives, what is sent.
+//! The server's sockets: the connected client, received and sent messages.
 
 use std::io::Write;
 use std::net::{IpAddr, Shutdown, SocketAddr, TcpListener, TcpStream, UdpSocket};
@@ -12,10 +12,10 @@ use crate::error::{FciError, Result};
 use crate::message::read_message;
 use crate::wire::{Header, HeaderKind};
 
-/// A client that does not take a response within this time is gone.
+/// Time within which a client must accept a response; otherwise it counts as disconnected.
 const WRITE_TIMEOUT: Duration = Duration::from_millis(100);
-/// A client that connects while another is served waits so long for that one's end, which another thread tells: who has just
-/// disconnected may connect again at once. Shorter than clients wait for an answer (1 s).
+/// Time that a second client waits for the end of the first, which another thread reports: a client that has just
+/// disconnected may connect again at once. Shorter than a client's timeout for an answer (1 s).
 const HANDOVER: Duration = Duration::from_millis(500);
 
 /// Messages of the listening thread and of the reading one to the loop.
@@ -31,7 +31,7 @@ enum LinkEvent {
 pub enum Incoming {
     /// A request of the client: header and body.
     Request(Header, Vec<u8>),
-    /// The client has gone or sent what is no message.
+    /// The client has disconnected or sent an invalid message.
     Gone,
 }
 
@@ -52,7 +52,7 @@ struct WaitingClient {
     until: Instant,
 }
 
-/// A TCP port with one client at a time, and the UDP socket beside it.
+/// A TCP port with one client at a time, and its UDP socket.
 #[derive(Debug)]
 pub struct Link {
     kind: HeaderKind,
@@ -68,10 +68,10 @@ pub struct Link {
 }
 
 impl Link {
-    /// Listens on an address; UDP goes out from a port of its own.
+    /// Listens on an address; UDP is sent from a separate port.
     ///
     /// # Errors
-    /// [`FciError::Socket`], as where the port is taken.
+    /// [`FciError::Socket`], for example if the port is in use.
     pub fn listen(ip: IpAddr, port: u16, kind: HeaderKind) -> Result<Self> {
         let failed = |source| FciError::Socket { action: "listen on", address: format!("{ip}:{port}"), source };
         let listener = TcpListener::bind((ip, port)).map_err(failed)?;
@@ -99,12 +99,12 @@ impl Link {
         })
     }
 
-    /// Where clients connect to.
+    /// The address for clients.
     pub fn address(&self) -> SocketAddr {
         self.address
     }
 
-    /// The next thing that a client has sent, without waiting.
+    /// The next message of a client, without waiting.
     pub fn poll(&mut self) -> Option<Incoming> {
         loop {
             self.admit_waiting();
@@ -136,7 +136,7 @@ impl Link {
         self.client.as_ref().is_some_and(|client| client.udp_port.is_some())
     }
 
-    /// Sends a response; a client that does not take it is gone, which [`Link::poll`] tells.
+    /// Sends a response; a client that does not accept it counts as disconnected, which [`Link::poll`] reports.
     pub fn respond(&mut self, message: &[u8]) {
         if let Some(client) = &mut self.client
             && client.stream.write_all(message).is_err()
@@ -148,7 +148,7 @@ impl Link {
     /// Sends a state.
     pub fn send_state(&self, datagram: &[u8]) {
         if let Some(peer) = self.udp_peer() {
-            // A datagram that does not get through is a lost one.
+            // A datagram that cannot be sent counts as lost.
             let _ = self.udp.send_to(datagram, peer);
         }
     }
@@ -160,13 +160,13 @@ impl Link {
             match self.udp.recv_from(buffer) {
                 Ok((length, from)) if from == peer => return Some(length),
                 Ok(_) => {}
-                // An error of an earlier datagram (port unreachable) arrives here; the next call reads on.
+                // An error of an earlier datagram (port unreachable) arrives here; the next call continues to read.
                 Err(_) => return None,
             }
         }
     }
 
-    /// Lets [`Link::receive`] wait for a datagram for a short while, or not at all.
+    /// Makes [`Link::receive`] wait for a datagram for a short time, or not at all.
     ///
     /// # Errors
     /// [`FciError::Socket`].
@@ -192,7 +192,7 @@ impl Link {
         self.client.as_ref().is_some_and(|client| client.session == session)
     }
 
-    /// Takes a client, or lets it wait where there is one already; a third one is turned away.
+    /// Accepts a client, or lets it wait if there is one already; a third one is refused.
     fn meet(&mut self, stream: TcpStream, address: SocketAddr) {
         if self.client.is_none() {
             self.take_client(stream, address);
@@ -203,7 +203,7 @@ impl Link {
         }
     }
 
-    /// Takes the client that waits once there is room, or turns it away once it has waited long enough.
+    /// Accepts the waiting client when the first has ended, or refuses it after its waiting time.
     fn admit_waiting(&mut self) {
         let Some(waiting) = self.waiting.take() else { return };
         if self.client.is_none() {
@@ -262,7 +262,7 @@ fn read_requests(mut stream: TcpStream, session: u64, kind: HeaderKind, sender: 
     loop {
         let event = match read_message(&mut stream, kind) {
             Ok(Ok((header, payload))) => LinkEvent::Message(session, header, payload),
-            // A header that cannot be ends the connection as its closing does.
+            // An invalid header ends the connection like a closed one.
             Ok(Err(_)) | Err(_) => LinkEvent::Gone(session),
         };
         let is_end = matches!(event, LinkEvent::Gone(..));

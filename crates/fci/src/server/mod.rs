@@ -1,7 +1,8 @@
-//! The server: makes a [`Plant`], a simulated arm with a hand, a Panda on the network (protocol versions 5 and, for the hand, 3).
+//! The server: puts a [`Plant`], a simulated arm with a hand, on the network as a Panda (protocol versions 5 and, for
+//! the hand, 3).
 //!
-//! [`RobotCore`] and [`HandCore`] are the robot without sockets and clock: every cycle takes the client's command or none, and
-//! gives the next state. [`Server`] is the network around them.
+//! [`RobotCore`] and [`HandCore`] are the robot without sockets and clock: every cycle takes the client's command, if
+//! any, and returns the next state. [`Server`] is the network around them.
 
 mod cartesian;
 mod communication;

@@ -5,9 +5,9 @@ use super::plant::{Observation, Plant};
 use super::robot::RobotCore;
 use crate::wire::robot_error::RobotError;
 
-/// Measured velocities overshoot commanded ones: by this much, rad/s or m/s, before the robot stops.
+/// Largest excess of measured velocities over the commanded limit, rad/s or m/s, before the robot stops.
 const MEASURED_VELOCITY_MARGIN: f64 = 0.1;
-/// Measured positions may be this far, rad, beyond the range that commanded ones must keep.
+/// Largest distance of measured positions, rad, beyond the range of commanded ones.
 const MEASURED_POSITION_MARGIN: f64 = 0.01;
 impl RobotCore {
     /// Estimates contacts and compares measurements with their limits.
@@ -15,7 +15,7 @@ impl RobotCore {
         let (flange, flange_jacobian) = plant.flange(&self.observation.q);
         let flange_from_ee = self.settings.flange_from_ee();
         let flange_from_stiffness = flange_from_ee * self.settings.ee_from_stiffness;
-        // The load's weight is known; what else acts is a contact.
+        // The load's weight is known; any other force is a contact.
         let external = self.observation.contact_torque + self.load_torque(&flange, &flange_jacobian);
         self.contacts.update(
             &external,

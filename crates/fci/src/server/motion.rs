@@ -1,4 +1,4 @@
-//! A motion that runs: from a client's command to the next reference, or to the errors that stop the robot.
+//! A running motion: from a client's command to the next reference, or to the errors that stop the robot.
 
 use nalgebra::Isometry3;
 
@@ -11,10 +11,10 @@ use crate::pose::difference;
 use crate::wire::robot_error::{RobotError, RobotErrors};
 use crate::wire::{ControllerMode, MotionCommand, MotionGeneratorMode, RobotCommand};
 
-/// The first position of a motion may be this far from the reference; not published, as franka-sim has it.
+/// Largest distance of a motion's first position from the reference; not published, as in franka-sim.
 const START_POSITION_RAD: f64 = 0.1;
 
-/// Where the end effector is at joint positions: `base_from_ee` and its Jacobian.
+/// The pose of the end effector at joint positions: `base_from_ee` and its Jacobian.
 pub type EndEffectorAt<'a> = &'a dyn Fn(&JointVector) -> (Isometry3<f64>, Jacobian);
 
 /// The references of a robot.
@@ -33,23 +33,23 @@ pub struct References {
 pub struct Motion {
     /// The Move's number.
     pub command_id: u32,
-    /// What makes the torques.
+    /// The controller, which computes the torques.
     pub controller: ControllerMode,
-    /// What makes the references.
+    /// The generator, which computes the references.
     pub generator: MotionGeneratorMode,
-    /// Which cycles were answered.
+    /// The record of answered cycles.
     pub communication: Communication,
-    /// Whether the last command gave the elbow.
+    /// Whether the last command contained the elbow.
     is_elbow_given: bool,
 }
 
 impl Motion {
-    /// A motion that has just been asked for.
+    /// A motion that was just requested.
     pub fn new(command_id: u32, controller: ControllerMode, generator: MotionGeneratorMode) -> Self {
         Self { command_id, controller, generator, communication: Communication::default(), is_elbow_given: false }
     }
 
-    /// The references after a cycle, and whether the motion is at its end; or what stops the robot.
+    /// The references after a cycle, and whether the motion is at its end; or the errors that stop the robot.
     pub fn follow(
         &mut self,
         last: &References,
@@ -71,7 +71,7 @@ impl Motion {
             next.torque = self.checked_torque(last, command, limits)?;
         }
         if command.motion.finished {
-            // A motion must end at rest: what follows is a standing reference.
+            // A motion must end at rest: a constant reference follows.
             let stopped = next.joints.after_velocity(JointVector::zeros());
             let errors = stopped.violations(&next.joints, limits, self.generator);
             if !errors.is_empty() {
@@ -115,7 +115,7 @@ impl Motion {
         if errors.is_empty() { Ok(next) } else { Err(errors) }
     }
 
-    /// libfranka sends no number that is not finite; a robot that got one would stop.
+    /// libfranka sends only finite numbers; a robot that received another one would stop.
     fn check_finite(&self, command: &MotionCommand) -> Result<(), RobotErrors> {
         let is_finite = |values: &[f64]| values.iter().all(|value| value.is_finite());
         let error = match self.generator {
@@ -146,7 +146,7 @@ impl Motion {
     ) -> Result<JointVector, RobotErrors> {
         let torque = JointVector::from(command.torque);
         let mut errors = RobotErrors::default();
-        // Written so that a number that is none counts as out of range.
+        // Written so that NaN counts as out of range.
         if !torque.iter().zip(&limits.torque).all(|(torque, limit)| torque.abs() <= limit * ROUNDING) {
             errors.insert(RobotError::TauJRangeViolation);
         }
@@ -156,7 +156,7 @@ impl Motion {
         if errors.is_empty() { Ok(torque) } else { Err(errors) }
     }
 
-    /// A lost motion command goes on at constant acceleration; a lost torque stays.
+    /// A lost motion command is replaced at constant acceleration; a lost torque keeps its value.
     fn extrapolate(&self, last: &References, end_effector_at: EndEffectorAt) -> References {
         match self.generator {
             MotionGeneratorMode::CartesianPosition | MotionGeneratorMode::CartesianVelocity => {
@@ -167,7 +167,7 @@ impl Motion {
     }
 }
 
-/// In a joint motion, the Cartesian reference is where the joints' is.
+/// In a joint motion, the Cartesian reference follows the joints' reference.
 fn with_joints(last: &References, joints: JointReference, end_effector_at: EndEffectorAt) -> References {
     let (pose, jacobian) = end_effector_at(&joints.q);
     let twist = jacobian * joints.dq;
@@ -182,7 +182,7 @@ fn with_joints(last: &References, joints: JointReference, end_effector_at: EndEf
     References { joints, cartesian, ..*last }
 }
 
-/// In a Cartesian motion, the joints follow: one step of Newton's method a cycle, from where the joints are.
+/// In a Cartesian motion, the joints follow: one Newton step per cycle, from the joints' present positions.
 fn with_cartesian(
     last: &References,
     cartesian: CartesianReference,

@@ -1,4 +1,4 @@
-//! Joint references: what a command makes of the last one, and whether the robot would accept it.
+//! Joint references: the next reference from a command, and whether the robot would accept it.
 
 use super::plant::JointVector;
 use crate::limits::Limits;
@@ -7,7 +7,7 @@ use crate::wire::robot_error::{RobotError, RobotErrors};
 
 /// One cycle in seconds.
 pub const PERIOD_SECS: f64 = 1e-3;
-/// Differences of doubles are no violations.
+/// Rounding differences of doubles are not violations.
 pub(super) const ROUNDING: f64 = 1.0 + 1e-6;
 
 /// The controller's reference of the joints: `q_d`, `dq_d`, `ddq_d`.
@@ -22,7 +22,7 @@ pub struct JointReference {
 }
 
 impl JointReference {
-    /// Standing at a position.
+    /// At rest at a position.
     pub fn at_rest(q: JointVector) -> Self {
         Self { q, dq: JointVector::zeros(), ddq: JointVector::zeros() }
     }
@@ -44,7 +44,7 @@ impl JointReference {
         Self { q: self.q + dq * PERIOD_SECS, dq, ddq: self.ddq }
     }
 
-    /// One cycle of slowing down with the limits' acceleration.
+    /// One cycle of braking with the limits' acceleration.
     pub fn braked(&self, limits: &Limits) -> Self {
         let dq = JointVector::from_fn(|joint, _| {
             let step = limits.acceleration[joint] * PERIOD_SECS;
@@ -53,15 +53,15 @@ impl JointReference {
         self.after_velocity(dq)
     }
 
-    /// Whether the reference stands.
+    /// Whether the reference is at rest.
     pub fn is_at_rest(&self) -> bool {
         self.dq.amax() == 0.0
     }
 
-    /// What the robot would stop for on the way from `previous` to this reference.
+    /// The errors for which the robot would stop between `previous` and this reference.
     ///
-    /// The names are the interface's: too large an acceleration is a discontinuity of the velocity where positions or poses are
-    /// commanded, and of the acceleration where velocities or twists are.
+    /// The names are the interface's: a too large acceleration is a discontinuity of the velocity if positions or poses
+    /// are commanded, and of the acceleration if velocities or twists are commanded.
     pub fn violations(&self, previous: &Self, limits: &Limits, generator: MotionGeneratorMode) -> RobotErrors {
         let jerk = (self.ddq - previous.ddq) / PERIOD_SECS;
         let exceeds = |values: &JointVector, limits: &[f64; 7]| {
@@ -120,7 +120,7 @@ mod tests {
         for (share, expected) in [(0.999, vec![]), (1.001, vec!["joint_motion_generator_acceleration_discontinuity"])] {
             assert_eq!(names(&rest, &rest.after_velocity(with_joint_1([0.0, 7.5e-3 * share, 0.0]).dq)), expected);
         }
-        // At 14.995 rad/s², 15 is reached within the jerk's limit.
+        // At 14.995 rad/s², 15 is reached within the jerk limit.
         let accelerating = with_joint_1([0.0, 1.0, 14.995]);
         for (acceleration, expected) in
             [(14.999, vec![]), (15.001, vec!["joint_motion_generator_velocity_discontinuity"])]

@@ -1,4 +1,4 @@
-//! The state that a robot reports.
+//! The state reported by a robot.
 
 use nalgebra::Isometry3;
 

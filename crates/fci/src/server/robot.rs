@@ -1,4 +1,5 @@
-//! The simulated robot: requests and commands in, responses and states out, a cycle at a time. No socket, no clock.
+//! The simulated robot: requests and commands in, responses and states out, cycle by cycle. It has no socket and no
+//! clock.
 
 use nalgebra::Isometry3;
 
@@ -16,13 +17,14 @@ use crate::wire::{
     Command, ControllerMode, MotionGeneratorMode, MoveRequest, Request, Response, RobotCommand, RobotMode, Status,
 };
 
-/// So many cycles of a recovery the arm yields to what it touches, so that the next motion does not start in a collision.
+/// Number of cycles of a recovery during which the arm yields to contacts, so that the next motion does not start in a
+/// collision.
 const RECOVERY_CYCLES: u32 = 200;
-/// Nothing has to be simulated once the measured velocities are below this, rad/s, or after so many cycles without a motion: an
-/// arm that presses on something may never stand wholly still.
+/// The simulation pauses once the measured velocities are below this, rad/s, or after this many cycles without a
+/// motion: an arm that presses on something may never be completely at rest.
 const STILL: f64 = 1e-3;
 const MAX_SETTLING_CYCLES: u32 = 1000;
-/// A measured joint velocity below this, rad/s, is standing.
+/// A measured joint velocity below this, rad/s, counts as rest.
 const STANDING: f64 = 0.01;
 
 /// A response to be sent.
@@ -32,7 +34,7 @@ pub struct Outgoing {
     pub command_id: u32,
     /// The request's command.
     pub command: Command,
-    /// Status and payload that the client gets.
+    /// Status and payload of the response.
     pub response: Response,
 }
 
@@ -50,22 +52,22 @@ pub struct RobotCore {
     pub(super) mode: RobotMode,
     pub(super) errors: RobotErrors,
     pub(super) reflex_reason: RobotErrors,
-    /// Whether the arm touched itself when the motion began, which then may lead it out.
+    /// Whether the arm was in self-collision at the start of the motion, which may then lead it out.
     pub(super) began_in_self_collision: bool,
     pub(super) time_ms: u64,
     pub(super) torque: JointVector,
     pub(super) torque_rate: JointVector,
     /// Cycles since the last motion.
     idle_cycles: u32,
-    /// Cycles that the present recovery takes yet.
+    /// Remaining cycles of the present recovery.
     recovery_cycles: u32,
-    /// Answers that wait for the arm to stand.
+    /// Answers that wait until the arm is at rest.
     waiting: Vec<Outgoing>,
     outbox: Vec<Outgoing>,
 }
 
 impl RobotCore {
-    /// A robot that stands where the plant is.
+    /// A robot at rest in the plant's configuration.
     pub fn new(plant: &mut dyn Plant, limits: Limits) -> Self {
         let observation = plant.observe();
         let settings = Settings::default();
@@ -98,12 +100,12 @@ impl RobotCore {
         }
     }
 
-    /// Responses that are due.
+    /// The due responses.
     pub fn take_responses(&mut self) -> Vec<Outgoing> {
         std::mem::take(&mut self.outbox)
     }
 
-    /// Whether a motion runs and its client has answered a state.
+    /// Whether a motion is running and its client has answered a state.
     pub fn expects_commands(&self) -> Option<bool> {
         self.motion.as_ref().map(|motion| motion.communication.has_started())
     }
@@ -114,7 +116,7 @@ impl RobotCore {
         self.motion.is_none() && self.waiting.is_empty() && self.references.joints.is_at_rest() && is_still
     }
 
-    /// Lets a millisecond pass for the robot's clock alone.
+    /// Advances only the robot's clock by a millisecond.
     pub fn tick_clock(&mut self) {
         self.time_ms += 1;
     }
@@ -124,12 +126,12 @@ impl RobotCore {
         self.time_ms
     }
 
-    /// What the robot stopped for, until the recovery.
+    /// The errors for which the robot stopped, until the recovery.
     pub fn errors(&self) -> RobotErrors {
         self.errors
     }
 
-    /// Does what a client asks, all but Connect.
+    /// Executes a client's request, except Connect.
     pub fn request(&mut self, plant: &dyn Plant, command_id: u32, request: &Request) {
         let command = request.command();
         let mut rest = Vec::new();
@@ -162,7 +164,7 @@ impl RobotCore {
                 rest = vec![0; 3 * 8 + 16 * 8 + 1];
                 Status::Success
             }
-            // A library of machine code is the one thing that a robot without Franka's software cannot send.
+            // A library of machine code is the only thing that a robot without Franka's software cannot send.
             Request::LoadModelLibrary(_) => Status::Error,
             Request::Connect { .. } | Request::GetRobotModel => Status::NotPossible,
             setter if self.motion.is_some() => {
@@ -174,7 +176,7 @@ impl RobotCore {
         self.outbox.push(Outgoing { command_id, command, response: Response { status, rest } });
     }
 
-    /// The client is gone: a motion that runs is a broken communication.
+    /// The client is disconnected: for a running motion this is a communication error.
     pub fn disconnect(&mut self) {
         if self.motion.is_some() {
             self.abort(RobotError::CommunicationConstraintsViolation.into());
@@ -183,10 +185,10 @@ impl RobotCore {
         self.outbox.clear();
     }
 
-    /// Lets a millisecond pass, with the answer to the present state or none.
+    /// Advances a millisecond, with the answer to the present state, if any.
     ///
     /// # Errors
-    /// The plant's.
+    /// The plant's errors.
     pub fn cycle(&mut self, plant: &mut dyn Plant, command: Option<&RobotCommand>) -> Result<(), String> {
         self.idle_cycles = if self.motion.is_some() { 0 } else { self.idle_cycles.saturating_add(1) };
         self.update_references(plant, command);
@@ -257,7 +259,7 @@ impl RobotCore {
         }
     }
 
-    /// Leaves the motion; the Move is answered when the arm stands.
+    /// Leaves the motion; the Move is answered when the arm is at rest.
     fn end_motion(&mut self, status: Status) {
         let Some(motion) = self.motion.take() else { return };
         self.mode = RobotMode::Idle;
@@ -278,10 +280,10 @@ impl RobotCore {
         let is_external = self.motion.as_ref().is_some_and(|motion| motion.controller == ControllerMode::External);
         let is_collision = errors.contains(RobotError::JointReflex) || errors.contains(RobotError::CartesianReflex);
         if is_collision {
-            // Braking would press on.
+            // Braking would continue to press.
             self.references.joints = JointReference::at_rest(self.observation.q);
         } else if is_external {
-            // The arm is not where the reference is, and must not go there.
+            // The arm is not at the reference, and must not move there.
             self.follow_measurement();
         }
         if let Some(motion) = self.motion.take() {
@@ -327,7 +329,7 @@ impl RobotCore {
         self.waiting.push(outgoing(command_id, command, status));
     }
 
-    /// Sends what waited for the arm to stand.
+    /// Sends the answers that waited until the arm was at rest.
     fn send_waiting(&mut self) {
         let is_standing = self.references.joints.is_at_rest() && self.observation.dq.amax() < STANDING;
         if self.motion.is_some() || !is_standing || self.recovery_cycles > 0 {

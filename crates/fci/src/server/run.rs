@@ -1,4 +1,4 @@
-//! The server's loop: a thousand cycles a second, or one for each answer of the client.
+//! The server's loop: a thousand cycles per second, or one per answer of the client.
 
 use std::net::SocketAddr;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -18,17 +18,17 @@ use crate::wire::{
     RobotCommand, Status, Version,
 };
 
-/// The version that the server speaks.
+/// The server's protocol version.
 const VERSION: Version = Version::V5;
 /// One cycle.
 const PERIOD: Duration = Duration::from_millis(1);
-/// The hand sends its state every so many cycles.
+/// Interval of the hand's states, in cycles.
 const HAND_STATE_CYCLES: u64 = 20;
-/// In lockstep, a state is answered within this time or counts as not answered while a motion begins: libfranka leaves the
-/// first one or two without an answer.
+/// In lockstep, a state must be answered within this time, otherwise it counts as unanswered at the start of a motion:
+/// libfranka leaves the first one or two without an answer.
 const START_WAIT: Duration = Duration::from_millis(50);
 
-/// What the server's owner and its loop share.
+/// Data shared by the server's owner and its loop.
 #[derive(Debug, Default)]
 struct Shared {
     is_stopping: AtomicBool,
@@ -36,7 +36,7 @@ struct Shared {
     statistics: Mutex<ServerStatistics>,
 }
 
-/// A robot on the network. Dropping it ends it.
+/// A robot on the network. Dropping it ends the server.
 #[derive(Debug)]
 pub struct Server {
     robot_address: SocketAddr,
@@ -49,7 +49,7 @@ impl Server {
     /// Serves a plant.
     ///
     /// # Errors
-    /// [`FciError::Socket`], as where the ports are taken.
+    /// [`FciError::Socket`], for example if the ports are in use.
     pub fn start(plant: impl Plant + 'static, config: &ServerConfig) -> Result<Self> {
         let robot_link = Link::listen(config.ip, config.robot_port, HeaderKind::Robot)?;
         let hand_link = Link::listen(config.ip, config.hand_port, HeaderKind::Hand)?;
@@ -70,22 +70,22 @@ impl Server {
         Ok(Self { robot_address, hand_address, shared, thread: Some(thread) })
     }
 
-    /// Where the robot listens.
+    /// The robot's address.
     pub fn robot_address(&self) -> SocketAddr {
         self.robot_address
     }
 
-    /// Where the hand listens.
+    /// The hand's address.
     pub fn hand_address(&self) -> SocketAddr {
         self.hand_address
     }
 
-    /// What has been counted.
+    /// The counters.
     pub fn statistics(&self) -> ServerStatistics {
         *self.shared.statistics.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Lets the hand fail, as a broken one does, or work again: for tests of clients.
+    /// Makes the hand fail, as a defective one does, or work again: for tests of clients.
     pub fn set_hand_failing(&self, fails: bool) {
         self.shared.hand_fails.store(fails, Ordering::Relaxed);
     }
@@ -98,7 +98,7 @@ impl Server {
     /// Ends the server.
     ///
     /// # Errors
-    /// [`FciError::Plant`] where the simulation failed.
+    /// [`FciError::Plant`] if the simulation failed.
     pub fn stop(mut self) -> Result<()> {
         self.end()
     }
@@ -115,7 +115,7 @@ impl Server {
 
 impl Drop for Server {
     fn drop(&mut self) {
-        // Who wants to know calls `stop`.
+        // A caller that needs the result calls `stop`.
         let _ = self.end();
     }
 }
@@ -170,7 +170,7 @@ impl Loop {
         Ok(())
     }
 
-    /// Lets a millisecond pass.
+    /// Advances a millisecond.
     fn cycle(&mut self, command: Option<&RobotCommand>) -> Result<()> {
         self.hand.set_failing(self.shared.hand_fails.load(Ordering::Relaxed));
         if command.is_some() || self.robot.expects_commands() == Some(true) {
@@ -210,7 +210,7 @@ impl Loop {
         *self.shared.statistics.lock().unwrap_or_else(PoisonError::into_inner) = self.statistics;
     }
 
-    /// Waits for the next millisecond; one that came too late is not made up for.
+    /// Waits for the next millisecond; a late one is not compensated.
     fn sleep(&mut self) {
         let now = Instant::now();
         if now < self.next_cycle {
@@ -225,7 +225,7 @@ impl Loop {
         }
     }
 
-    /// In a motion, waits for the answer to the last state; without one, keeps to the clock.
+    /// During a motion, waits for the answer to the last state; otherwise follows the clock.
     fn await_command(&mut self, max_wait: Duration) -> Option<RobotCommand> {
         self.serve_requests();
         let Some(has_started) = self.robot.expects_commands() else {
@@ -247,9 +247,9 @@ impl Loop {
         }
     }
 
-    /// The answer to the last state among what has arrived.
+    /// The answer to the last state among the received messages.
     fn receive_command(&mut self) -> Option<RobotCommand> {
-        // One byte more than a command shows those that are too long.
+        // One byte more than a command, to detect datagrams that are too long.
         let mut buffer = [0; COMMAND_SIZE_V5 + 1];
         while let Some(length) = self.robot_link.receive(&mut buffer) {
             match RobotCommand::decode(&buffer[..length], VERSION) {
@@ -295,7 +295,7 @@ impl Loop {
                 self.statistics.num_motions += u64::from(request.command() == Command::Move);
                 self.robot.request(self.plant.as_ref(), header.command_id, &request);
             }
-            // What is no request, and a request before Connect: this client speaks another protocol.
+            // An invalid request, or a request before Connect: this client uses another protocol.
             (Err(_), _) | (Ok(_), false) => {
                 self.robot_link.close();
                 self.robot.disconnect();
@@ -306,7 +306,7 @@ impl Loop {
     fn serve_hand_request(&mut self, header: &Header, payload: &[u8]) {
         match (HandRequest::decode(header, payload), self.hand_link.is_open()) {
             (Ok(HandRequest::Connect { version, udp_port }), false) => {
-                // Number 1 says another version to Connect, a failure elsewhere.
+                // Number 1 means another version for Connect, and a failure for other commands.
                 let status = if version == HAND_VERSION { HandStatus::Success } else { HandStatus::Fail };
                 self.hand_link.respond(&status.encode(HandCommand::Connect, header.command_id));
                 if status == HandStatus::Success {

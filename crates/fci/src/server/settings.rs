@@ -1,4 +1,4 @@
-//! What a client can set: frames, load, impedances, thresholds.
+//! The client's settings: frames, load, impedances, thresholds.
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
@@ -10,10 +10,10 @@ use crate::wire::{CollisionBehavior, Load, Request, Status};
 const MAX_JOINT_STIFFNESS: f64 = 14250.0;
 const TRANSLATION_STIFFNESS: std::ops::RangeInclusive<f64> = 10.0..=3000.0;
 const ROTATION_STIFFNESS: std::ops::RangeInclusive<f64> = 1.0..=300.0;
-/// The Panda carries 3 kg; more than the robot's own mass is a mistake of units.
+/// The payload of the Panda is 3 kg; more than the robot's own mass is probably an error of units.
 const MAX_LOAD_KG: f64 = 18.0;
 
-/// Mass of Franka's hand, kg, its centre of mass on the flange, m, and its inertia, kg·m².
+/// Mass of Franka's hand, kg, its centre of mass in the flange's frame, m, and its inertia, kg·m².
 pub const HAND_MASS_KG: f64 = 0.73;
 /// In the flange's frame.
 pub const HAND_CENTER_M: [f64; 3] = [-0.01, 0.0, 0.03];
@@ -23,19 +23,19 @@ pub const HAND_INERTIA: [f64; 9] = [0.001, 0.0, 0.0, 0.0, 0.0025, 0.0, 0.0, 0.0,
 /// The settings of a robot.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
-    /// Nominal end effector on the flange: Franka's hand, turned by -45°, its tip 0.1034 m out.
+    /// Nominal end effector relative to the flange: Franka's hand, turned by -45°, its tip at 0.1034 m.
     pub flange_from_ne: Isometry3<f64>,
-    /// End effector on the nominal one.
+    /// End effector relative to the nominal one.
     pub ne_from_ee: Isometry3<f64>,
-    /// Stiffness frame on the end effector.
+    /// Stiffness frame relative to the end effector.
     pub ee_from_stiffness: Isometry3<f64>,
-    /// What the robot carries besides its hand.
+    /// The load of the robot besides its hand.
     pub load: Load,
     /// N·m/rad.
     pub joint_stiffness: JointVector,
     /// N/m and N·m/rad.
     pub cartesian_stiffness: [f64; 6],
-    /// From when on contacts are reported and collisions stop the robot.
+    /// Thresholds at which contacts are reported and collisions stop the robot.
     pub collision: CollisionBehavior,
 }
 
@@ -59,12 +59,12 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// The end effector on the flange.
+    /// The end effector relative to the flange.
     pub fn flange_from_ee(&self) -> Isometry3<f64> {
         self.flange_from_ne * self.ne_from_ee
     }
 
-    /// Does what a setter asks, and answers it; `None` for a request that sets nothing.
+    /// Executes a setter and returns the answer; `None` for a request that sets nothing.
     pub fn set(&mut self, request: &Request) -> Option<Status> {
         Some(match self.accept(request)? {
             true => Status::Success,
@@ -118,7 +118,7 @@ impl Settings {
                 }
                 is_valid
             }
-            // A person leads no simulated robot, and its filters are the client's.
+            // Hand guiding has no meaning for a simulated robot, and its filters are the client's.
             Request::SetGuidingMode(_) => true,
             Request::SetFilters(frequencies) => frequencies.iter().all(|value| *value > 0.0 && *value <= 1000.0),
             _ => return None,

@@ -1,8 +1,8 @@
-//! What a server counts.
+//! The server's counters.
 
 use std::time::Duration;
 
-/// A cycle this much too late, by the computer's clock, is a stall.
+/// Delay of a cycle, by the computer's clock, that counts as a stall.
 pub const STALL: Duration = Duration::from_millis(20);
 
 /// Counts since the server started.
@@ -10,18 +10,18 @@ pub const STALL: Duration = Duration::from_millis(20);
 pub struct ServerStatistics {
     /// States that were sent.
     pub num_states: u64,
-    /// Cycles of motions, from the first command of each on.
+    /// Number of cycles of motions, from the first command of each.
     pub num_motion_cycles: u64,
-    /// Commands that came in their own cycle.
+    /// Number of commands that arrived in their own cycle.
     pub num_commands: u64,
-    /// Commands that came too late.
+    /// Number of commands that arrived too late.
     pub num_late: u64,
-    /// Datagrams that are no commands.
+    /// Number of datagrams that are not commands.
     pub num_invalid: u64,
     /// Motions that were started.
     pub num_motions: u64,
-    /// Cycles that began more than 20 ms too late.
+    /// Number of cycles that started more than 20 ms too late.
     pub num_stalls: u64,
-    /// The latest beginning of a cycle.
+    /// The largest delay of a cycle's start.
     pub max_lateness: Duration,
 }

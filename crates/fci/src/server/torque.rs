@@ -21,7 +21,7 @@ pub fn joint_impedance(robot: &Observation, reference: &JointReference, stiffnes
     spring + damping.component_mul(&(reference.dq - robot.dq)) + robot.mass * reference.ddq + robot.coriolis
 }
 
-/// What the Cartesian impedance needs to know of the end effector.
+/// The data of the end effector for Cartesian impedance.
 #[derive(Debug, Clone, Copy)]
 pub struct EndEffector {
     /// Measured pose of the end effector.
@@ -30,12 +30,12 @@ pub struct EndEffector {
     pub jacobian: Jacobian,
     /// Desired pose of the end effector.
     pub base_from_ee_desired: Isometry3<f64>,
-    /// Wanted, m/s and rad/s in the base frame.
+    /// Desired twist, m/s and rad/s in the base frame.
     pub twist_desired: Vector6<f64>,
 }
 
-/// Impedance of the end effector: `Jᵀ (K e + D (v_d - J dq)) + M ddq_d + coriolis`, and a weak one for the elbow in the null
-/// space. `K` in N/m and N·m/rad along the base's axes; `D` damps each direction with the inertia that is felt in it.
+/// Impedance of the end effector: `Jᵀ (K e + D (v_d - J dq)) + M ddq_d + coriolis`, and a weak one for the elbow in the
+/// null space. `K` in N/m and N·m/rad along the base's axes; `D` damps each direction with the effective inertia in it.
 pub fn cartesian_impedance(
     robot: &Observation,
     end_effector: &EndEffector,
@@ -58,7 +58,7 @@ pub fn cartesian_impedance(
     jacobian.transpose() * wrench + (elbow - felt_by_ee) + robot.mass * reference.ddq + robot.coriolis
 }
 
-/// The inertia that is felt at the end effector: `(J M⁻¹ Jᵀ)⁻¹`, damped at singular poses.
+/// The effective inertia at the end effector: `(J M⁻¹ Jᵀ)⁻¹`, damped at singular poses.
 fn operational_inertia(robot: &Observation, jacobian: &Jacobian) -> SMatrix<f64, 6, 6> {
     let inverse = robot.mass.try_inverse().unwrap_or_else(SMatrix::identity);
     let mobility = jacobian * inverse * jacobian.transpose() + SMatrix::<f64, 6, 6>::identity() * 1e-4;
@@ -71,7 +71,7 @@ pub fn load_gravity(mass: f64, flange_jacobian: &Jacobian, lever: &nalgebra::Vec
     JointVector::from_fn(|joint, _| {
         let column = flange_jacobian.column(joint);
         let (linear, angular) = (column.fixed_rows::<3>(0), column.fixed_rows::<3>(3));
-        // Vertical speed of the load's centre for a rad/s of the joint.
+        // Vertical speed of the load's centre per rad/s of the joint.
         let vertical = linear[2] + angular[0] * lever[1] - angular[1] * lever[0];
         mass * GRAVITY_M_S2 * vertical
     })

@@ -1,10 +1,10 @@
-//! Packed little-endian fields, read and written by one list of fields.
+//! Packed little-endian fields, read and written through one list of fields.
 //!
 //! A message names its fields once, in a function generic over [`Codec`]; an [`Encoder`] writes them, a [`Decoder`] fills them.
 
 use crate::wire_error::WireError;
 
-/// How a message keeps its real numbers.
+/// Precision of a message's real numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Real {
     /// 4 bytes.
@@ -18,10 +18,10 @@ pub trait Codec {
     /// The next bytes, in order.
     ///
     /// # Errors
-    /// [`WireError::Short`] where a message ends too early.
+    /// [`WireError::Short`] if a message ends too early.
     fn bytes(&mut self, bytes: &mut [u8]) -> Result<(), WireError>;
 
-    /// How [`Codec::reals`] are kept.
+    /// Precision of [`Codec::reals`].
     fn real(&self) -> Real;
 
     /// One byte.
@@ -98,7 +98,7 @@ pub trait Codec {
         values.iter_mut().try_for_each(|value| self.f64(value))
     }
 
-    /// Numbers as wide as [`Codec::real`] says, in order.
+    /// Numbers of the precision of [`Codec::real`], in order.
     ///
     /// # Errors
     /// As [`Codec::bytes`].
@@ -115,7 +115,7 @@ pub trait Codec {
     }
 }
 
-/// Writes fields behind each other.
+/// Writes fields in sequence.
 #[derive(Debug)]
 pub struct Encoder {
     bytes: Vec<u8>,
@@ -163,7 +163,7 @@ impl<'a> Decoder<'a> {
     /// Ends the reading.
     ///
     /// # Errors
-    /// [`WireError::Long`] where bytes are left.
+    /// [`WireError::Long`] if bytes remain.
     pub fn finish(self) -> Result<(), WireError> {
         if self.position == self.bytes.len() {
             return Ok(());

@@ -3,7 +3,7 @@
 use super::version::Version;
 use crate::wire_error::WireError;
 
-/// Which command; the numbers depend on the version.
+/// A command; the numbers depend on the version.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[allow(missing_docs, reason = "each is described at the request of its name")]
 pub enum Command {
@@ -73,7 +73,7 @@ impl Command {
         command.copied().ok_or(WireError::Value { field: "command", found: number })
     }
 
-    /// The number in a version, `None` for a command that it does not have.
+    /// The number in a version, `None` for a command that the version lacks.
     pub fn number(self, version: Version) -> Option<u32> {
         Self::table(version).iter().position(|&command| command == self).map(|index| index as u32)
     }

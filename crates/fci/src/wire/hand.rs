@@ -55,13 +55,13 @@ pub enum HandRequest {
     },
     /// Homing: measures the range of the fingers.
     Homing,
-    /// Closes to a width and presses; successful where the fingers stand between `width - inner` and `width + outer`.
+    /// Closes to a width and presses; successful if the fingers are then between `width - inner` and `width + outer`.
     Grasp {
         /// The part's width, m.
         width: f64,
-        /// How much narrower it may be.
+        /// Tolerance below it.
         epsilon_inner: f64,
-        /// How much wider it may be.
+        /// Tolerance above it.
         epsilon_outer: f64,
         /// Closing speed, m/s.
         speed: f64,
@@ -75,12 +75,12 @@ pub enum HandRequest {
         /// Speed, m/s.
         speed: f64,
     },
-    /// Stops and lets go.
+    /// Stops and releases the part.
     Stop,
 }
 
 impl HandRequest {
-    /// Which command this is.
+    /// The command of this request.
     pub fn command(&self) -> HandCommand {
         match self {
             HandRequest::Connect { .. } => HandCommand::Connect,
@@ -134,7 +134,7 @@ impl HandRequest {
     }
 }
 
-/// How a command of the hand ended.
+/// The result of a hand command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u16)]
 pub enum HandStatus {
@@ -142,7 +142,7 @@ pub enum HandStatus {
     Success = 0,
     /// The hand failed; to Connect: another version.
     Fail = 1,
-    /// Done, but not with what was wanted: the part is not within the tolerance.
+    /// Done, but without the wanted result: the part is not within the tolerance.
     Unsuccessful = 2,
     /// Another command ended it.
     Aborted = 3,

@@ -1,4 +1,4 @@
-//! What stands before every message over TCP.
+//! The header of every message over TCP.
 
 use super::codec::{Codec, Decoder, Encoder, Real};
 use crate::wire_error::WireError;
@@ -7,10 +7,10 @@ use crate::wire_error::WireError;
 pub const HEADER_SIZE: usize = 12;
 /// Size of the hand's header.
 pub const HAND_HEADER_SIZE: usize = 10;
-/// No message over TCP is larger; the largest is the robot's description in version 10 (about 30 kB).
+/// Maximum size of a message over TCP; the largest is the robot's description in version 10 (about 30 kB).
 pub const MAX_MESSAGE_SIZE: u32 = 4 << 20;
 
-/// Whose header: the robot's command number has four bytes, the hand's two.
+/// The kind of header: the robot's command number has four bytes, the hand's two.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum HeaderKind {
     /// 12 bytes.
@@ -29,12 +29,12 @@ impl HeaderKind {
     }
 }
 
-/// Which command a message belongs to and how long it is.
+/// The command of a message, and its length.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Header {
     /// Number of the command.
     pub command: u32,
-    /// Chosen by the client; the response has the same.
+    /// Chosen by the client; repeated in the response.
     pub command_id: u32,
     /// Size of header and payload.
     pub size: u32,
@@ -65,7 +65,7 @@ impl Header {
         Ok(header)
     }
 
-    /// Size of what follows the header.
+    /// Size of the data after the header.
     pub fn payload_size(&self, kind: HeaderKind) -> usize {
         self.size as usize - kind.size()
     }

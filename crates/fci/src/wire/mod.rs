@@ -1,8 +1,8 @@
 //! The messages, byte for byte: packed, little-endian.
 //!
-//! Written from the layout in `research_interface` of libfranka-common (Apache-2.0; version 5 is commit b482ee0, version 10
-//! d96c221). TCP carries requests and responses, each behind a [`Header`]; UDP carries [`RobotState`] one way and
-//! [`RobotCommand`] the other, each a whole datagram.
+//! Written from the layout in `research_interface` of libfranka-common (Apache-2.0; version 5 is commit b482ee0,
+//! version 10 d96c221). TCP carries requests and responses, each after a [`Header`]; UDP carries [`RobotState`] in one
+//! direction and [`RobotCommand`] in the other, each in one datagram.
 
 pub(crate) mod codec;
 mod commands;

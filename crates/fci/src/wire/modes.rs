@@ -2,7 +2,7 @@
 
 use crate::wire_error::WireError;
 
-/// An enum of bytes, and its names for messages.
+/// Defines an enum of bytes, and its names for messages.
 macro_rules! byte_enum {
     ($(#[$doc:meta])* $name:ident, $what:literal { $($(#[$variant_doc:meta])* $variant:ident = $value:literal),+ $(,)? }) => {
         $(#[$doc])*
@@ -28,7 +28,7 @@ macro_rules! byte_enum {
 }
 
 byte_enum! {
-    /// Which generator makes the references; `Idle` where none does.
+    /// The generator of the references; `Idle` if there is none.
     MotionGeneratorMode, "motion_generator_mode" {
         /// No motion.
         Idle = 0,
@@ -46,7 +46,7 @@ byte_enum! {
 }
 
 byte_enum! {
-    /// Which controller makes the torques.
+    /// The controller, which computes the torques.
     ControllerMode, "controller_mode" {
         /// The robot's own joint impedance.
         JointImpedance = 0,
@@ -60,17 +60,17 @@ byte_enum! {
 }
 
 byte_enum! {
-    /// What the robot is doing.
+    /// The robot's mode.
     RobotMode, "robot_mode" {
         /// Any other mode.
         Other = 0,
-        /// Standing, ready for a motion.
+        /// At rest, ready for a motion.
         Idle = 1,
         /// In a motion.
         Move = 2,
-        /// Led by hand.
+        /// Guided by hand.
         Guiding = 3,
-        /// Stopped by an error that waits for recovery.
+        /// Stopped by an error, waiting for recovery.
         Reflex = 4,
         /// Stopped by a person.
         UserStopped = 5,

@@ -8,7 +8,7 @@ use super::state::{IDENTITY, Transform};
 use super::version::Version;
 use crate::wire_error::WireError;
 
-/// How far a motion may be off.
+/// Tolerances of a motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Deviation {
     /// Translation, m.
@@ -22,9 +22,9 @@ pub struct Deviation {
 /// Starts a motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MoveRequest {
-    /// What makes the torques.
+    /// The controller.
     pub controller: ControllerMode,
-    /// What makes the references.
+    /// The generator.
     pub generator: MotionGeneratorMode,
     /// Largest deviation along the path.
     pub max_path_deviation: Deviation,
@@ -32,8 +32,8 @@ pub struct MoveRequest {
     pub max_goal_deviation: Deviation,
 }
 
-/// From when on contacts and collisions are reported and stop the robot; lower thresholds for contacts, upper ones for collisions.
-/// Torques in N·m, forces in N and N·m.
+/// The thresholds at which contacts and collisions are reported and stop the robot; lower thresholds for contacts,
+/// upper ones for collisions. Torques in N·m, forces in N and N·m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CollisionBehavior {
     /// While accelerating.
@@ -70,7 +70,7 @@ impl CollisionBehavior {
     }
 }
 
-/// What the robot carries besides its end effector.
+/// The load of the robot besides its end effector.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Load {
     /// Mass, kg.
@@ -94,7 +94,7 @@ pub enum Request {
     },
     /// Starts a motion.
     Move(MoveRequest),
-    /// Ends the motion that runs.
+    /// Ends the running motion.
     StopMove,
     /// Reads a virtual wall (version 5).
     GetCartesianLimit(u32),
@@ -104,11 +104,11 @@ pub enum Request {
     SetJointImpedance([f64; 7]),
     /// Sets the internal controller's stiffness, N/m and N·m/rad.
     SetCartesianImpedance([f64; 6]),
-    /// Sets what a person may lead: x, y, z, roll, pitch, yaw, elbow.
+    /// Sets the directions for hand guiding: x, y, z, roll, pitch, yaw, elbow.
     SetGuidingMode([bool; 7]),
-    /// Sets the stiffness frame on the end effector.
+    /// Sets the stiffness frame relative to the end effector.
     SetEeToStiffness(Transform),
-    /// Sets the end effector's frame on the nominal one.
+    /// Sets the end effector's frame relative to the nominal one.
     SetNeToEe(Transform),
     /// Sets the load.
     SetLoad(Load),
@@ -125,7 +125,7 @@ pub enum Request {
 const NO_DEVIATION: Deviation = Deviation { translation: 0.0, rotation: 0.0, elbow: 0.0 };
 
 impl Request {
-    /// Which command this is.
+    /// The command of this request.
     pub fn command(&self) -> Command {
         match self {
             Request::Connect { .. } => Command::Connect,
@@ -146,7 +146,7 @@ impl Request {
         }
     }
 
-    /// The message, header included; `None` for a command that the version does not have.
+    /// The message, header included; `None` for a command that the version lacks.
     pub fn encode(&self, command_id: u32, version: Version) -> Option<Vec<u8>> {
         let number = self.command().number(version)?;
         let mut encoder = Encoder::new(Real::F64);
@@ -229,7 +229,7 @@ impl MoveRequest {
             2 => ControllerMode::External,
             found => return Err(WireError::Value { field: "controller mode", found }),
         };
-        // A Move counts from the joint positions on, a state from idle on.
+        // A Move numbers its modes from joint positions, a state from idle.
         let mut generator = u32::from(self.generator as u8).wrapping_sub(1);
         codec.u32(&mut generator)?;
         self.generator = match (generator, version) {

@@ -10,7 +10,7 @@ pub const COMMAND_SIZE_V5: usize = 370;
 /// Size of a command in version 10.
 pub const COMMAND_SIZE_V10: usize = 371;
 
-/// The part that a motion generator reads; which fields count is a matter of the Move that runs.
+/// The data for a motion generator; the running Move determines which fields are used.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MotionCommand {
     /// Joint positions, rad (`q_c`).
@@ -21,7 +21,7 @@ pub struct MotionCommand {
     pub base_from_ee: Transform,
     /// Twist of the end effector in the base frame, m/s and rad/s (`O_dP_EE_c`).
     pub twist: [f64; 6],
-    /// Position of joint 3 and sign of joint 4, where `valid_elbow`.
+    /// Position of joint 3 and sign of joint 4, if `valid_elbow`.
     pub elbow: [f64; 2],
     /// Whether `elbow` is valid.
     pub valid_elbow: bool,
@@ -46,13 +46,13 @@ impl Default for MotionCommand {
 /// The client's command for one millisecond.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct RobotCommand {
-    /// Number of the state that this answers.
+    /// Number of the answered state.
     pub message_id: u64,
     /// For the motion generator.
     pub motion: MotionCommand,
     /// Torques without gravity, N·m (`tau_J_d`).
     pub torque: [f64; 7],
-    /// Whether the torque control ends (version 10 alone).
+    /// Whether the torque control ends (only version 10).
     pub torque_finished: bool,
 }
 

@@ -5,10 +5,10 @@ use std::fmt;
 use crate::wire::codec::Codec;
 use crate::wire_error::WireError;
 
-/// Names the errors, in the order of their bits.
+/// Defines the errors, in the order of their bits.
 macro_rules! robot_errors {
     ($($(#[$doc:meta])* $variant:ident = $name:literal),+ $(,)?) => {
-        /// Why the robot stopped a motion.
+        /// The reason why the robot stopped a motion.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
         #[repr(u8)]
         pub enum RobotError {
@@ -35,9 +35,9 @@ pub const NUM_ERRORS: usize = 41;
 robot_errors! {
     /// A joint left its range.
     JointPositionLimitsViolation = "joint_position_limits_violation",
-    /// The end effector left its room.
+    /// The end effector left its workspace.
     CartesianPositionLimitsViolation = "cartesian_position_limits_violation",
-    /// The arm would touch itself.
+    /// The arm would collide with itself.
     SelfCollisionAvoidanceViolation = "self_collision_avoidance_violation",
     /// A joint is too fast.
     JointVelocityViolation = "joint_velocity_violation",
@@ -45,39 +45,39 @@ robot_errors! {
     CartesianVelocityViolation = "cartesian_velocity_violation",
     /// The force controller left its limits.
     ForceControlSafetyViolation = "force_control_safety_violation",
-    /// The external torque on a joint passed its threshold.
+    /// The external torque on a joint exceeded its threshold.
     JointReflex = "joint_reflex",
-    /// The external force passed its threshold.
+    /// The external force exceeded its threshold.
     CartesianReflex = "cartesian_reflex",
-    /// The goal pose was missed by more than allowed.
+    /// The goal pose was missed by more than the tolerance.
     MaxGoalPoseDeviationViolation = "max_goal_pose_deviation_violation",
     /// The path was left.
     MaxPathPoseDeviationViolation = "max_path_pose_deviation_violation",
     /// The velocity along the path was not kept.
     CartesianVelocityProfileSafetyViolation = "cartesian_velocity_profile_safety_violation",
-    /// The first position is not where the arm is.
+    /// The first position differs from the arm's position.
     JointPositionMotionGeneratorStartPoseInvalid = "joint_position_motion_generator_start_pose_invalid",
     /// A commanded position is out of range.
     JointMotionGeneratorPositionLimitsViolation = "joint_motion_generator_position_limits_violation",
     /// A commanded joint velocity is too large.
     JointMotionGeneratorVelocityLimitsViolation = "joint_motion_generator_velocity_limits_violation",
-    /// The commanded velocity jumps: too large an acceleration.
+    /// The commanded velocity jumps: the acceleration is too large.
     JointMotionGeneratorVelocityDiscontinuity = "joint_motion_generator_velocity_discontinuity",
-    /// The commanded acceleration jumps: too large a jerk.
+    /// The commanded acceleration jumps: the jerk is too large.
     JointMotionGeneratorAccelerationDiscontinuity = "joint_motion_generator_acceleration_discontinuity",
-    /// The first pose is not where the end effector is.
+    /// The first pose differs from the end effector's pose.
     CartesianPositionMotionGeneratorStartPoseInvalid = "cartesian_position_motion_generator_start_pose_invalid",
     /// The commanded elbow is out of range or too fast.
     CartesianMotionGeneratorElbowLimitViolation = "cartesian_motion_generator_elbow_limit_violation",
     /// The commanded twist is too large.
     CartesianMotionGeneratorVelocityLimitsViolation = "cartesian_motion_generator_velocity_limits_violation",
-    /// The commanded twist jumps: too large an acceleration.
+    /// The commanded twist jumps: the acceleration is too large.
     CartesianMotionGeneratorVelocityDiscontinuity = "cartesian_motion_generator_velocity_discontinuity",
-    /// The commanded acceleration jumps: too large a jerk.
+    /// The commanded acceleration jumps: the jerk is too large.
     CartesianMotionGeneratorAccelerationDiscontinuity = "cartesian_motion_generator_acceleration_discontinuity",
     /// The elbow changed its side.
     CartesianMotionGeneratorElbowSignInconsistent = "cartesian_motion_generator_elbow_sign_inconsistent",
-    /// The first elbow is not where the arm is.
+    /// The first elbow differs from the arm's elbow.
     CartesianMotionGeneratorStartElbowInvalid = "cartesian_motion_generator_start_elbow_invalid",
     /// The wanted force was not reached.
     ForceControllerDesiredForceToleranceViolation = "force_controller_desired_force_tolerance_violation",
@@ -87,15 +87,15 @@ robot_errors! {
     CommunicationConstraintsViolation = "communication_constraints_violation",
     /// The motors took too much power.
     PowerLimitViolation = "power_limit_violation",
-    /// The pose needs a joint out of its range.
+    /// The pose requires a joint outside its range.
     CartesianMotionGeneratorJointPositionLimitsViolation = "cartesian_motion_generator_joint_position_limits_violation",
-    /// The twist needs too fast a joint.
+    /// The twist requires a too large velocity of a joint.
     CartesianMotionGeneratorJointVelocityLimitsViolation = "cartesian_motion_generator_joint_velocity_limits_violation",
-    /// The pose needs too large an acceleration of a joint.
+    /// The pose requires a too large acceleration of a joint.
     CartesianMotionGeneratorJointVelocityDiscontinuity = "cartesian_motion_generator_joint_velocity_discontinuity",
-    /// The pose needs too large a jerk of a joint.
+    /// The pose requires a too large jerk of a joint.
     CartesianMotionGeneratorJointAccelerationDiscontinuity = "cartesian_motion_generator_joint_acceleration_discontinuity",
-    /// The commanded pose is no rotation and translation.
+    /// The commanded pose is not a rotation and translation.
     CartesianPositionMotionGeneratorInvalidFrameFlag = "cartesian_position_motion_generator_invalid_frame_flag",
     /// The commanded torque jumps.
     ControllerTorqueDiscontinuity = "controller_torque_discontinuity",
@@ -128,12 +128,12 @@ impl fmt::Display for RobotError {
 pub struct RobotErrors(u64);
 
 impl RobotErrors {
-    /// Whether there is none.
+    /// Whether the set is empty.
     pub const fn is_empty(self) -> bool {
         self.0 == 0
     }
 
-    /// Whether an error is among them.
+    /// Whether it contains an error.
     pub const fn contains(self, error: RobotError) -> bool {
         self.0 >> error as u8 & 1 == 1
     }

@@ -1,4 +1,4 @@
-//! The robot's state, 1000 times a second.
+//! The robot's state, sent 1000 times per second.
 
 use super::codec::{Codec, Decoder, Encoder};
 use super::modes::{ControllerMode, MotionGeneratorMode, RobotMode};
@@ -14,10 +14,10 @@ pub const STATE_SIZE_V10: usize = 1377;
 /// A homogeneous transform, column by column; `base_from_ee[12..15]` is the translation in metres.
 pub type Transform = [f64; 16];
 
-/// Standing at the origin.
+/// The identity.
 pub(crate) const IDENTITY: Transform = [1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.];
 
-/// The state that the robot sends each millisecond. In brackets the field's name in libfranka.
+/// The state that the robot sends every millisecond. In brackets the field's name in libfranka.
 ///
 /// # Units and frames
 /// rad, m, kg, N, N·m and seconds; `base` is libfranka's `O`, `flange` `F`, `ne` the nominal end effector, `ee` the end
@@ -30,25 +30,25 @@ pub struct RobotState {
     pub base_from_ee: Transform,
     /// Pose of the reference (`O_T_EE_d`).
     pub base_from_ee_desired: Transform,
-    /// End effector on the flange (`F_T_EE`).
+    /// End effector relative to the flange (`F_T_EE`).
     pub flange_from_ee: Transform,
-    /// Stiffness frame on the end effector (`EE_T_K`).
+    /// Stiffness frame relative to the end effector (`EE_T_K`).
     pub ee_from_stiffness: Transform,
-    /// Nominal end effector on the flange (`F_T_NE`).
+    /// Nominal end effector relative to the flange (`F_T_NE`).
     pub flange_from_ne: Transform,
-    /// End effector on the nominal one (`NE_T_EE`).
+    /// End effector relative to the nominal one (`NE_T_EE`).
     pub ne_from_ee: Transform,
     /// Mass of the end effector (`m_ee`).
     pub ee_mass: f64,
     /// Its inertia (`I_ee`).
     pub ee_inertia: [f64; 9],
-    /// Its centre of mass on the flange (`F_x_Cee`).
+    /// Its centre of mass relative to the flange (`F_x_Cee`).
     pub ee_center: [f64; 3],
     /// Mass of the load (`m_load`).
     pub load_mass: f64,
     /// Its inertia (`I_load`).
     pub load_inertia: [f64; 9],
-    /// Its centre of mass on the flange (`F_x_Cload`).
+    /// Its centre of mass relative to the flange (`F_x_Cload`).
     pub load_center: [f64; 3],
     /// Position of joint 3 and sign of joint 4.
     pub elbow: [f64; 2],
@@ -80,7 +80,7 @@ pub struct RobotState {
     pub cartesian_collision: [f64; 6],
     /// Estimated external torques (`tau_ext_hat_filtered`).
     pub external_torque: [f64; 7],
-    /// Estimated wrench on the stiffness frame, in the base frame (`O_F_ext_hat_K`).
+    /// Estimated wrench at the stiffness frame, in the base frame (`O_F_ext_hat_K`).
     pub external_wrench_in_base: [f64; 6],
     /// The same in the stiffness frame (`K_F_ext_hat_K`).
     pub external_wrench_in_stiffness: [f64; 6],
@@ -104,17 +104,17 @@ pub struct RobotState {
     pub theta: [f64; 7],
     /// Motor velocities (`dtheta`).
     pub dtheta: [f64; 7],
-    /// Which generator runs.
+    /// The running generator.
     pub motion_generator_mode: MotionGeneratorMode,
-    /// Which controller runs.
+    /// The running controller.
     pub controller_mode: ControllerMode,
     /// Present errors (`current_errors` in libfranka).
     pub errors: RobotErrors,
-    /// What ended the last motion (`last_motion_errors`).
+    /// The errors that ended the last motion (`last_motion_errors`).
     pub reflex_reason: RobotErrors,
-    /// What the robot is doing.
+    /// The robot's mode.
     pub robot_mode: RobotMode,
-    /// Share of the last 100 commands that were received in time; 0 outside of motions.
+    /// Share of the last 100 commands that were received in time; 0 outside motions.
     pub control_command_success_rate: f64,
 }
 
@@ -242,7 +242,7 @@ impl RobotState {
         codec.reals(&mut self.theta)?;
         codec.reals(&mut self.dtheta)?;
         if version == Version::V10 {
-            // Two accelerometers of three axes on six links, which nothing here reads.
+            // Two accelerometers of three axes on six links, which this crate does not read.
             codec.reals(&mut [0.0; 36])?;
         }
         self.modes(codec)?;

@@ -6,12 +6,12 @@ use super::commands::Command;
 use super::version::Version;
 use crate::wire_error::WireError;
 
-/// How a command ended.
+/// The result of a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Status {
     /// Done.
     Success,
-    /// The motion runs; a second answer follows at its end.
+    /// The motion is running; a second answer follows at its end.
     MotionStarted,
     /// Another command ended the motion.
     Preempted,
@@ -19,7 +19,7 @@ pub enum Status {
     PreemptedBySafety,
     /// A safety function is active (version 10).
     RejectedBySafety,
-    /// Not in the robot's present mode.
+    /// Not possible in the robot's present mode.
     NotPossible,
     /// No Cartesian motion starts at a singular pose.
     StartAtSingularPose,
@@ -122,7 +122,7 @@ const GETTER: &[Status] = &[Status::Success, Status::NotPossible, Status::Reject
 const LIBRARY: &[Status] = &[Status::Success, Status::Error];
 
 impl Status {
-    /// What a command's numbers mean: the status of number `n` is the `n`th.
+    /// The meaning of a command's numbers: the status of number `n` is the `n`th.
     fn table(command: Command, version: Version) -> &'static [Status] {
         match (command, version) {
             (Command::Connect, _) => CONNECT,
@@ -134,7 +134,7 @@ impl Status {
             (Command::AutomaticErrorRecovery, Version::V10) => RECOVERY_V10,
             (Command::LoadModelLibrary, _) => LIBRARY,
             (Command::GetRobotModel, _) => GETTER,
-            // Version 5 has the first three alone.
+            // Version 5 has only the first three.
             _ => SETTER,
         }
     }
@@ -150,16 +150,16 @@ impl Status {
             .ok_or(WireError::Value { field: "status", found: number.into() })
     }
 
-    /// The number of the status, `None` where the command has no such status.
+    /// The number of the status, `None` if the command has no such status.
     pub fn number(self, command: Command, version: Version) -> Option<u8> {
         Self::table(command, version).iter().position(|&status| status == self).map(|index| index as u8)
     }
 }
 
-/// A response: its status, and what follows for some commands.
+/// A response: its status, and further data for some commands.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Response {
-    /// How the command ended.
+    /// The result of the command.
     pub status: Status,
     /// Bytes after the status: the server's version, the robot's description.
     pub rest: Vec<u8>,

@@ -1,6 +1,6 @@
 //! One motion just inside and one just outside of every limit that a robot checks, by our client.
 //!
-//! Each motion leads one signal to its limit with all others well within theirs, at `1 - MARGIN` or `1 + MARGIN` of it.
+//! Each motion moves one signal to its limit with all others well within theirs, to `1 - MARGIN` or `1 + MARGIN` of it.
 
 mod profile;
 mod signal;
@@ -16,53 +16,55 @@ use profile::Profile;
 pub use signal::go_to;
 use signal::{Axis, Signal};
 
-/// How far inside and outside, as a share of the limit.
+/// Distance inside and outside, as a share of the limit.
 const MARGIN: f64 = 0.005;
-/// The robot stops for measured velocities this much beyond the limit, rad/s, or somewhat later.
+/// Excess of measured velocities over the limit, rad/s, at which the robot stops, or slightly later.
 const MEASURED_BEYOND: f64 = 0.4;
-/// Measured velocities of the end effector swing beyond what is commanded, and a robot may stop a tenth of a metre a second later.
+/// Measured velocities of the end effector overshoot the commanded ones, and a robot may stop a tenth of a metre per
+/// second later.
 const MEASURED_END_MARGIN: f64 = 0.1;
-/// The pose that a Panda is usually begun from, rad.
+/// The usual start configuration of a Panda, rad.
 pub const READY: [f64; 7] = [0.0, -FRAC_PI_4, 0.0, -3.0 * FRAC_PI_4, 0.0, FRAC_PI_2, FRAC_PI_4];
-/// What joint 2 turns for a metre forward at the ready pose, where all joints together move least, rad/m: an entry of the
+/// Turn of joint 2 per metre forward at the ready pose with the smallest motion of all joints, rad/m: an entry of the
 /// Jacobian's pseudoinverse. No other joint uses as much of its limits there.
 const JOINT_2_PER_METRE: f64 = 3.1520;
-/// A pose just beside those at which no Cartesian motion begins, and one of them, rad: the smallest singular values of the
-/// end effector's Jacobian are 0.053 and 0.048, at the flange as at the finger tips, where 0.05 is asked for.
+/// A pose next to those at which no Cartesian motion may start, and one of them, rad: the smallest singular values of
+/// the end effector's Jacobian are 0.053 and 0.048, both at the flange and at the finger tips; the required minimum is
+/// 0.05.
 const BESIDE_SINGULAR: [f64; 7] = [0.0000, -0.2081, 0.0000, -0.8449, 0.0000, 1.3718, std::f64::consts::FRAC_PI_4];
 const SINGULAR: [f64; 7] = [0.0000, -0.1924, 0.0000, -0.8038, 0.0000, 1.3663, std::f64::consts::FRAC_PI_4];
-/// Joints 4 and 6 of an arm that touches itself, rad.
+/// Joints 4 and 6 of an arm in self-collision, rad.
 const FOLDED: (f64, f64) = (-3.0, 0.8);
-/// How much nearer than where the arm was stopped it is led to itself for a motion just inside, as a share of the way there.
+/// Distance before the pose of the stop at which a motion just inside ends, as a share of the path to the folded pose.
 const FOLD_MARGIN: f64 = 0.02;
 
 /// A kind of check, with a motion on either side of it.
 #[derive(Debug, Clone)]
 pub struct Case {
-    /// What is checked.
+    /// The checked limit.
     pub name: &'static str,
     reason: Reason,
     inside: Signal,
     outside: Signal,
 }
 
-/// What a robot does about a motion outside.
+/// The robot's reaction to a motion outside.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Reason {
     /// It stops for this error.
     Stop(RobotError),
-    /// It does not begin.
+    /// It does not start.
     Refusal(Status),
 }
 
-/// How a motion ended.
+/// The end of a motion.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Found {
     /// At its end.
     Done,
     /// By the robot, for these errors.
     Stopped(RobotErrors),
-    /// Before it began.
+    /// Before its start.
     Refused(Status),
     /// In another way.
     Other(String),
@@ -92,7 +94,8 @@ pub fn all(limits: &Limits) -> Vec<Case> {
     let (velocity, acceleration, jerk) = (limits.velocity[joint], limits.acceleration[joint], limits.jerk[joint]);
     let position = |profile| Signal::JointPosition { joint, profile };
     let speed = |profile| Signal::JointVelocity { joint, profile };
-    // Joint 7 starts at 0.785 rad; near its end an FR3 allows little velocity, so that the inner motion ends earlier.
+    // Joint 7 starts at 0.785 rad; near its end an FR3 allows only a low velocity, so that the inner motion ends
+    // earlier.
     let to_the_end = limits.q_max[6] - FRAC_PI_4;
     let torque = |peak: f64| {
         let up = (0..=20).map(|step| peak * f64::from(step) / 20.0);
@@ -202,7 +205,7 @@ pub fn all(limits: &Limits) -> Vec<Case> {
         Case {
             name: "first position",
             reason: Reason::Stop(RobotError::JointPositionMotionGeneratorStartPoseInvalid),
-            // A step to a standing position jerks twice as much when it ends.
+            // A step to a constant position has twice the jerk when it ends.
             inside: Signal::StartPosition { offset: 0.5 * jerk * 1e-9 * inside },
             outside: Signal::StartPosition { offset: 0.101 },
         },
@@ -239,8 +242,8 @@ pub fn all(limits: &Limits) -> Vec<Case> {
     ]
 }
 
-/// What the joints need in Cartesian motions whose own limits are far, along the base's x; to be run from [`READY`]. Franka's robots
-/// are stopped for it: 2.5 m/s² are refused by a Panda, as joint 2 would need 7.9 rad/s² of 7.5.
+/// Joint limits in Cartesian motions far from the Cartesian limits, along the base's x; to be run from [`READY`].
+/// Franka's robots stop for them: a Panda refuses 2.5 m/s², as joint 2 would need 7.9 rad/s² of 7.5.
 pub fn joints_of_cartesian_motions(limits: &Limits) -> Vec<Case> {
     let (inside, outside) = (1.0 - MARGIN, 1.0 + MARGIN);
     let acceleration = limits.acceleration[1] / JOINT_2_PER_METRE;
@@ -272,8 +275,8 @@ pub fn joints_of_cartesian_motions(limits: &Limits) -> Vec<Case> {
     ]
 }
 
-/// Folds the arm from `home`, rad, until the robot stops it before it touches itself, then leads it to just before that place.
-/// How the motion just inside ended, and the one outside.
+/// Folds the arm from `home`, rad, until the robot stops it before a self-collision, then moves it to just before that
+/// pose. Returns the ends of the motion just inside and of the one outside.
 ///
 /// # Errors
 /// Those of the connection.
@@ -299,7 +302,7 @@ fn found<T>(ended: Result<T, FciError>) -> Result<Found, FciError> {
         Ok(_) => Ok(Found::Done),
         Err(FciError::Motion { status: Status::ReflexAborted, errors, .. }) => Ok(Found::Stopped(errors)),
         Err(FciError::Refused { status, .. }) => Ok(Found::Refused(status)),
-        // Where the start is looked at in the cycle after the Move was accepted, the refusal is its second answer.
+        // If the start is checked in the cycle after the Move was accepted, the refusal is its second answer.
         Err(FciError::Motion { status: status @ Status::StartAtSingularPose, .. }) => Ok(Found::Refused(status)),
         Err(error @ FciError::Motion { .. }) => Ok(Found::Other(error.to_string())),
         Err(error) => Err(error),
@@ -314,8 +317,8 @@ fn recover(robot: &mut Robot) -> Result<(), FciError> {
 }
 
 impl Case {
-    /// Whether poses, twists or the elbow are commanded. A robot may stop such a motion inside of its Cartesian limits for what
-    /// it needs of the joints, so that the two are told apart only where the joints are allowed more.
+    /// Whether poses, twists or the elbow are commanded. A robot may stop such a motion inside its Cartesian limits
+    /// because of the joints' limits; the two can be distinguished only if the joints have higher limits.
     #[allow(dead_code, reason = "franka-sim is told to allow the joints more")]
     pub fn is_cartesian(&self) -> bool {
         matches!(
@@ -329,7 +332,7 @@ impl Case {
         )
     }
 
-    /// Whether a motion ended as it should.
+    /// Whether a motion ended as expected.
     pub fn is_expected(&self, is_inside: bool, found: &Found) -> bool {
         match found {
             Found::Done => is_inside,

@@ -1,4 +1,4 @@
-//! Velocities, one for each millisecond, that lead a signal to a limit and back to rest.
+//! Velocities, one per millisecond, that lead a signal to a limit and back to rest.
 
 use std::f64::consts::PI;
 
@@ -18,8 +18,8 @@ impl Profile {
         Self(up.chain([peak; 3]).chain(down).collect())
     }
 
-    /// As [`Profile::velocity`] to 0.8 of the peak, and from there for a moment to the peak at a constant acceleration: an arm that
-    /// overshoots is not measured beyond the limit.
+    /// As [`Profile::velocity`] to 0.8 of the peak, and from there briefly to the peak at a constant acceleration, so
+    /// that an overshooting arm is not measured beyond the limit.
     pub fn velocity_burst(peak: f64, ramp_ms: u32, acceleration: f64) -> Self {
         let base = 0.8 * peak;
         let num_steps = ((peak - base) / (acceleration * PERIOD_SECS)).ceil();
@@ -30,7 +30,7 @@ impl Profile {
         Self([rising, &burst, falling].concat())
     }
 
-    /// Up to an acceleration in ten steps, held for three cycles; the same the other way round leads back to rest.
+    /// Up to an acceleration in ten steps, held for three cycles; the reverse leads back to rest.
     pub fn acceleration(peak: f64) -> Self {
         let up = (1..=10).map(|step| peak * f64::from(step) / 10.0);
         let pulse: Vec<f64> = up.clone().chain([peak; 3]).chain(up.rev()).collect();
@@ -38,13 +38,13 @@ impl Profile {
         Self::from_accelerations(pulse.into_iter().chain(back))
     }
 
-    /// A jump of the acceleration as large as a jerk allows in one cycle, and back to rest by others.
+    /// A jump of the acceleration as large as the jerk limit allows in one cycle, and back to rest by further jumps.
     pub fn jerk(peak: f64) -> Self {
         let step = peak * PERIOD_SECS;
         Self::from_accelerations([step, 0.0, -step, 0.0].into_iter())
     }
 
-    /// Smoothly by a distance in so many milliseconds.
+    /// Smoothly by a distance in this many milliseconds.
     pub fn distance(distance: f64, duration_ms: u32) -> Self {
         // The area under the velocities is the peak times the ramp.
         let ramp_ms = duration_ms / 2;
@@ -53,7 +53,7 @@ impl Profile {
         Self(shape.0.iter().map(|velocity| velocity * distance / length).collect())
     }
 
-    /// Values as they are, such as torques.
+    /// Values without conversion, such as torques.
     pub fn of(values: impl Iterator<Item = f64>) -> Self {
         Self(values.collect())
     }
@@ -75,7 +75,7 @@ impl Profile {
         usize::try_from(ms).ok().and_then(|index| self.0.get(index)).copied().unwrap_or(0.0)
     }
 
-    /// The way up to and with the `ms`th cycle.
+    /// The distance up to and including the `ms`th cycle.
     pub fn offset(&self, ms: u64) -> f64 {
         let num = usize::try_from(ms).map_or(self.0.len(), |index| self.0.len().min(index.saturating_add(1)));
         self.0[..num].iter().sum::<f64>() * PERIOD_SECS

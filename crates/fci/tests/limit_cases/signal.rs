@@ -1,4 +1,4 @@
-//! Motions that lead one signal somewhere.
+//! Motions that change one signal.
 
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -9,7 +9,7 @@ use sdg_fci::{FciError, isometry, transform};
 
 use super::profile::Profile;
 
-/// What a motion commands.
+/// The commanded quantity of a motion.
 #[derive(Debug, Clone)]
 pub enum Signal {
     /// A joint's position.
@@ -20,31 +20,31 @@ pub enum Signal {
     Pose { profile: Profile },
     /// The same as a velocity.
     Twist { profile: Profile },
-    /// The way of the end effector along an axis of the base, as poses.
+    /// The path of the end effector along an axis of the base, as poses.
     PoseAlong { axis: Axis, profile: Profile },
     /// The same as a velocity.
     TwistAlong { axis: Axis, profile: Profile },
-    /// The elbow, the end effector standing.
+    /// The elbow, with the end effector at rest.
     Elbow { profile: Profile },
-    /// Joint 7's torque, the others standing.
+    /// Joint 7's torque, with the others at rest.
     Torque { profile: Profile },
     /// Joint 7 brought to a velocity by torques.
     SpunJoint { profile: Profile },
-    /// The first commanded position of joint 1 is this far off.
+    /// The first commanded position of joint 1 has this error.
     StartPosition { offset: f64 },
-    /// The first commanded pose is this far off along x.
+    /// The first commanded pose has this error along x.
     StartPose { offset: f64 },
-    /// The first commanded elbow is this far off.
+    /// The first commanded elbow has this error.
     StartElbow { offset: f64 },
     /// The elbow's sign changes after 20 cycles, or not.
     ElbowSign { changes: bool },
-    /// The commanded pose is a rotation times this after 20 cycles.
+    /// The commanded pose is a rotation multiplied by this after 20 cycles.
     Frame { scale: f64 },
-    /// So many answers in a row are left out.
+    /// This many successive answers are omitted.
     Unanswered { num: u64 },
-    /// The speed of an end effector that is set [`FAR_END_M`] beyond its place, turned by joint 6.
+    /// The speed of an end effector that is set [`FAR_END_M`] beyond its position, turned by joint 6.
     FarEnd { profile: Profile },
-    /// A pose that stands, begun from joint positions.
+    /// A constant pose, started from joint positions.
     StandingPose { from: [f64; 7] },
 }
 
@@ -53,16 +53,16 @@ pub enum Signal {
 pub enum Axis {
     /// Forward, along which joint 2 moves most.
     X,
-    /// Sideways: turning in the base needs the least of the joints.
+    /// Sideways: a rotation in the base needs the smallest joint motion.
     Y,
 }
 
-/// How far [`Signal::FarEnd`] sets the end effector along its own z, m.
+/// Distance by which [`Signal::FarEnd`] moves the end effector along its own z, m.
 const FAR_END_M: f64 = 2.0;
 /// From joint 6's axis to the flange, along the flange's z and across it, m.
 const JOINT_6_TO_FLANGE_M: [f64; 2] = [0.107, 0.088];
 
-/// Moves the joints at leisure.
+/// Moves the joints slowly.
 pub fn go_to(robot: &mut Robot, goal: &[f64; 7]) -> Result<(), FciError> {
     let start = robot.read_state()?.q_desired;
     let distance = (0..7).map(|joint| (goal[joint] - start[joint]).abs()).fold(0.0, f64::max);
@@ -95,11 +95,11 @@ fn answer<T>(value: T, is_last: bool) -> Answer<T> {
     if is_last { ControlFlow::Break(value) } else { ControlFlow::Continue(value) }
 }
 
-/// How long motions last that command no profile.
+/// Duration of motions without a profile.
 const STANDING_MS: u64 = 100;
-/// Profiles begin after so many cycles of standing.
+/// Number of cycles at rest before a profile starts.
 const PROFILE_START_MS: u64 = 30;
-/// When those do what they are made for.
+/// The cycle at which the others take effect.
 const EVENT_MS: u64 = 20;
 
 impl Signal {
@@ -122,7 +122,7 @@ impl Signal {
         (ControllerMode::JointImpedance, generator)
     }
 
-    /// Runs the motion from where the arm stands, but for [`Signal::StandingPose`], which goes to its place first.
+    /// Runs the motion from the arm's position; only [`Signal::StandingPose`] first moves to its start.
     pub fn run(&self, robot: &mut Robot) -> Result<RobotState, FciError> {
         match self {
             Signal::StandingPose { from } => go_to(robot, from)?,
@@ -159,10 +159,10 @@ impl Signal {
         })
     }
 
-    /// Sets what is commanded in the `ms`th cycle; true in the last.
+    /// Sets the command of the `ms`th cycle; returns true in the last.
     fn fill(&self, command: &mut RobotCommand, ms: u64, state: &RobotState, start: &RobotState) -> bool {
         let motion = &mut command.motion;
-        // The first command of a motion is judged by other rules, and torques take over from the internal controller.
+        // The first command of a motion has other rules, and torques take over from the internal controller.
         let since_start = ms.checked_sub(PROFILE_START_MS);
         match self {
             Signal::Elbow { .. } if since_start.is_none() => motion.valid_elbow = true,
@@ -260,7 +260,7 @@ fn ee_moved_by(z_m: f64) -> Transform {
     transform(&nalgebra::Isometry3::translation(0.0, 0.0, z_m))
 }
 
-/// Springs and dampers that keep the joints where they started; joint 7 is let go.
+/// Springs and dampers that keep the joints at their start; joint 7 is free.
 fn holding_torque(state: &RobotState, start: &RobotState) -> [f64; 7] {
     std::array::from_fn(|joint| {
         let spring = 60.0 * (start.q[joint] - state.q[joint]) - 6.0 * state.dq[joint];
@@ -268,7 +268,7 @@ fn holding_torque(state: &RobotState, start: &RobotState) -> [f64; 7] {
     })
 }
 
-/// A torque that is reached from the last one within the torque's rate.
+/// A torque reached from the last one within the torque rate limit.
 fn within_rate(torque: f64, state: &RobotState, joint: usize) -> f64 {
     let last = state.torque_desired[joint];
     torque.clamp(last - 0.9, last + 0.9)

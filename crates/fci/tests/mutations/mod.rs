@@ -1,10 +1,10 @@
-//! Mistakes in messages, by seed.
+//! Random errors in messages, by seed.
 
 use rand::Rng;
 use rand_pcg::Pcg64Mcg;
 use sdg_fci::wire::MAX_MESSAGE_SIZE;
 
-/// Changes bytes, cuts, doubles or lengthens, as often as not more than once.
+/// Changes bytes, truncates, doubles or lengthens, in half of the cases more than once.
 pub fn mutate(bytes: &mut Vec<u8>, rng: &mut Pcg64Mcg) {
     for _ in 0..rng.random_range(1..=4) {
         let length = bytes.len();

@@ -1,12 +1,12 @@
 //! Lens distortion with the five coefficients that ROS and OpenCV call `plumb_bob`.
 //!
-//! Legend: `(x, y)` a point at depth 1 as a pinhole shows it, `(x', y')` where the lens puts it, `r² = x² + y²`:
+//! Legend: `(x, y)` a point at depth 1 as a pinhole shows it, `(x', y')` its position through the lens, `r² = x² + y²`:
 //! ```text
 //! x' = x (1 + k1 r² + k2 r⁴ + k3 r⁶) + 2 p1 x y + p2 (r² + 2 x²)
 //! y' = y (1 + k1 r² + k2 r⁴ + k3 r⁶) + p1 (r² + 2 y²) + 2 p2 x y
 //! ```
-//! A polynomial fitted to a picture turns back somewhere outside it: beyond that radius points far to the side would appear in
-//! the picture once more. They are taken as not seen.
+//! A polynomial fitted to a picture decreases again somewhere outside it: beyond that radius, points far to the side
+//! would appear in the picture again. They are treated as not visible.
 
 use nalgebra::{Matrix2, Point2, Vector2};
 use serde::{Deserialize, Serialize};
@@ -26,9 +26,9 @@ pub struct PlumbBob {
     pub k3: f64,
 }
 
-/// Steps of Newton's method, of which five suffice for the lenses that there are.
+/// Maximum steps of Newton's method, of which five suffice for existing lenses.
 const MAX_STEPS: usize = 30;
-/// Where it ends, at depth 1: a millionth of a pixel.
+/// Its tolerance, at depth 1: a millionth of a pixel.
 const TOLERANCE: f64 = 1e-10;
 
 impl PlumbBob {
@@ -45,12 +45,13 @@ impl PlumbBob {
         [self.k1, self.k2, self.p1, self.p2, self.k3]
     }
 
-    /// Where the lens puts a point at depth 1; `None` beyond the radius at which the polynomial turns back.
+    /// The position of a point at depth 1 through the lens; `None` beyond the radius at which the polynomial turns
+    /// back.
     pub fn distort(&self, point: &Point2<f64>) -> Option<Point2<f64>> {
         self.grows_up_to(point.coords.norm_squared()).then(|| self.polynomial(point))
     }
 
-    /// The point at depth 1 that the lens puts there; `None` where it puts none.
+    /// The point at depth 1 that the lens maps to this position; `None` if there is none.
     pub fn undistort(&self, point: &Point2<f64>) -> Option<Point2<f64>> {
         if *self == Self::NONE {
             return Some(*point);
@@ -62,14 +63,14 @@ impl PlumbBob {
                 return self.grows_up_to(found.coords.norm_squared()).then_some(found);
             }
             let step = self.jacobian(&found).try_inverse()? * off;
-            // A step as long as the picture is wide leads behind the turning point.
+            // A step as long as the picture is wide leads beyond the turning point.
             found += step * (1.0 / step.norm()).min(1.0);
         }
         None
     }
 
-    /// What the polynomial makes of a point at depth 1, also beyond the radius at which it turns back: for optimisers, which must
-    /// be able to come back from there.
+    /// The polynomial's value at a point at depth 1, also beyond the radius at which it turns back: for optimisers,
+    /// which must be able to return from there.
     pub fn polynomial(&self, point: &Point2<f64>) -> Point2<f64> {
         let Self { p1, p2, .. } = *self;
         let (x, y, r2) = (point.x, point.y, point.coords.norm_squared());
@@ -100,7 +101,7 @@ impl PlumbBob {
         )
     }
 
-    /// Whether the distorted radius grows with the radius, from the middle up to the root of `r2`.
+    /// Whether the distorted radius increases with the radius, from the centre up to the root of `r2`.
     fn grows_up_to(&self, r2: f64) -> bool {
         // d(r radial)/dr, and where its own derivative by r² vanishes: 3 k1 + 10 k2 r² + 21 k3 r⁴ = 0.
         let growth = |t: f64| 1.0 + t * (3.0 * self.k1 + t * (5.0 * self.k2 + t * 7.0 * self.k3));
@@ -118,15 +119,15 @@ mod tests {
 
     #[test]
     fn a_lens_that_turns_back_does_not_show_points_twice() {
-        // r (1 − 0.4 r²) grows up to r = 0.91.
+        // r (1 − 0.4 r²) increases up to r = 0.91.
         let lens = PlumbBob { k1: -0.4, ..PlumbBob::NONE };
         assert!(lens.distort(&Point2::new(0.9, 0.0)).is_some());
         assert_eq!(lens.distort(&Point2::new(0.92, 0.0)), None);
         assert_eq!(lens.distort(&Point2::new(1.5, 0.0)), None);
-        // 0.6086 is the farthest that it shows.
+        // 0.6086 is the largest radius that it shows.
         assert!(lens.undistort(&Point2::new(0.6, 0.0)).is_some());
         assert_eq!(lens.undistort(&Point2::new(0.7, 0.0)), None);
-        // It turns back between 0.84 and 1.6 and grows again: two roots inside.
+        // It turns back between 0.84 and 1.6 and then increases again: two roots inside.
         let lens = PlumbBob { k1: -0.65, k2: 0.15, ..PlumbBob::NONE };
         assert_eq!(lens.distort(&Point2::new(2.5, 0.0)), None);
     }
@@ -139,7 +140,7 @@ mod tests {
         ) {
             let lens = PlumbBob { k1, k2, p1, p2, k3 };
             let point = Point2::new(x, y);
-            // Near the turning point two points lie so close together that either may be found.
+            // Near the turning point two points are so close together that either may be found.
             if lens.grows_up_to(1.3 * point.coords.norm_squared()) && lens.jacobian(&point).determinant() > 0.2 {
                 let back = lens.undistort(&lens.distort(&point).unwrap()).unwrap();
                 prop_assert!((back - point).norm() < 1e-8, "{back} {point}");

@@ -17,7 +17,7 @@ pub struct PinholeCamera {
     pub fx: f64,
     /// Vertical focal length.
     pub fy: f64,
-    /// The optical axis's x; the middle of a 640-pixel image is 320.
+    /// The optical axis's x; the centre of a 640-pixel image is 320.
     pub cx: f64,
     /// The optical axis's y.
     pub cy: f64,
@@ -27,25 +27,25 @@ pub struct PinholeCamera {
 }
 
 impl PinholeCamera {
-    /// The paper's wrist camera: 640 × 480, f = 550 px, axis in the middle.
+    /// The paper's wrist camera: 640 × 480, f = 550 px, axis in the centre.
     pub const WRIST: Self =
         Self { width: 640, height: 480, fx: 550.0, fy: 550.0, cx: 320.0, cy: 240.0, lens: PlumbBob::NONE };
 
     /// A camera without distortion from its intrinsics.
     ///
     /// # Errors
-    /// As [`Self::checked`].
+    /// As for [`Self::checked`].
     pub fn new(width: u32, height: u32, fx: f64, fy: f64, cx: f64, cy: f64) -> Result<Self, GeometryError> {
         Self { width, height, fx, fy, cx, cy, lens: PlumbBob::NONE }.checked()
     }
 
-    /// A camera without distortion whose axis is in the middle of its picture, and whose pixels are square.
+    /// A camera without distortion, with its axis in the centre of its picture and with square pixels.
     pub fn symmetric(width: u32, height: u32, focal_px: f64) -> Self {
         let [cx, cy] = [width, height].map(|side| 0.5 * f64::from(side));
         Self { width, height, fx: focal_px, fy: focal_px, cx, cy, lens: PlumbBob::NONE }
     }
 
-    /// The same camera, if it can be one.
+    /// The same camera, if its values are possible.
     ///
     /// # Errors
     /// A focal length that is not positive and finite, an empty image, or a centre or a coefficient that is not finite.
@@ -63,7 +63,7 @@ impl PinholeCamera {
         }
     }
 
-    /// Where a point in the camera's frame appears; `None` at or behind the camera and beyond what the lens shows.
+    /// The pixel of a point in the camera's frame; `None` at or behind the camera and outside the lens's range.
     pub fn project(&self, p_in_camera: &Point3<f64>) -> Option<Point2<f64>> {
         if p_in_camera.z <= 0.0 {
             return None;
@@ -72,7 +72,7 @@ impl PinholeCamera {
         Some(Point2::new(self.fx * seen.x + self.cx, self.fy * seen.y + self.cy))
     }
 
-    /// The point at depth 1 m that appears at `pixel`; `None` where the lens shows nothing.
+    /// The point at depth 1 m that appears at `pixel`; `None` if the lens shows nothing there.
     pub fn unproject(&self, pixel: &Point2<f64>) -> Option<Point3<f64>> {
         let seen = Point2::new((pixel.x - self.cx) / self.fx, (pixel.y - self.cy) / self.fy);
         self.lens.undistort(&seen).map(|point| Point3::new(point.x, point.y, 1.0))

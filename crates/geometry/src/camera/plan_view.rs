@@ -1,4 +1,4 @@
-//! A plane over the table, seen straight down at a fixed scale.
+//! A plane over the table, seen vertically from above at a fixed scale.
 //!
 //! ```text
 //! y of the world                     column 0
@@ -7,11 +7,12 @@
 //!   │   └───────────────┘            ↓
 //!   └──────→ x  ↑ left_m             y
 //! ```
-//! Seen from above, nothing is mirrored: x goes right with the world's x, y goes down against the world's y. An angle in the
-//! plan view, from x towards y, is therefore minus the same turn about the world's z.
+//! The view from above is not mirrored: x goes right with the world's x, y goes down against the world's y. An angle in
+//! the plan view, from x towards y, is therefore minus the same turn about the world's z.
 //!
-//! Only the plane itself is shown where it is. What lies `h` above it, `d` beside the camera's foot, is displaced outwards by
-//! `d h / (H − h)`, where `H` is the camera's height over the plane: 8 mm for 30 mm of height, 150 mm beside the foot, from 0.58 m.
+//! Only points of the plane are shown at their true position. A point `h` above it, `d` from the point below the
+//! camera, is displaced outwards by `d h / (H − h)`, where `H` is the camera's height over the plane: 8 mm for 30 mm of
+//! height, 150 mm from the point below the camera, from 0.58 m.
 
 use nalgebra::{Point2, Point3};
 use serde::{Deserialize, Serialize};
@@ -21,18 +22,18 @@ use super::posed::PosedCamera;
 /// A rectangle of the world in which parts may lie, in metres.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Workspace {
-    /// Least and largest x.
+    /// Smallest and largest x.
     pub x_m: [f64; 2],
-    /// Least and largest y.
+    /// Smallest and largest y.
     pub y_m: [f64; 2],
 }
 
-/// Where a plan view lies and how fine it is.
+/// The position and the resolution of a plan view.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PlanView {
     /// The plane's z in the world, in metres.
     pub height_m: f64,
-    /// Pixels for a metre.
+    /// Pixels per metre.
     pub pixels_per_m: f64,
     /// World x of the left border.
     pub left_m: f64,
@@ -44,7 +45,7 @@ pub struct PlanView {
     pub height: u32,
 }
 
-/// Why there is no plan view.
+/// The reason why there is no plan view.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlanViewError {
@@ -62,7 +63,7 @@ pub enum PlanViewError {
     OutsideWorkspace {
         /// The workspace that was given.
         workspace: Workspace,
-        /// What the picture shows of the plane.
+        /// The part of the plane that the picture shows.
         seen: Workspace,
     },
     /// More pixels than allowed.
@@ -75,14 +76,15 @@ pub enum PlanViewError {
     },
 }
 
-/// Where the picture's grid of looked-at pixels is this fine, no corner of the plane is missed by more than a percent.
+/// Steps of the grid at which the picture is evaluated, along each side: fine enough that no corner of the plane is
+/// missed by more than a percent.
 const GRID: u32 = 32;
-/// Where a pixel covers more than this many times the length that it covers at best, towards the horizon, the picture shows too
+/// If a pixel covers more than this many times the best pixel's length, towards the horizon, the picture shows too
 /// little to find parts. Chosen by hand.
 const MAX_COARSENING: f64 = 4.0;
 
 impl PlanView {
-    /// All that `camera` sees of the plane at `height_m`, within the workspace.
+    /// The part of the plane at `height_m` that `camera` sees, within the workspace.
     ///
     /// # Errors
     /// A camera that looks elsewhere, and a view of more than `max_pixels`.
@@ -100,7 +102,7 @@ impl PlanView {
                 seen.intersection(workspace).ok_or(PlanViewError::OutsideWorkspace { workspace: *workspace, seen })?
             }
         };
-        // A rounding error makes no further pixel.
+        // A rounding error must not add a pixel.
         let side = |[low, high]: [f64; 2]| ((high - low) * pixels_per_m - 1e-6).ceil().max(1.0);
         let [width, height] = [shown.x_m, shown.y_m].map(side);
         let found = (width * height) as u64;
@@ -117,19 +119,19 @@ impl PlanView {
         Point3::new(self.left_m + x, self.top_m - y, self.height_m)
     }
 
-    /// The pixel at which a point of the plane is shown; of other points the one straight below or above.
+    /// The pixel of a point of the plane; for other points that of the point vertically below or above in the plane.
     pub fn pixel(&self, point: &Point3<f64>) -> Point2<f64> {
         Point2::new(point.x - self.left_m, self.top_m - point.y) * self.pixels_per_m
     }
 
-    /// Where the camera's own picture shows what is at a pixel of the plan view; `None` where it does not.
+    /// The position in the camera's own picture of a pixel of the plan view; `None` if the picture does not show it.
     pub fn in_picture(&self, camera: &PosedCamera, pixel: &Point2<f64>) -> Option<Point2<f64>> {
         let seen = camera.project(&self.point(pixel))?;
         let [width, height] = [camera.intrinsics.width, camera.intrinsics.height].map(f64::from);
         ((0.0..=width).contains(&seen.x) && (0.0..=height).contains(&seen.y)).then_some(seen)
     }
 
-    /// Where the plan view shows what is at a pixel of the camera's own picture; `None` where that does not show the plane.
+    /// The position in the plan view of a pixel of the camera's own picture; `None` if that does not show the plane.
     pub fn from_picture(&self, camera: &PosedCamera, pixel: &Point2<f64>) -> Option<Point2<f64>> {
         Some(self.pixel(&camera.at_height(pixel, self.height_m)?))
     }

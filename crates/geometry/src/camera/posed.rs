@@ -1,4 +1,4 @@
-//! A camera at its place: pixel ↔ ray ↔ point on a plane.
+//! A camera with its pose: pixel ↔ ray ↔ point on a plane.
 
 use nalgebra::{Isometry3, Point2, Point3, Unit, Vector3};
 
@@ -14,29 +14,30 @@ pub struct Ray {
 }
 
 impl Ray {
-    /// Where the ray meets the plane z = `height_m`; `None` when it runs along the plane or away from it.
+    /// The intersection of the ray with the plane z = `height_m`; `None` if the ray is parallel to the plane or points
+    /// away from it.
     pub fn at_height(&self, height_m: f64) -> Option<Point3<f64>> {
         let t = (height_m - self.origin.z) / self.direction.z;
         (t.is_finite() && t > 0.0).then(|| self.origin + self.direction.into_inner() * t)
     }
 }
 
-/// A camera with its place in the world.
+/// A camera with its pose in the world.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PosedCamera {
     /// Size and focal length.
     pub intrinsics: PinholeCamera,
-    /// Takes the optical frame (x right, y down, z forward) to the world, metres.
+    /// Transform from the optical frame (x right, y down, z forward) to the world, metres.
     pub world_from_camera: Isometry3<f64>,
 }
 
 impl PosedCamera {
-    /// Where a point in the world appears; `None` behind the camera.
+    /// The pixel of a point in the world; `None` behind the camera.
     pub fn project(&self, p_in_world: &Point3<f64>) -> Option<Point2<f64>> {
         self.intrinsics.project(&self.world_from_camera.inverse_transform_point(p_in_world))
     }
 
-    /// The ray through a pixel; `None` where the lens shows nothing.
+    /// The ray through a pixel; `None` if the lens shows nothing there.
     pub fn ray(&self, pixel: &Point2<f64>) -> Option<Ray> {
         let direction = self.world_from_camera * self.intrinsics.unproject(pixel)?.coords;
         Some(Ray {
@@ -50,7 +51,7 @@ impl PosedCamera {
         self.ray(pixel)?.at_height(height_m)
     }
 
-    /// Metres on the plane z = `height_m` for one pixel near `pixel` (the mean of both axes); `None` off the plane.
+    /// Metres per pixel on the plane z = `height_m` near `pixel` (the mean of both axes); `None` off the plane.
     pub fn metres_per_pixel(&self, pixel: &Point2<f64>, height_m: f64) -> Option<f64> {
         let here = self.at_height(pixel, height_m)?;
         let right = self.at_height(&Point2::new(pixel.x + 1.0, pixel.y), height_m)?;
@@ -66,7 +67,7 @@ mod tests {
     use proptest::prelude::*;
     use std::f64::consts::PI;
 
-    /// Half a metre above (0.4, 0, 0), looking straight down with image x along world x.
+    /// Half a metre above (0.4, 0, 0), looking vertically down with image x along world x.
     fn looking_down() -> PosedCamera {
         let turn = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI);
         PosedCamera {

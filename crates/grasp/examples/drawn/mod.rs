@@ -1,4 +1,4 @@
-//! Generated parts with pictures, for what is fitted or trained on them.
+//! Generated parts with pictures, for fitting or training.
 
 use sdg_grasp::TaughtDemonstration;
 use sdg_grasp::fitting::{FitInstance, FitPart, FitPicture};
@@ -13,7 +13,7 @@ pub fn absent(condition: Condition) -> SceneConfig {
     SceneConfig { absent_share: 1.0, ..SceneConfig::only(condition) }
 }
 
-/// `count` parts that can be taught, each with so many pictures of each kind.
+/// `count` parts that can be taught, each with this many pictures of each kind.
 pub fn draw_parts(
     count: usize,
     [width, height]: [u32; 2],
@@ -21,7 +21,7 @@ pub fn draw_parts(
     seed: u64,
 ) -> Result<Vec<FitPart>> {
     let photo = PhotoConfig { width, height, ..PhotoConfig::default() };
-    // The same photo as the scenes' truth refers to.
+    // The same photo that the scenes' truth refers to.
     let photo_seed = SceneConfig::default().photo_seed;
     let mut generated = Vec::new();
     let mut parts = Vec::new();
@@ -40,7 +40,7 @@ pub fn draw_parts(
         }
     }
     for (kind_idx, (config, a_part)) in kinds.iter().enumerate() {
-        // As in use: the camera's distance is not known, and parts may lie a little outside.
+        // As in use: the camera's distance is unknown, and parts may lie partly outside.
         let config = SceneConfig {
             width,
             height,

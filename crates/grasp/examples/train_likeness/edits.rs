@@ -1,4 +1,5 @@
-//! Photos of other parts, made by changing one feature of a photo: moved, removed, put in; a bite or a lug at the outline; stretched.
+//! Photos of other parts, made by changing one feature of a photo: moved, removed or added; a notch or a lug at the
+//! outline; stretched.
 
 use rand::Rng;
 use rand_pcg::Pcg64Mcg;
@@ -6,12 +7,12 @@ use sdg_shape::{Pair, SIDE};
 
 use crate::pairs::{AREA, between};
 
-/// Radius of a feature and how far it is moved, in pixels.
+/// Radius of a feature and its displacement, in pixels.
 const RADIUS: [f32; 2] = [2.5, 7.0];
 const MOVED_PX: [f32; 2] = [4.0, 10.0];
 /// Factor by which a photo is longer or shorter in one direction.
 const STRETCH: [f32; 2] = [0.1, 0.3];
-/// An edit counts where it changes the photo by this much in all, in pixels of full contrast.
+/// Minimum total change of the photo by an edit, in pixels of full contrast.
 const MIN_CHANGE: f32 = 2.5;
 const TRIES: usize = 12;
 
@@ -52,7 +53,7 @@ fn inside(pair: &Pair, rng: &mut Pcg64Mcg) -> [f32; 2] {
     place(if inside.is_empty() { AREA / 2 } else { inside[rng.random_range(0..inside.len())] })
 }
 
-/// A feature is replaced by what surrounds it, and stands elsewhere or nowhere.
+/// A feature is replaced by its surroundings, and is copied elsewhere or nowhere.
 fn move_feature(pair: &mut Pair, rng: &mut Pcg64Mcg, stands_elsewhere: bool) {
     let (from, radius) = (inside(pair, rng), rng.random_range(RADIUS[0]..RADIUS[1]));
     let (sin, cos) = rng.random_range(0.0..std::f32::consts::TAU).sin_cos();
@@ -80,7 +81,7 @@ fn move_feature(pair: &mut Pair, rng: &mut Pcg64Mcg, stands_elsewhere: bool) {
     }
 }
 
-/// A feature of the photo stands in another place, too.
+/// A feature of the photo is copied to another place.
 fn put_in(pair: &mut Pair, rng: &mut Pcg64Mcg) {
     let (from, to, radius) = (inside(pair, rng), inside(pair, rng), rng.random_range(RADIUS[0]..RADIUS[1]));
     let before = pair.photo.clone();
@@ -101,7 +102,7 @@ fn paste(pair: &mut Pair, before: &[Option<[f32; 3]>], from: [f32; 2], to: [f32;
     }
 }
 
-/// Table within the outline, or part beyond it.
+/// Table inside the outline, or part outside it.
 fn change_outline(pair: &mut Pair, rng: &mut Pcg64Mcg) {
     let is_edge = |i: &usize| {
         let (x, y) = (i % SIDE, i / SIDE);

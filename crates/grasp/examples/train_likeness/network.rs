@@ -1,4 +1,4 @@
-//! The network in burn, trained, and its weights as a file.
+//! The network in burn, its training, and its weights as a file.
 
 use std::collections::BTreeMap;
 
@@ -22,7 +22,7 @@ use crate::pairs::{Pairs, Stream};
 use crate::rendered::Rendered;
 
 const BATCH: usize = 128;
-/// Of each batch. Chosen by hand.
+/// Share of each batch. Chosen by hand.
 const RENDERED_SHARE: f64 = 0.35;
 const SCHEDULE: OneCycle = OneCycle { peak: 2e-3, warm_up: 0.1 };
 const WEIGHT_DECAY: f64 = 0.02;
@@ -77,7 +77,7 @@ impl Network {
     fn loss(&self, batch: &[(Vec<f32>, bool)], device: &Device) -> Tensor<1> {
         let pairs = batch.iter().flat_map(|(values, _)| values.iter().copied()).collect::<Vec<_>>();
         let pairs = Tensor::<4>::from_data(TensorData::new(pairs, [batch.len(), SIDE, SIDE, NUM_CHANNELS]), device);
-        // −1 where right: −ln p is softplus of the signed log-odds.
+        // −1 for right examples: −ln p is softplus of the signed log-odds.
         let signs: Vec<f32> = batch.iter().map(|(_, is_right)| if *is_right { -1.0 } else { 1.0 }).collect();
         let signs = Tensor::<1>::from_data(TensorData::new(signs, [batch.len()]), device);
         activation::softplus(self.forward(pairs.permute([0, 3, 1, 2])) * signs, 1.0).mean()
@@ -114,7 +114,8 @@ impl Network {
     }
 }
 
-/// Trains on the examples for training; says after every epoch how the held-out ones are told. The file's bytes.
+/// Trains on the training examples; reports the classification of the held-out ones after every epoch. Returns the
+/// file's bytes.
 pub fn train(
     pairs: &Pairs,
     rendered: &Rendered,
@@ -148,7 +149,7 @@ pub fn train(
     network.valid().file()
 }
 
-/// Every example changed by a random stream of its own, on all cores: those of the indices, and `num_rendered` more.
+/// Every example changed by its own random stream, on all cores: those of the indices, and `num_rendered` more.
 fn batch(pairs: &Pairs, idxs: &[usize], rendered: &Rendered, num_rendered: usize, seed: u64) -> Vec<(Vec<f32>, bool)> {
     let make = |k: usize| {
         let rng = &mut Pcg64Mcg::seed_from_u64(seed.wrapping_add(k as u64));
@@ -168,7 +169,7 @@ fn batch(pairs: &Pairs, idxs: &[usize], rendered: &Rendered, num_rendered: usize
     })
 }
 
-/// Loss and share told right, by the network as it is shipped.
+/// Loss and share of correct classifications, by the network in its shipped form.
 fn held_out(pairs: &Pairs, rendered: &Rendered, network: &LikenessNetwork) -> String {
     let drawn = pairs.of(Stream::HeldOut).into_iter().map(|idx| (pairs.pair(idx), pairs.is_right(idx)));
     let drawn = Told::of(network, drawn);
@@ -176,12 +177,12 @@ fn held_out(pairs: &Pairs, rendered: &Rendered, network: &LikenessNetwork) -> St
     format!("held out: {drawn}; rendered: {rendered}")
 }
 
-/// How held-out examples are told.
+/// The classification of held-out examples.
 struct Told {
     loss: f64,
     hits: usize,
     count: usize,
-    /// The chance that a right one has more than a wrong one.
+    /// The probability that a right example scores higher than a wrong one.
     area: f64,
 }
 

@@ -1,4 +1,4 @@
-//! Photo and picture laid over each other, many times: drawn, kept, and changed at random for training.
+//! Pairs of photo and aligned picture: drawn, stored, and randomly changed for training.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -14,12 +14,12 @@ use crate::drawn::{Result, absent, draw_parts};
 
 /// Pixels of a pair.
 pub const AREA: usize = SIDE * SIDE;
-/// Parts drawn at once: all of them are in memory with their pictures.
+/// Parts drawn together: all of them are in memory with their pictures.
 const PARTS_AT_ONCE: usize = 20;
 /// Picture sizes, in turn.
 const SIZES: [[u32; 2]; 2] = [[640, 480], [320, 240]];
 
-/// What an example is for.
+/// The use of an example.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stream {
     Training,
@@ -31,7 +31,7 @@ pub struct Pairs {
     bytes: Vec<u8>,
 }
 
-/// Ranges of the changes, as standard deviations or half ranges of what they are named after. Chosen by hand.
+/// Ranges of the changes, as standard deviations or half ranges of the named quantities. Chosen by hand.
 const EXPOSURE: f32 = 0.5;
 const GAMMA: f32 = 0.4;
 const TINT: f32 = 0.1;
@@ -41,7 +41,7 @@ impl Pairs {
     /// Nothing yet.
     pub const EMPTY: Self = Self { bytes: Vec::new() };
 
-    /// Draws the parts that are lacking and looks for them; the held-out ones are of another seed.
+    /// Draws the missing parts and searches for them; the held-out ones use another seed.
     pub fn drawn_up_to(self, parts: usize, held_out: usize, seed: u64, say: &mut dyn FnMut(String)) -> Result<Self> {
         let once = |condition| (SceneConfig::only(condition), 1);
         let kinds: Vec<(SceneConfig, u64)> = Condition::ALL
@@ -77,13 +77,13 @@ impl Pairs {
         Ok(Self { bytes }.sorted())
     }
 
-    /// Which parts are there, by stream, [`PARTS_AT_ONCE`] together.
+    /// The parts that are present, by stream, in groups of [`PARTS_AT_ONCE`].
     fn chunks(&self) -> BTreeSet<(u8, usize)> {
         let chunk = |facts: PairFacts| (facts.stream, usize::from(facts.part_idx) / PARTS_AT_ONCE);
         self.bytes.chunks_exact(RECORD).map(pair_facts).map(chunk).collect()
     }
 
-    /// In the order in which they are drawn at once.
+    /// In the order in which they are drawn.
     fn sorted(self) -> Self {
         let mut records: Vec<&[u8]> = self.bytes.chunks_exact(RECORD).collect();
         records.sort_by_key(|record| (pair_facts(record).stream, pair_facts(record).part_idx));
@@ -112,7 +112,7 @@ impl Pairs {
         (0..self.len()).filter(|&idx| pair_facts(self.record(idx)).stream == stream as u8).collect()
     }
 
-    /// Right and wrong ones.
+    /// Numbers of right and wrong examples.
     pub fn counts(&self, stream: Stream) -> (usize, usize) {
         let of_it = self.of(stream);
         let right = of_it.iter().filter(|&&idx| self.is_right(idx)).count();
@@ -127,24 +127,24 @@ impl Pairs {
         &self.bytes[idx * RECORD..][..RECORD]
     }
 
-    /// As it was found.
+    /// Unchanged.
     pub fn pair(&self, idx: usize) -> Pair {
         pair_of(self.record(idx))
     }
 
-    /// Turned and mirrored together, and each in another light.
+    /// Both turned and mirrored together, with a different light change for each.
     pub fn changed_pair(&self, idx: usize, rng: &mut Pcg64Mcg) -> Pair {
         changed(&self.pair(idx), rng)
     }
 }
 
-/// Turned and mirrored together, and each in another light.
+/// Both turned and mirrored together, with a different light change for each.
 pub fn changed(pair: &Pair, rng: &mut Pcg64Mcg) -> Pair {
     let pair = turned(pair, rng);
     Pair { photo: in_other_light(&pair.photo, 0.6, rng), picture: in_other_light(&pair.picture, 1.0, rng), ..pair }
 }
 
-/// Both turned by the same angle about the middle, and mirrored or not.
+/// Both turned by the same angle about the centre, and mirrored or not.
 fn turned(pair: &Pair, rng: &mut Pcg64Mcg) -> Pair {
     let (sin, cos) = rng.random_range(0.0..std::f32::consts::TAU).sin_cos();
     let mirror = if rng.random_bool(0.5) { -1.0 } else { 1.0 };

@@ -1,4 +1,4 @@
-//! Pairs of rendered sets: photos and pictures of the same parts in really different light.
+//! Pairs of rendered sets: photos and pictures of the same parts in physically different light.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -13,9 +13,10 @@ use crate::drawn::Result;
 use crate::edits::edited;
 use crate::pairs::changed;
 
-/// Every so manieth part is held out where parts are held out at all.
+/// Every part of this index interval is held out, if parts are held out.
 const HELD_OUT: usize = 4;
-/// Chosen by hand: right ones, those whose photo is another picture of the part, and right ones that an edit of the photo makes wrong.
+/// Chosen by hand: the shares of right examples, of right examples whose photo is another picture of the part, and of
+/// right examples that an edit of the photo makes wrong.
 const RIGHT_SHARE: f64 = 0.55;
 const OTHER_PHOTO_SHARE: f64 = 0.6;
 const EDITED_SHARE: f64 = 0.25;
@@ -24,7 +25,7 @@ const EDITED_SHARE: f64 = 0.25;
 #[derive(Default)]
 struct OfPart {
     right: Vec<Pair>,
-    /// Indices of the right ones whose picture can stand for a photo.
+    /// Indices of the right ones whose picture can serve as a photo.
     clear: Vec<usize>,
     wrong: Vec<Pair>,
 }
@@ -63,7 +64,7 @@ impl Rendered {
         self.training.is_empty()
     }
 
-    /// An example for training, every part as often as any other.
+    /// A training example; each part is drawn equally often.
     pub fn sample(&self, rng: &mut Pcg64Mcg) -> (Pair, bool) {
         let part = self.training.choose(rng).expect("some part is trained on");
         let mut is_right = part.wrong.is_empty() || rng.random_bool(RIGHT_SHARE);
@@ -82,7 +83,7 @@ impl Rendered {
         (changed(&pair, rng), is_right)
     }
 
-    /// Those held out, as they were found.
+    /// The held-out examples, unchanged.
     pub fn held_out(&self) -> impl Iterator<Item = (&Pair, bool)> {
         self.held_out.iter().flat_map(|part| {
             part.right.iter().map(|pair| (pair, true)).chain(part.wrong.iter().map(|pair| (pair, false)))

@@ -8,14 +8,14 @@ const SHAPE: &str = "crates/shape/src/config.rs";
 pub(super) struct Constant {
     /// Its field of [`CheckConfig`].
     pub(super) name: &'static str,
-    /// File that its value stands in.
+    /// The file that contains its value.
     pub(super) file: &'static str,
-    /// What is tried, upwards; today's value among them.
+    /// The tried values in ascending order, including the present one.
     pub(super) grid: &'static [f64],
     field: fn(&mut CheckConfig) -> Field<'_>,
 }
 
-/// A value in a configuration, in its own precision.
+/// A value of a configuration, at its own precision.
 enum Field<'a> {
     Double(&'a mut f64),
     Single(&'a mut f32),

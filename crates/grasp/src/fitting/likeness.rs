@@ -1,4 +1,4 @@
-//! What the network that compares photo and picture is trained on: the poses that the search finds.
+//! The training data of the network that compares photo and picture: the poses that the search finds.
 
 use sdg_shape::{Likeness, Pair};
 
@@ -9,14 +9,14 @@ use crate::taught::TaughtDemonstration;
 use crate::teach::symmetry::HiddenTurns;
 use crate::verification::{PlacedDemonstration, SearchedImage, search};
 
-/// Wrong poses of a picture that count: those that agree best.
+/// Number of wrong poses used per picture: those of highest agreement.
 const WRONG_A_PICTURE: usize = 3;
 
-/// A pose that is no farther from an instance than this, as a share of its diagonal and in radians, is neither right nor wrong if it is not
-/// right: the part's height displaces it.
+/// A pose within this distance of an instance, as a share of its diagonal and in radians, that is not right counts as
+/// neither right nor wrong, because the part's height displaces it.
 const NEARLY: (f64, f64) = (0.15, 0.3);
 
-/// Photo and picture laid over each other.
+/// A photo and an aligned picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LikenessExample {
     /// Index of the picture among the part's.
@@ -27,7 +27,7 @@ pub struct LikenessExample {
     pub is_right: bool,
 }
 
-/// For every instance its best right pose, for every picture its three best wrong ones, as they agree.
+/// For every instance its best right pose, for every picture its three best wrong ones, by agreement.
 ///
 /// # Errors
 /// A part that cannot be taught.

@@ -4,25 +4,25 @@ use super::observation::{PartObservations, PictureObservations};
 use crate::check_config::ScoreConfig;
 use crate::verdict::judge_picture;
 
-/// Scores are kept this far from 0 and 1: one decision can cost −ln 0.01 = 4.6 at most.
+/// Scores are clamped to this distance from 0 and 1: one decision costs at most −ln 0.01 = 4.6.
 const MIN_SCORE: f64 = 0.01;
 
-/// A wrong part accepted costs as much as so many right ones refused. It was 3 before photo and picture were compared by a
-/// network, without which the paper's protocol had false alarms at 1; now the best wrong pose there stays far below 0.5.
+/// Number of refused right parts that cost as much as one accepted wrong part. It was 3 before a network compared photo
+/// and picture; at 1 the paper's protocol then had false alarms. Now the best wrong pose there stays far below 0.5.
 pub(super) const COST_OF_WRONG: f64 = 1.0;
 
-/// How wrong decisions were; see [`crate::fitting`] for the definition.
+/// The loss of wrong decisions; see [`crate::fitting`] for the definition.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Loss {
-    /// The right poses' part and the wrong ones'.
+    /// The sum of the losses of right and wrong poses.
     pub total: f64,
     /// Loss of right poses: mean of −ln p.
     pub right: f64,
     /// Loss of wrong poses: mean of −ln (1 − q).
     pub wrong: f64,
-    /// Instances of which a right pose was accepted, and all instances.
+    /// Number of instances with an accepted right pose, and number of instances.
     pub accepted: [usize; 2],
-    /// Pictures in which a wrong pose was accepted, and all pictures.
+    /// Number of pictures with an accepted wrong pose, and number of pictures.
     pub false_alarms: [usize; 2],
 }
 
@@ -51,7 +51,7 @@ fn part_loss(part: &PartObservations, config: &ScoreConfig) -> Loss {
     }
 }
 
-/// The best score of a right pose of each instance, and the best of a wrong pose.
+/// The best score of a right pose of each instance, and of a wrong pose.
 fn scores(picture: &PictureObservations, config: &ScoreConfig) -> (Vec<f64>, f64) {
     let mut rights = vec![0.0f64; picture.num_instances];
     let mut worst = 0.0f64;
@@ -74,7 +74,7 @@ pub(super) fn mean_loss(parts: &[Loss]) -> Loss {
     }
 }
 
-/// What a change of the configuration does to the loss: negative is better.
+/// The effect of a change of the configuration on the loss: negative is better.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Difference {
     /// Mean over parts.
@@ -91,13 +91,13 @@ impl Difference {
         Self { mean: center, half_interval: 1.96 * (squares / (n - 1.0) / n).sqrt() }
     }
 
-    /// Whether the loss falls beyond the interval.
+    /// Whether the decrease of the loss exceeds the interval.
     pub fn is_improvement(&self) -> bool {
         self.mean + self.half_interval < 0.0
     }
 }
 
-/// Mean; 0 for no values.
+/// Mean; 0 for an empty list.
 fn mean(values: impl Iterator<Item = f64>) -> f64 {
     let (count, sum) = values.fold((0usize, 0.0), |(count, sum), value| (count + 1, sum + value));
     if count > 0 { sum / count as f64 } else { 0.0 }
@@ -112,7 +112,7 @@ mod tests {
     use crate::verdict::tests::look;
     use sdg_shape::Evidence;
 
-    /// A score of the edges alone: 10 for each unit above 0.5.
+    /// A score from the edges alone: 10 per unit above 0.5.
     fn edges_alone() -> ScoreConfig {
         let none = Term { weight: 0.0, neutral: 0.0, range: [0.0, 1.0] };
         ScoreConfig {

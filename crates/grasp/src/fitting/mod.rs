@@ -1,25 +1,26 @@
-//! The constants of [`CheckConfig`] fitted on pictures with truth: for maintainers.
+//! Fits the constants of [`CheckConfig`] on pictures with truth: for maintainers.
 //!
 //! ```text
 //! parts with pictures ─ observe: search, evidence for right and wrong poses ─┬─ score: logistic regression ─┐
 //! constant × grid ─ observe again ─ regression again ────────────────────────┴─ loss on the training half ──┤
 //!                                                       best value of each ─── loss on the held-out half ───┘
 //! ```
-//! First the weights of the score are fitted, for which no picture is searched again, then each constant of
-//! [`CheckConfig::search`] alone, the others at today's values: every picture is searched again for each value, and the
-//! weights are fitted again, too, today's included, because evidence changes with the constants that it rests on.
+//! First the weights of the score are fitted, without searching the pictures again. Then each constant of
+//! [`CheckConfig::search`] is fitted alone, the others at their present values: for each value, the present one
+//! included, every picture is searched again and the weights are fitted again, because the evidence depends on the
+//! constants.
 //!
-//! **Loss** ([`Loss`]). A picture's detections are scored as in use. Let p be the best score of a right pose of an instance
-//! (0 where there is none) and q the best score of a wrong pose in a picture (likewise); both are kept within 0.01 and 0.99. A
-//! part's loss is the mean of −ln p over the instances plus the mean of −ln (1 − q) over the pictures; the loss
-//! of several parts is their mean. 0.02 is the least. A right pose lies within 4 % of the part's size and 10° of an instance, turns
-//! that its symmetry hides not counted. Poses on a part that differs in size alone count neither way: without a camera it
-//! is the part.
+//! **Loss** ([`Loss`]). A picture's detections are scored as in use. Let p be the best score of a right pose of an
+//! instance (0 if there is none) and q the best score of a wrong pose in a picture (likewise); both are clamped to 0.01
+//! and 0.99. A part's loss is the mean of −ln p over the instances plus the mean of −ln (1 − q) over the pictures; the
+//! loss of several parts is their mean. The minimum is 0.02. A right pose lies within 4 % of the part's size and 10° of
+//! an instance, up to its symmetry. Poses on a part that differs only in size count as neither right nor wrong: without
+//! a camera it is the part.
 //!
-//! **Intervals.** Parts are independent, pictures of one part are not: a difference between two values is taken part by
-//! part, and its interval is the mean ± 1.96 standard errors of those differences.
+//! **Intervals.** Parts are independent, pictures of one part are not. A difference between two values is therefore
+//! computed per part; its interval is the mean ± 1.96 standard errors of those differences.
 //!
-//! Nothing here changes a constant. Deterministic, whatever the number of threads.
+//! Nothing here changes a constant. Deterministic for any number of threads.
 
 mod constants;
 mod likeness;
@@ -43,17 +44,19 @@ pub use self::pictures::{FitInstance, FitPart, FitPicture};
 use self::regression::fit_score;
 pub use self::report::{ConstantReport, FitReport, ScoreReport, Trial};
 
-/// What is fitted.
+/// The settings of a fit.
 #[derive(Debug, Clone, Default)]
 #[non_exhaustive]
 pub struct FitOptions {
-    /// Decides the negatives that are composed for each part.
+    /// The seed of the composed negatives of each part.
     pub seed: u64,
-    /// Names of the constants to fit, as [`constant_names`] lists them; all where empty. The score's weights are always fitted.
+    /// Names of the constants to fit, as [`constant_names`] lists them; if empty, all. The score's weights are always
+    /// fitted.
     pub only: Vec<String>,
 }
 
-/// The score's weights, which are always fitted, as a name among those of the constants: alone it asks for nothing else.
+/// The name of the score's weights among those of the constants. They are always fitted; this name alone asks for
+/// nothing else.
 const SCORE: &str = "score";
 
 /// The names of all that can be fitted.
@@ -61,15 +64,15 @@ pub fn constant_names() -> Vec<&'static str> {
     std::iter::once(SCORE).chain(CONSTANTS.iter().map(|constant| constant.name)).collect()
 }
 
-/// What a fit is doing: it takes minutes to hours.
+/// The progress of a fit, which takes minutes to hours.
 #[derive(Debug)]
 #[non_exhaustive]
 pub enum FitEvent<'a> {
-    /// All pictures are searched with a constant's value.
+    /// All pictures are searched with a value of a constant.
     Searching {
         /// Name of the constant.
         constant: &'static str,
-        /// The value that is tried.
+        /// The tried value.
         value: f64,
     },
     /// The score's weights are fitted.
@@ -81,7 +84,7 @@ pub enum FitEvent<'a> {
 /// Fits each constant on `training` and reports the effect of its value on `held_out`; `observe` is called with the progress.
 ///
 /// # Errors
-/// A name that no constant has, fewer than two parts on either side, and a part that cannot be taught.
+/// A name that no constant has, fewer than two parts in either half, and a part that cannot be taught.
 pub fn fit(
     training: &[FitPart],
     held_out: &[FitPart],
@@ -142,7 +145,7 @@ struct Sides<'a> {
     held_out: Vec<PreparedPart<'a>>,
 }
 
-/// What was seen in both halves.
+/// The observations of both halves.
 struct Observed {
     training: Vec<PartObservations>,
     held_out: Vec<PartObservations>,
@@ -208,8 +211,8 @@ fn fit_constant(
     })
 }
 
-/// The score's weights: fitted on the training half and measured on the held-out half, and fitted on all parts, which are
-/// those to take over.
+/// The score's weights: fitted on the training half and measured on the held-out half; and fitted on all parts, which
+/// are the ones to adopt.
 fn report_score(observed: &Observed) -> ScoreReport {
     let today = ScoreConfig::DEFAULT;
     let fitted = fit_score(&observed.training, &today);

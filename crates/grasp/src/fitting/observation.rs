@@ -1,4 +1,5 @@
-//! The results of the search on a part's pictures: evidence for right poses, for wrong ones, and how much other things resemble it.
+//! The results of the search on a part's pictures: evidence for right poses, for wrong ones, and the resemblance of
+//! other objects.
 
 use sdg_geometry::{Angle, PlanarGrasp};
 
@@ -12,8 +13,8 @@ use crate::teach::symmetry::HiddenTurns;
 use crate::verdict::Clues;
 use crate::verification::{PlacedDemonstration, SearchedImage, search};
 
-/// How far a right pose's grasp may lie from the true one, as a share of the diagonal of the demonstration's box, in the
-/// picture's size; and how far it may be turned. The tolerances of `sdg evaluate --pictures`.
+/// Tolerance of a right pose: distance of its grasp from the true one, as a share of the diagonal of the
+/// demonstration's box in the picture's size, and angle. The same as in `sdg evaluate --pictures`.
 const RIGHT_SHARE: f64 = 0.04;
 const RIGHT_DEGREES: f64 = 10.0;
 
@@ -21,19 +22,19 @@ const RIGHT_DEGREES: f64 = 10.0;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct PoseObservation {
     pub(super) clues: Clues,
-    /// The instance that it is a right pose of.
+    /// The instance of which it is a right pose.
     pub(super) instance_idx: Option<usize>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct PictureObservations {
     pub(super) num_instances: usize,
-    /// In no order that matters; those that can be called neither right nor wrong are left out.
+    /// In arbitrary order; those that are neither right nor wrong are left out.
     pub(super) poses: Vec<PoseObservation>,
 }
 
 impl PictureObservations {
-    /// Everything that is known of the poses, as a picture is judged.
+    /// Everything known about the poses, as used to judge a picture.
     pub(super) fn clues(&self) -> Vec<Clues> {
         self.poses.iter().map(|pose| pose.clues).collect()
     }
@@ -45,7 +46,7 @@ pub(super) struct PartObservations {
 }
 
 impl PartObservations {
-    /// The share of the instances that have a right pose.
+    /// The share of instances with a right pose.
     pub(super) fn coverage(&self) -> f64 {
         let all: usize = self.pictures.iter().map(|picture| picture.num_instances).sum();
         let is_covered =
@@ -59,7 +60,7 @@ impl PartObservations {
     }
 }
 
-/// A part with what does not depend on the configuration.
+/// A part with the data that do not depend on the configuration.
 pub(super) struct PreparedPart<'a> {
     part: &'a FitPart,
     turns: HiddenTurns,
@@ -69,7 +70,7 @@ pub(super) struct PreparedPart<'a> {
 
 impl<'a> PreparedPart<'a> {
     /// # Errors
-    /// A demonstration that nothing can be taught from.
+    /// A demonstration that cannot be taught.
     pub(super) fn prepare_all(parts: &'a [FitPart], seed: u64) -> Result<Vec<Self>> {
         parts
             .iter()
@@ -121,7 +122,7 @@ impl<'a> PreparedPart<'a> {
     }
 }
 
-/// Whether a pose is that of an instance, turns that look the same not counted.
+/// Whether a pose is that of an instance, up to symmetry.
 pub(super) fn is_right(
     placed: &PlacedDemonstration<'_>,
     instance: &FitInstance,
@@ -132,8 +133,8 @@ pub(super) fn is_right(
     share <= RIGHT_SHARE && turn <= Angle::from_degrees(RIGHT_DEGREES).radians()
 }
 
-/// How far a pose's grasp is from that of an instance: as a share of the instance's diagonal, and in radians, turns that look the same
-/// not counted.
+/// The distance of a pose's grasp from that of an instance: as a share of the instance's diagonal, and in radians, up
+/// to symmetry.
 pub(super) fn error_of(
     placed: &PlacedDemonstration<'_>,
     instance: &FitInstance,
@@ -149,7 +150,7 @@ pub(super) fn error_of(
 }
 
 impl FitPicture {
-    /// Whether a pose lies on a part of which it is not decided whether it is the part.
+    /// Whether a pose lies on a part that counts as neither right nor wrong.
     pub(super) fn is_undecided(&self, placed: &PlacedDemonstration<'_>) -> bool {
         let middle = placed.outline().bounds().center();
         self.undecided.iter().any(|bbox| bbox.contains(&middle))

@@ -1,4 +1,4 @@
-//! Photo and picture laid over each other, as records of equal length in a file: what the likeness is trained on.
+//! Photo and aligned picture, as records of equal length in a file: the training data of the likeness.
 
 use sdg_shape::{Pair, SIDE};
 
@@ -14,16 +14,16 @@ const PICTURE: u8 = 4;
 const RIGHT: u8 = 1;
 const CLEAR: u8 = 2;
 
-/// What is known of a pair besides its pixels.
+/// The data of a pair besides its pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PairFacts {
-    /// What the example is for: the trainer's own numbers.
+    /// The use of the example, as a number defined by the trainer.
     pub stream: u8,
     /// Index of the part.
     pub part_idx: u16,
     /// Whether the picture shows the part there.
     pub is_right: bool,
-    /// Whether nothing covers the part there, so that the picture can stand for a photo of it.
+    /// Whether nothing covers the part there, so that the picture can serve as a photo of it.
     pub is_clear: bool,
 }
 

@@ -1,15 +1,15 @@
-//! What constants are fitted on.
+//! The data on which constants are fitted.
 
 use image::RgbImage;
 use sdg_demonstration::Demonstration;
 use sdg_geometry::{BoundingBox, GraspLine, PlanarSimilarity, RotationalSymmetry};
 
-/// One part, taught from one photo, and pictures to find it in.
+/// One part, taught from one photo, and pictures to search for it.
 #[derive(Debug, Clone)]
 pub struct FitPart {
-    /// What it is taught from.
+    /// Its demonstration.
     pub demonstration: Demonstration,
-    /// Turns that look the same.
+    /// The turns of its symmetry.
     pub symmetry: RotationalSymmetry,
     /// Pictures of the photo's size, with the part and without.
     pub pictures: Vec<FitPicture>,
@@ -20,17 +20,17 @@ pub struct FitPart {
 pub struct FitPicture {
     /// The picture.
     pub image: RgbImage,
-    /// Every one of the part in it.
+    /// Every instance of the part in it.
     pub instances: Vec<FitInstance>,
-    /// Boxes of parts that differ in size alone: what is found on them is neither right nor wrong.
+    /// Boxes of parts that differ only in size: detections on them are neither right nor wrong.
     pub undecided: Vec<BoundingBox>,
 }
 
-/// Where a part lies.
+/// The position of a part.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FitInstance {
     /// The true marks, in pixels of the picture.
     pub grasp: GraspLine,
-    /// Takes the photo's pixels to the picture's.
+    /// Maps the photo's pixels to the picture's.
     pub image_from_demonstration: PlanarSimilarity,
 }

@@ -1,10 +1,10 @@
 //! The score's weights, by logistic regression.
 //!
-//! Not every pose counts alike. As in use, what matters of an instance is its best right pose, and of a picture its best
-//! wrong one: the regression is repeated, each time on those that the last weights put first. Instances, pictures and
-//! parts weigh as in the loss of [`crate::fitting`].
+//! Not every pose counts. As in use, only the best right pose of an instance and the best wrong pose of a picture
+//! matter: the regression is repeated, each time on the poses that the last weights rank first. Instances, pictures and
+//! parts have the same weights as in the loss of [`crate::fitting`].
 //!
-//! Legend: `x` the values of a pose's terms, kept in their ranges; `w` the weights, the bias last; `y` 1 for right.
+//! Legend: `x` the values of a pose's terms, clamped to their ranges; `w` the weights, the bias last; `y` 1 for right.
 
 use nalgebra::{SMatrix, SVector};
 use sdg_geometry::upper_median;
@@ -15,28 +15,29 @@ use super::observation::{PartObservations, PictureObservations};
 use crate::check_config::{ScoreConfig, Term};
 use crate::verdict::{judge_picture, rivals_gain};
 
-/// Terms that are fitted: all but the network's, which is not asked here.
+/// The fitted terms: all except the network's, which is not used here.
 const NUM_TERMS: usize = 14;
 /// Weights and bias.
 type Weights = SVector<f64, { NUM_TERMS + 1 }>;
 
-/// Rounds of choosing poses and fitting anew; a round moves half-way, so that it does not swing between two choices.
+/// Rounds of choosing poses and fitting; each round moves half-way, to avoid oscillation between two choices.
 const NUM_ROUNDS: usize = 16;
-/// Newton's steps of one regression.
+/// Newton steps of one regression.
 const NUM_STEPS: usize = 12;
-/// Keeps weights finite where a term carries no information, in units of a term's standard deviation. Chosen by hand.
+/// Keeps weights finite if a term carries no information, in units of a term's standard deviation. Chosen by hand.
 const RIDGE: f64 = 2e-4;
-/// Parts of which fewer instances have a right pose among those found say nothing about the score: near-symmetric ones.
+/// Minimum share of instances with a right pose among those found; parts below it, which are nearly symmetric, carry no
+/// information about the score.
 const MIN_COVERAGE: f64 = 0.6;
 
-/// One pose that counts.
+/// One pose that is used.
 struct Example {
     x: SVector<f64, NUM_TERMS>,
     is_right: bool,
     weight: f64,
 }
 
-/// The weights that fit `parts` best, beginning at `from`, whose ranges are kept.
+/// The weights that fit `parts` best, starting from `from`, whose ranges are kept.
 pub(super) fn fit_score(parts: &[PartObservations], from: &ScoreConfig) -> ScoreConfig {
     let parts: Vec<&PartObservations> = parts.iter().filter(|part| part.coverage() >= MIN_COVERAGE).collect();
     let mut config = *from;
@@ -180,7 +181,7 @@ fn terms_mut(config: &mut ScoreConfig) -> [&mut Term; NUM_TERMS] {
     ]
 }
 
-/// Weights, and the bias as if every neutral value were 0.
+/// Weights, and the bias for neutral values of 0.
 fn weights_of(config: &ScoreConfig) -> Weights {
     let terms = terms(config);
     let offset: f64 = terms.iter().map(|term| term.weight * term.neutral).sum();
@@ -228,7 +229,7 @@ fn regression(examples: &[Example]) -> Weights {
             hessian += z * z.transpose() * (share * p * (1.0 - p));
         }
         let Some(cholesky) = hessian.cholesky() else { break };
-        // A long step overshoots where the logistic is flat.
+        // A long step overshoots in the flat part of the logistic.
         let step = cholesky.solve(&gradient);
         w -= step * (4.0 / step.amax()).min(1.0);
     }
@@ -241,8 +242,8 @@ fn regression(examples: &[Example]) -> Weights {
     weights
 }
 
-/// The same score with neutral values half-way between right poses' median and wrong ones', so that contributions tell what
-/// speaks for and what against. Size and outside are neutral at 0: nothing is better than that.
+/// The same score with neutral values half-way between the medians of right and wrong poses, so that the sign of a
+/// contribution says whether it supports the part. Size and outside are neutral at 0, their best value.
 fn neutral_in_the_middle(parts: &[&PartObservations], config: &ScoreConfig) -> ScoreConfig {
     let examples = examples(parts, config);
     let median = |k: usize, right: Option<bool>| {
@@ -255,7 +256,7 @@ fn neutral_in_the_middle(parts: &[&PartObservations], config: &ScoreConfig) -> S
         term.neutral = match k {
             0..=3 | 7 => 0.5 * (median(k, Some(true)) + median(k, Some(false))),
             6 => median(k, None),
-            // What contradicts the part is neutral up to where its range begins.
+            // Evidence against the part is neutral up to the start of its range.
             8.. => term.range[0],
             _ => 0.0,
         };
@@ -274,7 +275,7 @@ mod tests {
 
     use crate::verdict::tests::look;
 
-    /// Right poses have more edges than wrong ones, by and large; everything else tells nothing.
+    /// Right poses have more edges than wrong ones on average; all other terms carry no information.
     fn part(rng: &mut Pcg64Mcg) -> PartObservations {
         let mut pose = |edges: f64, instance_idx| {
             let mut noise = || rng.random_range(-0.15..0.15);

@@ -1,33 +1,33 @@
-//! What a fit found, and how it is printed.
+//! The results of a fit, and their printed form.
 
 use std::fmt;
 
 use super::loss::{Difference, Loss};
 use crate::check_config::ScoreConfig;
 
-/// A value that was tried.
+/// A tried value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Trial {
-    /// The value that was tried.
+    /// The tried value.
     pub value: f64,
     /// The loss on the training half.
     pub loss: f64,
 }
 
-/// What was found about one constant.
+/// The result for one constant.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ConstantReport {
     /// Its field of [`crate::CheckConfig`].
     pub name: &'static str,
-    /// File that its value stands in.
+    /// The file that contains its value.
     pub file: &'static str,
     /// Present value.
     pub today: f64,
-    /// The value with the least loss on the training half.
+    /// The value with the smallest loss on the training half.
     pub fitted: f64,
-    /// All values that were tried.
+    /// All tried values.
     pub trials: Vec<Trial>,
-    /// On the held-out half, with today's value.
+    /// On the held-out half, with the present value.
     pub before: Loss,
     /// On the held-out half, with the fitted value.
     pub after: Loss,
@@ -35,14 +35,14 @@ pub struct ConstantReport {
     pub difference: Difference,
 }
 
-/// What was found about the score's weights.
+/// The result for the score's weights.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ScoreReport {
     /// Fitted on the training half.
     pub fitted: ScoreConfig,
-    /// Fitted on both halves: what is to be taken over.
+    /// Fitted on both halves: the weights to adopt.
     pub on_all: ScoreConfig,
-    /// On the held-out half, with today's weights.
+    /// On the held-out half, with the present weights.
     pub before: Loss,
     /// On the held-out half, with those of the training half.
     pub after: Loss,
@@ -50,16 +50,16 @@ pub struct ScoreReport {
     pub difference: Difference,
 }
 
-/// What a fit found. Printed, it is Markdown.
+/// The results of a fit; the printed form is Markdown.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FitReport {
-    /// Parts that constants were fitted on.
+    /// Parts used for fitting.
     pub num_training: usize,
-    /// Parts that fitted values were measured on.
+    /// Parts used for measuring the fitted values.
     pub num_held_out: usize,
-    /// Today's values on the held-out half.
+    /// The present values on the held-out half.
     pub today: Loss,
-    /// Today's values on the training half.
+    /// The present values on the training half.
     pub today_training: Loss,
     /// Each constant alone.
     pub constants: Vec<ConstantReport>,
@@ -115,7 +115,7 @@ impl fmt::Display for ConstantReport {
 }
 
 impl ConstantReport {
-    /// All values that were tried and their losses, upwards.
+    /// All tried values and their losses, in ascending order.
     pub fn tried(&self) -> String {
         let mut trials = self.trials.clone();
         trials.sort_by(|a, b| a.value.total_cmp(&b.value));

@@ -1,4 +1,4 @@
-//! What a network proposes: places of an image, each with the model's reading of it.
+//! A network's proposals: places of an image, each with the model's reading of it.
 
 use nalgebra::Point2;
 use sdg_geometry::{BoundingBox, PlanarGrasp, PlanarSimilarity};
@@ -11,9 +11,9 @@ use crate::taught::TaughtDemonstration;
 /// The output of a network for an image, read by the model.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Proposals {
-    /// Best first, those that cannot be read as a pose left out.
+    /// Best first; those that cannot be read as a pose are left out.
     pub(crate) candidates: Vec<PoseCandidate>,
-    /// Every box with its score, also of those that are no candidates.
+    /// Every box with its score, also those without a candidate.
     pub(super) boxes: Vec<(BoundingBox, f64)>,
 }
 
@@ -30,16 +30,16 @@ impl Proposals {
 pub(crate) struct PoseCandidate {
     /// The class's probability.
     pub(crate) class_probability: f64,
-    /// The same; of proposals, less where the heads contradict each other and where the place does not look
-    /// like the demonstration.
+    /// The same; for proposals, lower if the heads contradict each other or the place does not look like
+    /// the demonstration.
     pub(crate) network_score: f64,
     pub(crate) bbox: BoundingBox,
-    /// Each with the network's score; empty where the model has none.
+    /// Each with the network's score; empty for a model without keypoints.
     pub(crate) keypoints: Vec<(Point2<f64>, f64)>,
     pub(crate) grasp: PlanarGrasp,
     /// The demonstration that it is compared with first.
     pub(crate) demonstration_idx: usize,
-    /// Where that demonstration lies.
+    /// The pose of that demonstration.
     pub(crate) image_from_cutout: PlanarSimilarity,
     pub(crate) turn_source: TurnSource,
 }

@@ -1,9 +1,10 @@
-//! The comparison network's part in a detection: whether what lies under a pose looks like the demonstration.
+//! The comparison network's part in a detection: whether the image under a pose looks like the demonstration.
 //!
-//! A part whose two ends are alike is often read the wrong way round, and keypoints on a short grasp line say little of where
-//! a long part ends. So the pose that a model read is compared as it is, and laid into the detected box in its direction
-//! and in the opposite one. The likeliest poses are then corrected by where the network finds the demonstration's features,
-//! and all once more in views of twice the pixels, where how alike the features are counts, too.
+//! A part with similar ends is often read the wrong way round, and keypoints on a short grasp line say little about the
+//! ends of a long part. So the model's pose is compared as it is, and also fitted into the detected box in its
+//! direction and in the opposite one. The most likely poses are then corrected by the positions at which the network
+//! finds the demonstration's features. All are compared once more in views of twice the resolution, where the
+//! similarity of the features counts, too.
 
 use image::RgbImage;
 use sdg_comparison::{Comparison, ComparisonNetwork, Pyramid, Reference, View};
@@ -14,17 +15,18 @@ use super::consistency::ComparisonEvidence;
 use super::placing::fill_box;
 use crate::taught::TaughtDemonstration;
 
-/// Candidates of an image that are compared: those for which class and box say most. Each takes three to five views. In the
-/// protocol's pictures 16 of them found not one part more, and 616 of the 3200 pictures had five or more.
+/// Maximum number of compared candidates of an image: those with the highest class and box scores. Each takes three to
+/// five views. In the protocol's pictures 16 of them found no further part, and 616 of the 3200 pictures had five or
+/// more.
 const MAX_COMPARED: usize = 5;
-/// Candidates of an image whose poses are corrected before their features are compared finely: the likeliest. Four found not
-/// one more.
+/// Maximum number of candidates of an image whose poses are corrected before their features are compared at high
+/// resolution: the most likely. Four found no further part.
 const MAX_CORRECTED: usize = 2;
-/// Candidates of an image that are looked at the other way round in finer views: the likeliest. A finer view takes four times as
-/// long as another.
+/// Maximum number of candidates of an image that are tried end for end at high resolution: the most likely. Such a view
+/// takes four times as long as another.
 const MAX_TURNED: usize = 2;
 
-/// Asks the network about one picture.
+/// Evaluates the network on one picture.
 pub(super) struct Comparer<'a> {
     network: &'a ComparisonNetwork,
     picture: Pyramid<'a>,
@@ -44,8 +46,8 @@ impl<'a> Comparer<'a> {
         Self { network, picture: Pyramid::new(image), picture_size: image.dimensions(), demonstrations }
     }
 
-    /// The most promising of these candidates, each in the likeliest of the poses that it may have, with its score, best
-    /// first. They come best first.
+    /// The best of these candidates, each in its most likely pose, with its score, best first. The input is sorted,
+    /// best first.
     pub(super) async fn compare(&self, mut candidates: Vec<PoseCandidate>) -> Vec<PoseCandidate> {
         candidates.truncate(MAX_COMPARED);
         let likely = candidates.into_iter().map(|one| {
@@ -74,7 +76,7 @@ impl<'a> Comparer<'a> {
         aligned
     }
 
-    /// Each candidate in the likeliest of its poses; of equally likely ones, in the first.
+    /// Each candidate in its most likely pose; of equally likely ones, in the first.
     async fn likeliest(&self, candidates: Vec<(PoseCandidate, Vec<PlanarSimilarity>)>) -> Vec<Compared> {
         let of_candidate = |(one, poses): &(PoseCandidate, Vec<PlanarSimilarity>)| -> Vec<View> {
             poses.iter().map(|pose| self.reference(one).view(&self.picture, pose)).collect()
@@ -93,8 +95,8 @@ impl<'a> Comparer<'a> {
         candidates.into_iter().filter_map(likeliest).collect()
     }
 
-    /// Each candidate where the part's features lie in views of twice the pixels, or the other way round where they are more
-    /// alike there, and its score by how alike they are. The likeliest come first.
+    /// Each candidate at the position of the part's features in views of twice the resolution, or end for end if they
+    /// are more similar there, and its score by their similarity. The most likely come first.
     async fn aligned(&self, compared: Vec<Compared>) -> Vec<PoseCandidate> {
         let reference = |one: &PoseCandidate| self.demonstration(one).finer_reference(self.network.config());
         let ways = |(idx, (one, _)): (usize, &Compared)| match idx {
@@ -128,20 +130,20 @@ impl<'a> Comparer<'a> {
     }
 }
 
-/// Sorts by score; equal ones stay as they are.
+/// Sorts by score; a stable sort.
 pub(super) fn best_first<T>(candidates: &mut [T], candidate: impl Fn(&T) -> &PoseCandidate) {
     candidates.sort_by(|a, b| candidate(b).network_score.total_cmp(&candidate(a).network_score));
 }
 
-/// The pose in which the outline's box lies at the same place the other way round.
+/// The pose with the outline's box at the same place, turned end for end.
 fn turned(demonstration: &TaughtDemonstration, pose: &PlanarSimilarity) -> PlanarSimilarity {
     let center = demonstration.marks.bbox.center();
     pose.compose(&PlanarSimilarity::about(center, center, Angle::from_degrees(180.0), 1.0))
 }
 
-/// The pose that was read; laid into the box where that is another; laid into it the other way round.
+/// The pose as read; the pose fitted into the box if it differs; the pose fitted into it end for end.
 fn likely_poses(demonstration: &TaughtDemonstration, read: &PoseCandidate) -> Vec<PlanarSimilarity> {
-    /// Share of the box's diagonal by which the same point may be apart in two poses that are taken for one.
+    /// Largest distance of the same point in two poses that count as one, as a share of the box's diagonal.
     const MAX_DISTANCE: f64 = 0.01;
     let PoseCandidate { bbox, grasp, image_from_cutout, .. } = read;
     let laid = fill_box(demonstration, bbox, grasp.angle);
@@ -182,7 +184,7 @@ mod tests {
         assert_eq!((likely.len(), likely[0]), (2, pose));
         assert!(taught.outline(&likely[1]).bounds().iou(&bbox) > 0.999);
         assert!((likely[1].angle.distance(pose.angle).to_degrees() - 180.0).abs() < 1e-9);
-        // Read too small, it is laid into its box as well.
+        // A pose read too small is also fitted into its box.
         let small = PlanarSimilarity::about(from, to, Angle::from_degrees(33.0), 0.8);
         let likely = likely_poses(&taught, &read(small));
         assert_eq!((likely.len(), likely[0]), (3, small));

@@ -1,51 +1,53 @@
-//! A network's score: the probability of the class, less where its heads contradict each other, and less where the place does
+//! A network's score: the probability of the class, reduced if its heads contradict each other and if the place does
 //! not look like the demonstration.
 //!
-//! Box, keypoints, mask and turn of a detection each say where the part lies. On the part they agree; on another thing the
-//! box fits that thing, and where the other heads put the demonstration, it fills little of the box or has an impossible size.
+//! Box, keypoints, mask and turn of a detection each say where the part lies. On the part they agree. On another object
+//! the box fits that object, and the demonstration at the pose of the other heads fills little of the box or has an
+//! impossible size.
 
 use sdg_geometry::{Angle, BoundingBox, PlanarSimilarity};
 
 use crate::sizes::SizeRange;
 use crate::taught::TaughtDemonstration;
 
-/// Weight of ln of the share that is filled against the log-odds of the class. Of four generated parts, ten pictures each,
-/// taught for 120 steps, 31 were above all but one of the pictures without them, with a weight of 0 28
+/// Weight of ln of the filled share relative to the log-odds of the class. For four generated parts, ten pictures each,
+/// taught for 120 steps, 31 scored above all but one of the pictures without them; with a weight of 0 it was 28
 /// (docs/decisions/013-base-weights.md). Other weights were not tried.
 const WEIGHT: f64 = 3.0;
 
-/// Weight of the comparison network's log-odds against those of the class. Of the same four parts, 40 pictures with the
-/// part, so many were above every picture without it: 22 with a weight of 0, 24 with 0.5 and 1, 27 with 2, 29 with 3; so
-/// many were placed: 35, with 2 and 3 34. What the network says of one part differs more than these four tell.
+/// Weight of the comparison network's log-odds relative to those of the class. For the same four parts, 40 pictures
+/// with the part, the number that scored above every picture without it was: 22 with a weight of 0, 24 with 0.5 and 1,
+/// 27 with 2, 29 with 3. The number placed right was 35, and 34 with 2 and 3. The network's output varies more between
+/// parts than these four show.
 const COMPARISON_WEIGHT: f64 = 2.0;
 
-/// Weight of how alike the part's features are in the finer views, and the mean cosine that changes no score: between those of other
-/// things and of the part, which are 0.35 to 0.6 and 0.6 to 0.9. Of the generated parts 9001 to 9003, 49 pictures with the part
-/// placed right after 60 or 120 steps, so many were above every picture without it: 16 with a weight of 0, 34 with 5, 36 with 10,
-/// 37 with 20, 38 with 30 and 50.
+/// Weight of the similarity of the part's features in the finer views, and the neutral mean cosine: between those of
+/// other objects, 0.35 to 0.6, and of the part, 0.6 to 0.9. For the generated parts 9001 to 9003, 49 pictures with the
+/// part placed right after 60 or 120 steps, the number that scored above every picture without it was: 16 with a weight
+/// of 0, 34 with 5, 36 with 10, 37 with 20, 38 with 30 and 50.
 const COSINE_WEIGHT: f64 = 20.0;
 const NEUTRAL_COSINE: f64 = 0.62;
 
-/// The threshold of the score that generated parts have, in log-odds. On the parts 9001 to 9004 it accepts 30 of 37 places and 2
-/// of 40 pictures without the part; 1.5 accepts 33 and 4.
+/// The usual threshold of the score of generated parts, in log-odds. On the parts 9001 to 9004 it accepts 30 of 37
+/// places and 2 of 40 pictures without the part; 1.5 accepts 33 and 4.
 #[cfg(feature = "teach")]
 pub(crate) const USUAL_THRESHOLD: f64 = 2.0;
 
-/// Least share that is filled and most that the odds are, so that both logarithms are finite.
+/// Minimum filled share and maximum odds, so that both logarithms are finite.
 const MIN_FILLED: f64 = 0.01;
 const MAX_PROBABILITY: f64 = 1.0 - 1e-6;
 
-/// What the comparison network says of a pose.
+/// The comparison network's output for a pose.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ComparisonEvidence {
-    /// That the place shows the part.
+    /// Log-odds that the place shows the part.
     pub(super) log_odds: f64,
     /// The mean cosine of the part's features in the finer views; `None` before they are compared.
     pub(super) cosine: Option<f64>,
 }
 
-/// How much of the box the demonstration fills where the model puts it, in `[0, 1]`: the intersection over the union of the
-/// box with that of the outline, which is made no larger and no smaller than the part may be.
+/// The share of the box that the demonstration fills at the model's pose, in `[0, 1]`: the intersection over union of
+/// the box with the outline's box, whose size is clamped to the part's possible sizes.
 pub(super) fn filled(
     demonstration: &TaughtDemonstration,
     image_from_cutout: &PlanarSimilarity,
@@ -67,7 +69,7 @@ pub(super) fn score(class_probability: f64, filled: f64, compared: Option<Compar
     let probability = class_probability.clamp(1.0 - MAX_PROBABILITY, MAX_PROBABILITY);
     let of_class = (probability / (1.0 - probability)).ln();
     let of_heads = of_class + WEIGHT * filled.max(MIN_FILLED).ln();
-    // A mean, not the sum: scores that are all next to 0 or 1 leave no room for a threshold between them.
+    // A mean, not the sum: scores that are all close to 0 or 1 leave no room for a threshold between them.
     let with = |ComparisonEvidence { log_odds, cosine }| {
         let of_features = cosine.map_or(0.0, |cosine| COSINE_WEIGHT * (cosine - NEUTRAL_COSINE));
         (of_heads + COMPARISON_WEIGHT * log_odds) / (1.0 + COMPARISON_WEIGHT) + of_features
@@ -100,15 +102,15 @@ mod tests {
         let large = at(300.0, 2.0);
         let too_large = filled(&taught, &large, &around(&large), picture);
         assert!(too_large < 0.5 && score(0.9, too_large, None) < 0.6, "{too_large}");
-        // What does not look like the demonstration scores lower, what does higher.
+        // A place unlike the demonstration lowers the score, a similar one raises it.
         let compared = |log_odds: f64, cosine| Some(ComparisonEvidence { log_odds, cosine });
         let scores = [-3.0, 0.0, 3.0].map(|log_odds| score(0.7, whole, compared(log_odds, None)));
         assert!(scores[0] < 0.2 && scores[1] < score(0.7, whole, None) && scores[2] > 0.9, "{scores:?}");
-        // Features that are less alike than other things' lower it, those of the part raise it.
+        // Features less similar than those of other objects lower it, those of the part raise it.
         let scores = [0.4, NEUTRAL_COSINE, 0.8].map(|cosine| score(0.7, whole, compared(0.0, Some(cosine))));
         assert!(scores[0] < 0.1 && scores[2] > 0.9, "{scores:?}");
         assert_eq!(scores[1], score(0.7, whole, compared(0.0, None)));
-        // What fills nothing and what is certain stay numbers.
+        // A filled share of zero and certainty remain finite.
         assert!(score(1.0, 0.0, None) > 0.0 && score(1.0, 1.0, None) < 1.0 && score(0.0, 1.0, None) > 0.0);
     }
 }

@@ -13,7 +13,7 @@ pub(super) fn scored(detections: &Detections, i: usize) -> Vec<(Point2<f64>, f64
     detections.keypoints[i].iter().map(|k| (Point2::new(k.x, k.y), k.score)).collect()
 }
 
-/// Model C: the keypoints say where the demonstration lies.
+/// Model C: the keypoints give the pose of the demonstration.
 pub(super) fn on_line(
     keypoints: &[(Point2<f64>, f64)],
     bbox: &BoundingBox,
@@ -26,8 +26,8 @@ pub(super) fn on_line(
     })
 }
 
-/// Model C: the keypoints' mean is the grasp's middle, the least-squares line through them its angle. `None` where
-/// they all fall on one place.
+/// Model C: the keypoints' mean is the grasp's centre, the least-squares line through them its angle. `None` if
+/// they all coincide.
 ///
 /// # Source
 /// Paper, section IV-C.
@@ -36,10 +36,10 @@ pub(super) fn grasp(keypoints: &[(Point2<f64>, f64)], width_px: f64) -> Option<P
     PlanarGrasp::from_keypoints(&visible, width_px)
 }
 
-/// Model B: the box gives the place, the keypoints the turn alone.
+/// Model B: the box gives the position, the keypoints only the turn.
 ///
 /// # Source
-/// Paper, section IV-B. There the box's middle is the grasp; here the grasp keeps the taught offset from it.
+/// Paper, section IV-B. There the box's centre is the grasp; here the grasp keeps the taught offset from it.
 pub(super) fn box_and_turn(
     keypoints: &[(Point2<f64>, f64)],
     bbox: &BoundingBox,

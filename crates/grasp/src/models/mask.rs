@@ -13,22 +13,23 @@ use crate::error::Result;
 use crate::facts::TurnSource;
 use crate::taught::TaughtDemonstration;
 
-/// Pixels kept around a mask, so that keypoints near its rim see what surrounds them. Chosen by hand, not measured.
+/// Margin in pixels around a mask, so that keypoints near its rim see their surroundings. Chosen by hand, not measured.
 const MARGIN_PX: f64 = 24.0;
 
-/// The mask of a pipe, read off 28 cells a side, overlaps the pipe's outline by a third when it lies right on it. Whether
-/// it is the part, the demonstration says. Chosen on fuel lines, a shipped part; the number of pictures is not recorded.
+/// The mask of a pipe, read from 28 cells per side, overlaps the pipe's outline by a third even if it lies exactly on
+/// it. The demonstration decides whether it is the part. Chosen on fuel lines, a shipped part; the number of pictures
+/// is not recorded.
 fn rotation() -> RotationConfig {
     let mut config = RotationConfig::default();
     config.min_overlap = 0.3;
     config
 }
 
-/// The demonstrations as the mask's content is compared with them.
+/// The demonstrations in the form in which the mask's content is compared with them.
 #[derive(Clone)]
 pub(crate) struct MaskMatcher {
     estimator: Arc<RotationEstimator>,
-    /// One a demonstration, in their order.
+    /// One per demonstration, in their order.
     templates: Vec<Arc<RotationTemplate>>,
 }
 
@@ -58,8 +59,8 @@ impl MaskMatcher {
         Ok(Self { estimator: Arc::new(estimator), templates })
     }
 
-    /// Where the demonstration lies: by matched keypoints where enough of them agree, else by the outline, which may
-    /// be wrong by half a turn where both ends of the part look alike. `None` where neither tells a turn.
+    /// The pose of the demonstration: by matched keypoints if enough of them agree, otherwise by the outline, which
+    /// may be wrong by half a turn if both ends of the part look alike. `None` if neither gives a turn.
     ///
     /// # Source
     /// Paper, section IV-D. There the mask's centroid is the grasp; here the whole pose is estimated.
@@ -94,7 +95,7 @@ impl MaskMatcher {
     }
 }
 
-/// Whole pixels of an image: SIFT on the rest would be time lost.
+/// The masked window of an image in whole pixels: SIFT on the rest would waste time.
 struct Window {
     left: u32,
     top: u32,
@@ -136,7 +137,7 @@ mod tests {
     use nalgebra::Point2;
     use sdg_geometry::{Angle, GraspLine};
 
-    /// An L of one colour: nothing but its outline tells how it lies.
+    /// An L of one colour: only its outline shows its pose.
     fn l_shape() -> Polygon {
         let corners = [(20.0, 20.0), (120.0, 20.0), (120.0, 45.0), (45.0, 45.0), (45.0, 100.0), (20.0, 100.0)];
         Polygon { vertices: corners.map(|(x, y)| Point2::new(x, y)).to_vec() }

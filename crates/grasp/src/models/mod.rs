@@ -5,8 +5,8 @@
 //! | A ([`orientation`]) | Faster R-CNN, orientation CNN | box ([`placing`]) | class of the box's crop |
 //! | B ([`keypoints`]) | Keypoint R-CNN | box ([`placing`]) | line through the keypoints |
 //! | C ([`keypoints`]) | Keypoint R-CNN | keypoints | keypoints |
-//! | D ([`mask`]) | Mask R-CNN | texture or outline of what the mask shows | likewise |
-//! | S | none | the demonstration looked for in the whole image | likewise |
+//! | D ([`mask`]) | Mask R-CNN | texture or outline of the masked area | likewise |
+//! | S | none | search for the demonstration in the whole image | likewise |
 
 mod candidate;
 mod comparison;
@@ -38,8 +38,8 @@ use crate::error::{GraspError, Result};
 use crate::facts::ModelKind;
 use crate::taught::TaughtDemonstration;
 
-/// Candidates looked at in one image, best first; verification costs time for each, and what is beyond, the search finds.
-/// Chosen by hand, not measured.
+/// Maximum number of candidates used in one image, best first; verification takes time for each, and the search finds
+/// the others. Chosen by hand, not measured.
 const MAX_CANDIDATES: usize = 16;
 /// Boxes of a lower score are dropped: Detectron2's threshold at test time.
 const MIN_NETWORK_SCORE: f64 = 0.05;
@@ -49,7 +49,7 @@ const MIN_NETWORK_SCORE: f64 = 0.05;
 pub(crate) struct Network {
     pub(crate) detector: GeneralizedRcnn,
     pub(crate) reading: Reading,
-    /// Compares what lies under a pose with the demonstration; none where teaching started from weights without it.
+    /// Compares the image under a pose with the demonstration; none if teaching started from weights without it.
     pub(crate) comparison: Option<ComparisonNetwork>,
 }
 
@@ -66,7 +66,7 @@ pub(crate) enum Reading {
     Mask(MaskMatcher),
 }
 
-/// The detector that a model looks with; `None` for model S.
+/// The detector of a model; `None` for model S.
 #[cfg(any(feature = "teach", test))]
 pub(crate) fn rcnn_kind(kind: ModelKind) -> Option<RcnnKind> {
     match kind {
@@ -78,7 +78,7 @@ pub(crate) fn rcnn_kind(kind: ModelKind) -> Option<RcnnKind> {
 }
 
 impl Network {
-    /// The letter of the model that looks like this.
+    /// The letter of the model with this reading.
     pub(crate) fn kind(&self) -> ModelKind {
         match self.reading {
             Reading::BoxAndCrop(_) => ModelKind::A,
@@ -88,13 +88,13 @@ impl Network {
         }
     }
 
-    /// The threshold, in log-odds, that scores of networks of this kind have; `None` without a comparison network.
+    /// The usual threshold, in log-odds, of scores of networks of this kind; `None` without a comparison network.
     #[cfg(feature = "teach")]
     pub(crate) fn usual_threshold(&self) -> Option<f64> {
         self.comparison.as_ref().map(|_| consistency::USUAL_THRESHOLD)
     }
 
-    /// The same detector read as another model does that is taught alike.
+    /// The same detector, read as another model that is taught in the same way.
     pub(crate) fn read_as(self, kind: ModelKind) -> Option<Self> {
         let reading = match (self.reading, kind) {
             (Reading::BoxAndKeypoints | Reading::Keypoints, ModelKind::B) => Reading::BoxAndKeypoints,
@@ -104,7 +104,7 @@ impl Network {
         Some(Self { reading, ..self })
     }
 
-    /// The network as a file keeps it: every weight rounded to half precision.
+    /// The network as it is stored: every weight rounded to half precision.
     #[cfg(feature = "teach")]
     pub(crate) fn rounded(self) -> Self {
         fn round<M: Module>(module: M) -> M {
@@ -130,7 +130,7 @@ impl Network {
         Self { detector: self.detector.to_device(device), reading, comparison }
     }
 
-    /// What the network proposes, best first. Detections that make no sense to the model (keypoints on one place, a
+    /// The network's proposals, best first. Detections without a meaning for the model (coincident keypoints, a
     /// mask without a turn) are left out.
     ///
     /// # Errors
@@ -140,7 +140,8 @@ impl Network {
         read_sync(self.proposals_async(image, image.dimensions().into(), demonstrations))
     }
 
-    /// [`Self::proposals`], awaited, in a part of a picture of size `whole`, whose pixels the network is shown as if it were shown the whole.
+    /// [`Self::proposals`], asynchronous, in a region of a picture of size `whole`; the network gets the region's
+    /// pixels at the scale that it would get for the whole picture.
     ///
     /// # Errors
     /// As there.
@@ -212,7 +213,7 @@ impl Network {
     }
 }
 
-/// Refuses a detector that is not the model's own kind, as a forged file may bring.
+/// Refuses a detector of another kind than the model's, as a forged file may contain.
 ///
 /// # Errors
 /// [`GraspError::Damaged`] says which head was expected.

@@ -9,10 +9,10 @@ use crate::error::Result;
 use crate::facts::TurnSource;
 use crate::taught::TaughtDemonstration;
 
-/// Reads the turn off the crop of a detected box and lays the demonstration, so turned, into the box.
+/// Reads the turn from the crop of a detected box, and fits the demonstration at that turn into the box.
 ///
 /// # Source
-/// Paper, section IV-A. There the box's middle is the grasp; here the grasp keeps the taught offset from it.
+/// Paper, section IV-A. There the box's centre is the grasp; here the grasp keeps the taught offset from it.
 ///
 /// # Errors
 /// A box without area.

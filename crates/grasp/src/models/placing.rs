@@ -1,4 +1,5 @@
-//! Where a detection puts a demonstration: the reading of every model, and the pose that fills a box at a known turn.
+//! The pose of a demonstration from a detection: the reading of every model, and the pose that fills a box at a known
+//! turn.
 
 use sdg_geometry::{Angle, BoundingBox, PlanarSimilarity};
 
@@ -13,7 +14,7 @@ pub(super) struct PoseReading {
     pub(super) turn_source: TurnSource,
 }
 
-/// The demonstration that, where `pose` puts it, fills the detected box best.
+/// The demonstration that fills the detected box best at `pose`.
 pub(super) fn nearest_demonstration(
     demonstrations: &[TaughtDemonstration],
     bbox: &BoundingBox,
@@ -31,12 +32,12 @@ pub(super) fn nearest_demonstration(
         .map(|(reading, _)| reading)
 }
 
-/// The demonstration turned until its grasp line points to `grasp_angle`, so large and so placed that its outline fills
-/// `bbox`.
+/// The demonstration turned until its grasp line points to `grasp_angle`, then scaled and shifted so that its outline
+/// fills `bbox`.
 ///
-/// The middle of a turned part's upright box is not the turned middle of its box: the outline is turned first, and
-/// what is then its box is laid over the detected one. With that the grasp's offset from the box's middle is the
-/// taught one at any angle.
+/// The centre of a turned part's upright box is not the turned centre of its box. So the outline is turned first,
+/// and its new box is laid over the detected one. The grasp's offset from the box's centre is then the taught one
+/// at any angle.
 pub(super) fn fill_box(
     demonstration: &TaughtDemonstration,
     bbox: &BoundingBox,

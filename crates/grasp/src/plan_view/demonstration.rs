@@ -1,4 +1,4 @@
-//! A demonstration as the plan view shows it.
+//! A demonstration in the plan view.
 
 use image::RgbImage;
 use nalgebra::Point2;
@@ -13,12 +13,13 @@ use crate::error::{GraspError, Result};
 use crate::region::SearchRegion;
 use crate::taught::TaughtDemonstration;
 
-/// Photos and their marks in the plan view of the marks' plane, and how fine that is: as the first photo shows the part.
+/// Photos and their marks in the plan view of the marks' plane, and its resolution: that of the part in the first
+/// photo.
 ///
 /// Heights in metres over the table.
 ///
 /// # Errors
-/// A camera that does not see the plane, and marks outside what it sees.
+/// A camera that does not see the plane, and marks outside its view of it.
 pub fn seen_from_above(
     demonstrations: &[Demonstration],
     over_table: &CameraOverTable,
@@ -47,7 +48,7 @@ pub fn seen_from_above(
     Ok((made, lengths))
 }
 
-/// Pictures without the part as the same plan view shows them.
+/// Pictures without the part in the same plan view.
 ///
 /// # Errors
 /// A camera that does not see the plane.
@@ -63,7 +64,8 @@ pub fn pictures_from_above(
 /// Whether a region of a camera's pictures can be searched for the part of demonstrations that [`super::seen_from_above`] made.
 ///
 /// # Errors
-/// A region that reaches out of the pictures or is for others, that does not show the plane, or that the part does not fit in.
+/// A region that extends beyond the pictures or belongs to others, that does not show the plane, or that the part does
+/// not fit in.
 pub fn check_region_from_above(
     region: &SearchRegion,
     demonstrations: &[Demonstration],
@@ -100,7 +102,7 @@ fn annotation(marked: &Annotation, camera: &PosedCamera, view: &PlanView) -> Res
         Some(line) => Some(GraspLine::new(shown(&line.start)?, shown(&line.end)?)),
         None => None,
     };
-    // As much larger as the marks about it.
+    // Larger by the same factor as the marks.
     let jaw_width = match (marked.jaw_width, &marked.grasp, &grasp) {
         (Some(width), Some(before), Some(after)) => {
             Some(width * (after.end - after.start).norm() / (before.end - before.start).norm())

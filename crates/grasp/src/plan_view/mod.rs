@@ -5,8 +5,8 @@
 //! picture ─ plan view, as many pixels a metre ─ detect, the size known ─┬─ back into the picture's pixels ─ GraspDetection
 //!                                                                       └─ PlanarPose in metres
 //! ```
-//! In the plan view lens, slant, height and resolution no longer matter for what lies in the plane, so a model taught with one
-//! camera serves any other.
+//! In the plan view the image of the plane no longer depends on lens, slant, height and resolution, so that a model
+//! taught with one camera works with any other.
 
 mod demonstration;
 mod region;
@@ -37,11 +37,11 @@ pub struct CameraOverTable {
     pub camera: PosedCamera,
     /// The table's z.
     pub table_height_m: f64,
-    /// Where parts may lie; all that the camera sees where `None`.
+    /// Where parts may lie; `None` for everything that the camera sees.
     pub workspace: Option<Workspace>,
 }
 
-/// Where the gripper is to close, in the camera's world.
+/// The grasp pose, in the camera's world.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlanarPose {
     /// The gripper's centre point, in metres.
@@ -50,9 +50,9 @@ pub struct PlanarPose {
     pub yaw: Angle,
     /// The part's width between the jaws, in metres.
     pub opening_m: f64,
-    /// How far position and yaw may be off.
+    /// Uncertainty of position and yaw.
     pub uncertainty: Uncertainty,
-    /// What that was concluded from.
+    /// The conditions from which the uncertainty was computed.
     pub circumstances: Circumstances,
 }
 
@@ -68,16 +68,16 @@ impl PlanarPose {
 /// A grasp in the picture's pixels and in metres.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlanViewDetection {
-    /// In pixels of the picture as given.
+    /// In pixels of the given picture.
     pub detection: GraspDetection,
     /// In the camera's world.
     pub pose: PlanarPose,
 }
 
-/// More pixels than a search is quick in. Chosen by hand.
+/// Number of pixels above which a search becomes slow. Chosen by hand.
 const MAX_PLAN_PIXELS: u64 = 6_000_000;
 
-/// A model that looks through a camera.
+/// A model that uses a camera.
 #[derive(Debug, Clone)]
 pub struct PlanViewDetector {
     model: GraspModel,
@@ -86,12 +86,12 @@ pub struct PlanViewDetector {
     view: PlanView,
     map: PlanMap,
     region: Option<RegionInPlan>,
-    /// Sizes over the part's own at which it is looked for, where parts may lie at another height than the table's.
+    /// The range of sizes relative to the part's own, if parts may lie at another height than the table's.
     sizes: Option<RangeInclusive<f64>>,
 }
 
 impl PlanViewDetector {
-    /// Makes everything ready that is the same in every picture of the camera.
+    /// Prepares all data that are the same in every picture of the camera.
     ///
     /// # Errors
     /// A model that was taught without a camera; a camera that does not see the plane.
@@ -100,16 +100,17 @@ impl PlanViewDetector {
         let view = plan_view(over_table, &lengths)?;
         let map = PlanMap::new(&over_table.camera, &view);
         let region = model.region().map(|region| RegionInPlan::new(region, &over_table.camera, &view)).transpose()?;
-        // The model is shown plan views, whose pixels are not those of the region.
+        // The model gets plan views, whose pixels are not those of the region.
         let model = model.with_region(None)?.of_known_size()?;
         Ok(Self { model, over_table: *over_table, lengths, view, map, region, sizes: None })
     }
 
-    /// Looks for parts of these sizes in the plan view, over the part's own: what lies higher appears larger. No size within the range speaks
-    /// against a part then. With `None` sizes are those of parts on the table again, and another size is another part.
+    /// Searches the plan view for parts of these sizes relative to the part's own, because a higher part appears
+    /// larger. No size within the range then speaks against a part. With `None` parts lie on the table again, and
+    /// another size is another part.
     ///
     /// # Errors
-    /// A range that is none, as [`GraspModel::with_size_tolerance`].
+    /// An invalid range, as for [`GraspModel::with_size_tolerance`].
     pub fn look_for_sizes(&mut self, sizes: Option<RangeInclusive<f64>>) -> Result<()> {
         if self.sizes == sizes {
             return Ok(());
@@ -126,10 +127,10 @@ impl PlanViewDetector {
         Ok(())
     }
 
-    /// Goes on behind another camera, or the same camera in another place.
+    /// Continues with another camera, or the same camera in another place.
     ///
     /// # Errors
-    /// A camera that does not see the plane; nothing is changed then.
+    /// A camera that does not see the plane; then nothing is changed.
     pub fn move_to(&mut self, over_table: &CameraOverTable) -> Result<()> {
         let view = plan_view(over_table, &self.lengths)?;
         let region = self.region().map(|region| RegionInPlan::new(region, &over_table.camera, &view)).transpose()?;
@@ -139,11 +140,11 @@ impl PlanViewDetector {
         Ok(())
     }
 
-    /// Searches this part of pictures alone, in their pixels; all of them with `None`.
+    /// Searches only this region of pictures, in their pixels; `None` for whole pictures.
     ///
     /// # Errors
-    /// A region that reaches out of the camera's pictures or is for others, that does not show the plane, or that the part does not fit in;
-    /// nothing is changed then.
+    /// A region that extends beyond the camera's pictures or belongs to others, that does not show the plane, or that
+    /// the part does not fit in; then nothing is changed.
     pub fn look_in(&mut self, region: Option<&SearchRegion>) -> Result<()> {
         let region = region.map(|region| RegionInPlan::new(region, &self.over_table.camera, &self.view)).transpose()?;
         if let Some(region) = &region {
@@ -153,7 +154,7 @@ impl PlanViewDetector {
         Ok(())
     }
 
-    /// The part of pictures that is searched, in their pixels; all of them where `None`.
+    /// The searched region of pictures, in their pixels; `None` for whole pictures.
     pub fn region(&self) -> Option<&SearchRegion> {
         self.region.as_ref().map(|region| &region.region)
     }
@@ -163,12 +164,12 @@ impl PlanViewDetector {
         &self.model
     }
 
-    /// A picture of the camera as the model is shown it.
+    /// A picture of the camera in the model's plan view.
     pub fn plan_view_of(&self, picture: &RgbImage) -> RgbImage {
         self.map.resample(picture)
     }
 
-    /// What a pixel of the picture covers in the plane of the marks, in metres; `None` where it does not show the plane.
+    /// The size in the plane of the marks, in metres, of a pixel of the picture; `None` if it does not show the plane.
     pub fn metres_per_pixel(&self, pixel: &Point2<f64>) -> Option<f64> {
         self.over_table.camera.metres_per_pixel(pixel, self.view.height_m)
     }
@@ -182,7 +183,7 @@ impl PlanViewDetector {
         Ok(found.into_iter().filter_map(|found| self.placed(found.detection)).collect())
     }
 
-    /// What a picture shows, in pixels of the plan view.
+    /// Detections in a picture, in pixels of the plan view.
     pub(crate) fn find(&self, picture: &RgbImage, verification: Verification) -> Result<Vec<Found>> {
         let size = self.view_size();
         let (window, counts): (_, &dyn Fn(&GraspDetection) -> bool) = match &self.region {
@@ -195,7 +196,7 @@ impl PlanViewDetector {
         read_sync(self.model.find_in(&self.window_of(picture, &window.rect), &window, verification, counts))
     }
 
-    /// Whether a detection in the plan view lies in the region of the picture that is searched; any does where all of it is.
+    /// Whether a detection in the plan view lies in the searched region of the picture; always true for whole pictures.
     pub(crate) fn is_in_region(&self, detection: &GraspDetection) -> bool {
         let has =
             |region: &RegionInPlan| self.in_picture(detection.clone()).is_some_and(|seen| seen.lies_in(&region.region));
@@ -212,7 +213,7 @@ impl PlanViewDetector {
         self.map.resample_window(picture, window)
     }
 
-    /// `None` where the camera does not show it.
+    /// `None` if the camera does not show it.
     pub(crate) fn placed(&self, detection: GraspDetection) -> Option<PlanViewDetection> {
         let grasp = detection.grasp;
         let center = grasp.center();
@@ -222,7 +223,7 @@ impl PlanViewDetector {
         let circumstances = self.circumstances(&detection, &on_plane, &seen)?;
         let pose = PlanarPose {
             position_m: Point3::new(on_plane.x, on_plane.y, above),
-            // The plan view's y points against the world's.
+            // The plan view's y is opposite to the world's.
             yaw: Angle::from_radians(-grasp.angle.radians()),
             opening_m: grasp.width / self.view.pixels_per_m,
             uncertainty: circumstances.uncertainty(),
@@ -231,8 +232,8 @@ impl PlanViewDetector {
         Some(PlanViewDetection { detection: self.in_picture(detection)?, pose })
     }
 
-    /// What the errors of a detection in the plan view depend on, whose grasp is at `on_plane` in the world and at `seen` in the
-    /// picture.
+    /// The conditions that determine the errors of a detection in the plan view, whose grasp is at `on_plane` in the
+    /// world and at `seen` in the picture.
     fn circumstances(
         &self,
         detection: &GraspDetection,
@@ -254,7 +255,7 @@ impl PlanViewDetector {
         })
     }
 
-    /// Where the picture shows a point of the plan view, be it beyond the picture's border.
+    /// The picture position of a point of the plan view, also beyond the picture's border.
     pub fn shown(&self, point: &Point2<f64>) -> Option<Point2<f64>> {
         self.over_table.camera.project(&self.view.point(point))
     }
@@ -296,14 +297,14 @@ impl PlanViewDetector {
     }
 }
 
-/// The tangent of the angle between a line of sight and the vertical, in the directions x and y of the plan view: how far what
-/// stands a metre above the point appears displaced.
+/// The tangent of the angle between a line of sight and the vertical, in the directions x and y of the plan view: the
+/// apparent displacement of a point one metre above.
 pub(crate) fn slant(camera: &PosedCamera, point: &Point3<f64>) -> [f64; 2] {
     let sight = point.coords - camera.world_from_camera.translation.vector;
     [sight.x / -sight.z, sight.y / sight.z]
 }
 
-/// The part of the marks' plane in the camera's picture, as fine as the model's demonstrations.
+/// The part of the marks' plane in the camera's picture, at the resolution of the model's demonstrations.
 pub(crate) fn plan_view(over_table: &CameraOverTable, lengths: &Lengths) -> Result<PlanView> {
     let CameraOverTable { camera, table_height_m, workspace } = over_table;
     let height = table_height_m + lengths.mark_height_m;

@@ -8,10 +8,10 @@ use crate::region::{RegionError, SearchRegion};
 use crate::search_window::SearchWindow;
 use crate::taught::TaughtDemonstration;
 
-/// Points of each edge of the region that are looked up: a lens bends it.
+/// Points of each edge of the region that are mapped, because a lens bends the edge.
 const POINTS_A_SIDE: u32 = 16;
 
-/// A region of the picture, and the box about it in the plan view.
+/// A region of the picture, and its bounding box in the plan view.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct RegionInPlan {
     /// In pixels of the picture.
@@ -22,7 +22,7 @@ pub(super) struct RegionInPlan {
 
 impl RegionInPlan {
     /// # Errors
-    /// A region that is not of the camera's pictures, or that shows nothing of the plan view.
+    /// A region outside the camera's pictures, or one that shows nothing of the plan view.
     pub(super) fn new(region: &SearchRegion, camera: &PosedCamera, view: &PlanView) -> Result<Self> {
         region.check([camera.intrinsics.width, camera.intrinsics.height])?;
         let edges = region.bounds();
@@ -39,7 +39,7 @@ impl RegionInPlan {
         }
     }
 
-    /// What is cut out of a plan view of that size.
+    /// The window cut out of a plan view of that size.
     ///
     /// # Errors
     /// A region that the part does not fit in.

@@ -1,4 +1,4 @@
-//! Standard errors of a grasp's place and angle.
+//! Standard errors of a grasp's position and angle.
 //!
 //! ```text
 //! noise  = pixels · pixel · exp(by_disagreement (1 − agreement))
@@ -6,45 +6,45 @@
 //! shades = by_height · mark height
 //! length = √(noise² + walls² + shades²);  position: length;  turn: length / diagonal of the part
 //! ```
-//! The noise is that of the picture's edges, counted in its pixels; the walls are what a camera beside the part sees of it and
-//! the photo did not show; light and shadow draw other edges on a high part in every picture.
+//! The noise is that of the picture's edges, in its pixels. The walls are the part's sides that a camera beside it sees
+//! and the photo did not show. On a high part, light and shadow cause different edges in every picture.
 
 use serde::{Deserialize, Serialize};
 
-/// Within which a grasp lies with a probability of 68 %, as errors of one standard deviation do.
+/// Errors that a grasp does not exceed with a probability of 68 %, that is, of one standard deviation.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Uncertainty {
     /// Radius around the position in the plane, in metres.
     pub position_m: f64,
-    /// Turn to either side.
+    /// Turn in either direction.
     pub yaw_rad: f64,
 }
 
-/// What the errors depend on.
+/// The conditions that determine the errors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Circumstances {
-    /// What a pixel of the camera's picture covers at the part, in metres.
+    /// Size of a pixel of the camera's picture at the part, in metres.
     pub pixel_m: f64,
-    /// By how much the line of sight to the part is slanted otherwise than in the photo, seen from the part: the length of the
-    /// difference of the tangents in x and y.
+    /// Difference of the line of sight's slant from that in the photo, seen from the part: the length of the difference
+    /// of the tangents in x and y.
     pub slant: f64,
     /// Height of the marks over the table, in metres.
     pub mark_height_m: f64,
     /// Diagonal of the part's box, in metres.
     pub diagonal_m: f64,
-    /// Agreement with the demonstration, from 0 to 1; 0 where it was not asked.
+    /// Agreement with the demonstration, from 0 to 1; 0 if it was not computed.
     pub agreement: f64,
 }
 
-/// The length that an error is made of, see the module's formulas.
+/// The length from which an error is computed; see the module's formulas.
 ///
-/// The constants were fitted on generated parts, which are none of the shipped ones, by `cargo run --release -p sdg-grasp
+/// The constants were fitted on generated parts, without the shipped ones, by `cargo run --release -p sdg-grasp
 /// --example fit_uncertainty -- 160`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ErrorLength {
-    /// Error of a pose that agrees fully, in pixels.
+    /// Error of a pose of full agreement, in pixels.
     pub pixels: f64,
-    /// How the logarithm of the noise grows with what the agreement lacks.
+    /// Growth of the noise's logarithm per missing agreement.
     pub by_disagreement: f64,
     /// Share of the marks' height times the slant.
     pub by_slant: f64,
@@ -67,7 +67,7 @@ impl ErrorLength {
 }
 
 impl Circumstances {
-    /// The errors to expect.
+    /// The expected errors.
     pub fn uncertainty(&self) -> Uncertainty {
         Uncertainty {
             position_m: ErrorLength::POSITION.metres(self),

@@ -1,9 +1,9 @@
-//! The user's pictures without the part: samples of a network, and what the score is calibrated on.
+//! The user's pictures without the part: samples of a network, and data for the score's calibration.
 //!
 //! ```text
 //! pictures ─┬─ AbsentSamples: every 12th sample is a window of one of them, without objects
-//!           ├─ highest_scores: what the network alone says there ─ calibration of its score
-//!           └─ calibrated: what the finished model accepts there, against what it accepts on held-back samples of the part
+//!           ├─ highest_scores: of the network alone there ─ calibration of its score
+//!           └─ calibrated: highest scores of the finished model there, and its scores on held-back samples of the part
 //!                          ─ log-odds that every score has less
 //! ```
 
@@ -20,20 +20,22 @@ use crate::model::{GraspModel, Verification};
 use crate::models::Network;
 use crate::taught::TaughtDemonstration;
 
-/// One sample in so many shows a picture without the part. Chosen by hand, not measured: fewer than the composed ones without it.
+/// One sample in this many shows a picture without the part. Chosen by hand, not measured: fewer than the composed ones
+/// without it.
 const ONE_IN: u64 = 12;
-/// Held-back samples with the part that the score is held against. Chosen for time: one takes some 50 ms.
+/// Number of held-back samples with the part with which the score is compared. Chosen for time: one takes about 50 ms.
 const NUM_POSITIVES: u64 = 12;
-/// The samples begin far beyond those that networks are validated on, and apart from those that figures are measured on.
+/// First index of these samples: far beyond those of the networks' validation, and separate from those of the reported
+/// figures.
 const FIRST_POSITIVE: u64 = 1 << 36;
-/// What is found without the part is to score below 0.5 by so much, in log-odds. Chosen by hand.
+/// Margin below a score of 0.5 for detections without the part, in log-odds. Chosen by hand.
 const MARGIN: f64 = 0.2;
-/// So many percent of the parts may be refused for pictures without it.
+/// Largest percentage of parts that may be refused because of pictures without it.
 const REFUSED_PERCENT: f64 = 10.0;
-/// A detection on a held-back part overlaps it by at least this IoU.
+/// Minimum IoU of a detection with a held-back part.
 const MIN_IOU: f64 = 0.5;
 
-/// Samples made of pictures without the part.
+/// Samples made from pictures without the part.
 pub(super) struct AbsentSamples {
     pictures: Vec<RgbImage>,
     seed: u64,
@@ -56,7 +58,7 @@ impl AbsentSamples {
         Self { pictures: pictures.iter().map(covering).collect(), seed }
     }
 
-    /// Sample `index`, if it is one of these: a window of one picture at a place that seed and index decide.
+    /// Sample `index`, if it is one of these: a window of one picture at a place determined by seed and index.
     pub(super) fn sample(&self, index: u64, [width, height]: [u32; 2]) -> Option<Sample> {
         if self.pictures.is_empty() || index % ONE_IN != ONE_IN - 1 {
             return None;
@@ -72,7 +74,7 @@ impl AbsentSamples {
     }
 }
 
-/// The network's highest score in each picture; 0 where it proposes nothing.
+/// The network's highest score in each picture; 0 without a proposal.
 ///
 /// # Errors
 /// A picture that the network refuses.
@@ -88,17 +90,17 @@ pub(super) fn highest_scores(
     pictures.iter().map(highest).collect()
 }
 
-/// The model with scores so much lower that the pictures without the part are refused, as far as nine in ten held-back samples of
-/// the part are accepted still.
+/// The model with scores reduced until the pictures without the part are refused, as far as nine in ten held-back
+/// samples of the part are still accepted.
 ///
 /// # Errors
-/// A picture that the model cannot look at.
+/// A picture that cannot be searched.
 pub(super) fn calibrated(
     model: GraspModel,
     demonstrations: &[Demonstration],
     options: &TeachOptions,
 ) -> Result<GraspModel> {
-    // Pictures of a model that knows lengths are plan views.
+    // Pictures of a model with known lengths are plan views.
     let as_used = if options.lengths.is_some() { model.clone().of_known_size()? } else { model.clone() };
     let absent = options
         .negatives
@@ -119,14 +121,14 @@ pub(super) fn calibrated(
     Ok(model)
 }
 
-/// The log-odds that take the highest score without the part below 0.5, and no more than leave the lowest but a tenth of the
-/// scores on the part above.
+/// The log-odds that reduce the highest score without the part to below 0.5, limited so that all but the lowest tenth
+/// of the scores on the part stay above 0.5.
 fn less_for(highest: f64, present: &[f64]) -> f64 {
     let room = percentile(present.iter().copied(), REFUSED_PERCENT).unwrap_or(0.0).max(0.0);
     decimal(-(highest + MARGIN).clamp(0.0, room))
 }
 
-/// The best score on the part in each held-back sample, in log-odds; nothing of those in which it is not found.
+/// The best score on the part in each held-back sample, in log-odds; samples in which it is not found are left out.
 fn on_parts(model: &GraspModel, demonstrations: &[Demonstration], options: &TeachOptions) -> Result<Vec<f64>> {
     let sizes = model.size_tolerance();
     let mut style = SceneStyle { positive_share: 1.0, ..SceneStyle::default() };
@@ -141,7 +143,7 @@ fn on_parts(model: &GraspModel, demonstrations: &[Demonstration], options: &Teac
     Ok(found)
 }
 
-/// The best score of what is found in a picture and counts, in log-odds.
+/// The best score of the counted detections in a picture, in log-odds.
 fn best_log_odds(model: &GraspModel, picture: &RgbImage, counts: impl Fn(&BoundingBox) -> bool) -> Result<Option<f64>> {
     let detections = model.detect(picture, Verification::ByShape)?;
     let best = detections.iter().filter(|found| counts(&found.bbox)).map(|found| found.score).reduce(f64::max);
@@ -161,7 +163,7 @@ mod tests {
     fn scores_are_lowered_below_a_half_but_not_at_the_cost_of_the_part() {
         let present = [3.0, 3.1, 3.2, 3.3, 3.4, 3.5, 3.6, 3.7, 3.8, 3.9, 4.0];
         assert!((less_for(1.0, &present) + 1.2).abs() < 1e-9);
-        // As like the part as the part itself: nine in ten stay.
+        // As similar to the part as the part itself: nine in ten stay accepted.
         assert!((less_for(9.0, &present) + 3.1).abs() < 1e-9);
         assert_eq!(less_for(1.0, &[]), 0.0, "nothing is known of the part");
     }
@@ -205,7 +207,8 @@ mod tests {
         let photo = &demonstrations[0].image;
         let score = |model: &GraspModel| model.detect(photo, Verification::ByShape).unwrap()[0].score;
         assert!(score(&before) > 0.9);
-        // The photo but for a pixel, said to be without the part, is as like it as anything: scores go down as far as they may, no farther.
+        // The photo with one changed pixel, declared to be without the part, is as similar as possible: scores are
+        // reduced to the limit and no further.
         let mut nearly = photo.clone();
         nearly.put_pixel(0, 0, image::Rgb([0, 0, 0]));
         assert_ne!(nearly, *photo);
@@ -216,7 +219,7 @@ mod tests {
         assert!(score(&after) < score(&before));
         let read = GraspModel::from_bytes(&after.to_bytes().unwrap(), &Device::flex()).unwrap();
         assert_eq!(score(&read), score(&after));
-        // What is refused anyway changes nothing.
+        // Detections that are refused anyway change nothing.
         options.negatives.remove(0);
         assert_eq!(
             teach_s(&options).facts().negatives.unwrap(),

@@ -1,4 +1,4 @@
-//! The detector of a model, and what it is taught with besides.
+//! The detector of a model, and the additional heads that teaching uses.
 
 use burn::tensor::Device;
 use sdg_detection::config::KeypointHeadConfig;
@@ -8,21 +8,21 @@ use sdg_layers::state_dict;
 use crate::base_weights::BaseWeights;
 use crate::error::Result;
 
-/// A detector and a head that is left out after teaching.
+/// A detector, and a head that is removed after teaching.
 #[derive(Debug, Clone)]
 pub(crate) struct DetectorPlan {
     /// The detector's configuration.
     pub(crate) network: RcnnConfig,
     /// A keypoint head that only teaching has.
     ///
-    /// A box, or the mask of something thin, tells a network made from nothing too little of what the part is. After 260
-    /// steps model A's found the rod end in 17 and the fuel line in 12 of 35 held-back samples; after 300 with keypoints
-    /// in 20 and 14.
+    /// A box, or the mask of a thin part, gives a randomly initialised network too little information about the part.
+    /// After 260 steps model A's found the rod end in 17 and the fuel line in 12 of 35 held-back samples; after 300
+    /// with keypoints in 20 and 14.
     pub(crate) auxiliary_keypoints: Option<KeypointHeadConfig>,
 }
 
 impl DetectorPlan {
-    /// The detector while it is taught.
+    /// The detector during teaching.
     pub(crate) fn taught(&self) -> RcnnConfig {
         let mut taught = self.network.clone();
         if let Some(head) = &self.auxiliary_keypoints {
@@ -31,7 +31,7 @@ impl DetectorPlan {
         taught
     }
 
-    /// The detector as teaching starts, from base weights or from what the seed draws.
+    /// The detector at the start of teaching, from base weights or from random values by the seed.
     ///
     /// # Errors
     /// [`GraspError::BaseWeights`](crate::GraspError::BaseWeights) for weights of another network.
@@ -40,9 +40,9 @@ impl DetectorPlan {
         let taught = || self.taught().init(&device, seed);
         match weights {
             None => Ok(taught()?),
-            // Of ours, which have every head that is taught.
+            // Our own weights, which have every taught head.
             Some(weights) if weights.has_keypoint_head() => weights.apply(taught()?),
-            // Imported ones have the model's heads alone: the others start from nothing.
+            // Imported weights have only the model's heads: the others start from random values.
             Some(weights) => {
                 let own = weights.apply(self.network.init(&device, seed)?)?;
                 Ok(state_dict::import(taught()?, &state_dict::export(&own)).0)

@@ -1,5 +1,5 @@
-//! Every model on every device that the build has besides flex, against flex: stage by stage, from end to end, and
-//! taught there.
+//! Every model on every device that the build has besides flex, compared with flex: stage by stage, end to end,
+//! and taught there.
 //!
 //! Built with a feature of those devices: `make test-wgpu`, `make test-ndarray`.
 
@@ -15,15 +15,15 @@ use crate::detection::GraspDetection;
 use crate::device::ComputeBackend;
 use crate::model::Verification;
 
-/// What a place may differ, in pixels of the image as given: a fifth of what half precision may move it.
+/// Tolerance of a position, in pixels of the given image: a fifth of the shift that half precision may cause.
 const PLACE_PX: f64 = 0.02;
-/// What a turn may differ, in degrees.
+/// Tolerance of a turn, in degrees.
 const TURN_DEGREES: f64 = 0.02;
-/// What a score or an agreement may differ.
+/// Tolerance of a score or an agreement.
 const SCORE: f64 = 1e-3;
-/// What the losses of the first steps may differ, relative: every step's differences are in the next one's weights.
+/// Relative tolerance of the losses of the first steps: every step's differences enter the next one's weights.
 const LOSSES: f64 = 1e-3;
-/// Steps whose losses are compared.
+/// Number of steps whose losses are compared.
 const COMPARED_STEPS: usize = 4;
 
 const NETWORK_MODELS: [ModelKind; 4] = [ModelKind::A, ModelKind::B, ModelKind::C, ModelKind::D];
@@ -33,7 +33,7 @@ fn devices() -> Vec<(ComputeBackend, Device)> {
     others.filter(|backend| backend.is_built()).map(|backend| (backend, backend.open().unwrap())).collect()
 }
 
-/// The photo's marks as a step of training takes them, in pixels of the resized image.
+/// The photo's marks in the form that a training step takes, in pixels of the resized image.
 fn targets(network: &RcnnConfig) -> StateDict {
     let Demonstration { image, annotation } = demonstration();
     let transformed = sdg_detection::ImageTransform::new(&network.input).apply(&image).unwrap();
@@ -82,8 +82,8 @@ fn every_stage_of_every_network_agrees() {
     }
 }
 
-/// Those on something. Where the part is not, nothing draws a pose to one place: it ends where its start leads, which the
-/// last bits decide.
+/// Detections on an object. Where the part is absent, nothing determines the pose: it ends where its start leads, which
+/// depends on the last bits.
 fn placed(detections: &[GraspDetection]) -> Vec<&GraspDetection> {
     let is_placed = |agreement: f64| agreement >= CheckConfig::DEFAULT.search.min_agreement;
     detections.iter().filter(|detection| detection.agreement.is_none_or(is_placed)).collect()
@@ -116,7 +116,7 @@ fn every_model_detects_the_same() {
             for verification in [Verification::Off, Verification::ByShape] {
                 let expected = model.detect(&photo, verification).unwrap();
                 let found = there.detect(&photo, verification).unwrap();
-                // The mask of so few steps may find nothing; the check finds the part in its own photo.
+                // The mask after so few steps may find nothing; the verification finds the part in its own photo.
                 assert!(verification == Verification::Off || expected[0].is_accepted(), "{kind}: {expected:?}");
                 assert_same(&found, &expected, &format!("{kind} on {backend}, {verification:?}"));
             }
@@ -142,7 +142,7 @@ fn teaching_goes_the_same_way() {
             Instant::now(),
         )
         .unwrap();
-        // The part is found in its own photo, whatever the network has learnt.
+        // The part is found in its own photo with any state of the network.
         let found = taught.model.detect(&demonstration().image, Verification::ByShape).unwrap();
         assert!(found[0].is_accepted(), "{kind}: {found:?}");
         losses

@@ -9,9 +9,9 @@ pub enum TeachingEvent {
     OrientationStep {
         /// From zero.
         step: usize,
-        /// Steps that its run will have, as known now.
+        /// Number of steps of its run, as known now.
         planned_steps: usize,
-        /// Cross-entropy before the update, in nats a crop.
+        /// Cross-entropy before the update, in nats per crop.
         loss: f64,
         /// Since the start of its run.
         elapsed_secs: f64,
@@ -20,12 +20,12 @@ pub enum TeachingEvent {
     Step {
         /// The step.
         record: StepRecord,
-        /// Steps that the run will have, as known now.
+        /// Number of steps of the run, as known now.
         planned_steps: usize,
         /// Since the start of the run.
         elapsed_secs: f64,
     },
-    /// A validation of the detector, read as the model reads it.
+    /// A validation of the detector, with the model's reading.
     Validated(ValidationRecord),
 }
 

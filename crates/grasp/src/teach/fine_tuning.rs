@@ -1,20 +1,20 @@
-//! How a part is taught from base weights of our own: what differs from teaching from nothing.
+//! Teaching a part from our own base weights: the differences from teaching from random values.
 
 use sdg_detection::config::Freeze;
 use sdg_training::{EarlyStop, TrainingConfig, ValidationConfig};
 use serde::{Deserialize, Serialize};
 
-/// Steps unless the network is good before.
+/// Maximum number of steps; a good network stops earlier.
 const STEPS: usize = 120;
 
-/// What differs from the preset's teaching.
+/// The differences from the preset's teaching.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FineTuning {
     /// Steps, learning rate, windows, early stop.
     pub training: TrainingConfig,
-    /// What of the first stage stays as it is.
+    /// The part of the first stage that stays frozen.
     pub freeze: Freeze,
-    /// Generated parts that lie about while the part is taught, beside it and in its place.
+    /// Generated parts shown during teaching, beside the part and in its place.
     pub num_other_parts: usize,
     /// Share of the samples that show the part.
     pub positive_share: f32,
@@ -23,8 +23,9 @@ pub struct FineTuning {
 }
 
 impl FineTuning {
-    /// Half a minute on two cores with all that teaching does besides, among two dozen other parts. Most parts are good enough after
-    /// 40 steps; of 30 held-back samples with the part some six are so covered or blurred that no network finds them.
+    /// Half a minute on two cores including everything else of teaching, with two dozen other parts. Most parts are
+    /// good enough after 40 steps; of 30 held-back samples with the part about six are so covered or blurred that no
+    /// network finds them.
     pub fn new(seed: u64) -> Self {
         Self {
             training: TrainingConfig {

@@ -14,41 +14,42 @@ use crate::sighting::{Sighting, best_agreement, sightings, sightings_to_first};
 use crate::taught::TaughtDemonstration;
 use crate::verification::SearchedImage;
 
-/// Samples that no network is trained on.
+/// Samples on which no network is trained.
 pub(super) struct HeldBack<'a> {
     pub(super) samples: &'a [Sample],
     pub(super) turns: &'a HiddenTurns,
 }
 
-/// Where the network's score is cut, and the median errors after verification, in pixels of the demonstration and degrees:
-/// infinite where nothing was found.
+/// The threshold of the network's score, and the median errors after verification, in pixels of the demonstration and
+/// degrees: infinite if nothing was found.
 pub(super) struct Calibrated {
     pub(super) network: NetworkCalibration,
-    /// Samples with the part, and of those the ones in which a proposal of the network led the demonstration to it.
+    /// Number of samples with the part, and number of those in which a proposal of the network led to a right pose of
+    /// the demonstration.
     pub(super) positives: usize,
     pub(super) hits: usize,
-    /// The network's scores on the part wherever anything found it, and on what looks most like it in samples without it; 0 where
-    /// it proposes nothing.
+    /// The network's scores on the part, found by network or search, and on the most similar place in samples without
+    /// it; 0 without a proposal.
     pub(super) on_part: Vec<f64>,
     pub(super) elsewhere: Vec<f64>,
     pub(super) error_px: f64,
     pub(super) error_degrees: f64,
 }
 
-/// What is seen in one sample.
+/// The observations in one sample.
 struct Seen {
-    /// The network's highest score on the part, where it proposed it, and wherever anything found it.
+    /// The network's highest score on the part: where it proposed the part, and where network or search found it.
     proposed_on_part: Option<f64>,
     on_part: Option<f64>,
-    /// Its highest score in a sample without the part, and that on what looks most like the part there.
+    /// Its highest score in a sample without the part, and its score on the place most similar to the part.
     without_part: Option<f64>,
     elsewhere: Option<f64>,
-    /// In pixels of the demonstration and degrees, of what is on the part.
+    /// In pixels of the demonstration and degrees, for detections on the part.
     errors: Vec<[f64; 2]>,
 }
 
 impl HeldBack<'_> {
-    /// What a network proposes in each sample.
+    /// A network's proposals in each sample.
     ///
     /// # Errors
     /// An image that the network refuses.
@@ -56,7 +57,7 @@ impl HeldBack<'_> {
         side_by_side(self.samples, |sample| network.proposals(&sample.image, demonstrations))
     }
 
-    /// The detections of the network alone, from what it proposes in each sample.
+    /// The detections of the network alone, from its proposals in each sample.
     pub(super) fn outcomes(&self, proposals: &[Proposals]) -> Vec<Outcome> {
         let outcome =
             |(sample, proposals): (&Sample, &Proposals)| match (proposals.candidates.first(), sample.objects.first()) {
@@ -67,8 +68,8 @@ impl HeldBack<'_> {
         self.samples.iter().zip(proposals).map(outcome).collect()
     }
 
-    /// Calibrates a network by what it proposes in each sample, laid over by the demonstration as in use. `other_parts` are
-    /// its highest scores in pictures of other parts alone, `usual_threshold` is [`Network::usual_threshold`].
+    /// Calibrates a network by its proposals in each sample, verified by the demonstration as in use. `other_parts` are
+    /// its highest scores in pictures of other parts only, `usual_threshold` is [`Network::usual_threshold`].
     ///
     /// # Errors
     /// An image that cannot be searched.
@@ -79,7 +80,7 @@ impl HeldBack<'_> {
         demonstrations: &[TaughtDemonstration],
         other_parts: &[f64],
     ) -> Result<Calibrated> {
-        /// Highest raw score of a wrong detection where the held-back samples gave none. Chosen by hand, not measured.
+        /// Highest raw score of a wrong detection if the held-back samples gave none. Chosen by hand, not measured.
         const NO_WRONG: f64 = 0.1;
         let samples: Vec<(&Sample, &Proposals)> = self.samples.iter().zip(proposals).collect();
         let seen = side_by_side(&samples, |(sample, proposals)| Ok(self.measure(sample, proposals, demonstrations)))?;
@@ -118,7 +119,7 @@ impl HeldBack<'_> {
                 .filter(|s| hit(s).is_some() == right && (!proposed || s.turn_source != TurnSource::Search));
             of_kind.map(|sighting| sighting.network_score).reduce(f64::max)
         };
-        // What the search finds is no merit of the network, but its errors are the model's.
+        // The search's detections do not count for the network, but their errors are the model's.
         let errors = sightings.iter().filter_map(hit).filter_map(|outcome| match outcome {
             Outcome::Found { error_px, error_degrees, .. } => Some([error_px, error_degrees]),
             _ => None,
@@ -140,7 +141,7 @@ impl HeldBack<'_> {
     }
 }
 
-/// The true grasp of an object in a sample; its width plays no part.
+/// The true grasp of an object in a sample; its width is not used.
 fn truth(object: &SampleObject) -> PlanarGrasp {
     let on_line: Vec<Keypoint> = object.keypoints.iter().map(|k| Keypoint::visible(k.point())).collect();
     PlanarGrasp::from_keypoints(&on_line, 0.0).unwrap_or_else(|| panic!("a grasp line has a length"))

@@ -6,7 +6,7 @@
 //!        ├─ Augmenter ─ frames, windows ─ train ─ detector ─┐
 //!        │      ├─ held-back samples ── validation ─────────┴─ calibrate ─ GraspModel
 //!        │      └─ scenes without the part ────────────────────────┘│
-//! pictures without the part ─ some of the samples, and the score of what is found in them ─┘
+//! pictures without the part ─ some of the samples, and the scores of detections in them ─┘
 //!        └─ (model S: nothing to train) ──────────────────────────────────────┘
 //! ```
 
@@ -75,11 +75,12 @@ pub struct Taught {
     pub history: Option<History>,
 }
 
-/// Teaches a grasp model. `observe` is called after every step and validation and may end the teaching, which then keeps the
-/// best network so far, if it is any good.
+/// Teaches a grasp model. `observe` is called after every step and validation and may stop the teaching, which then
+/// keeps the best network so far, if it is good enough.
 ///
 /// # Errors
-/// No demonstration, one that lacks what the model needs or is among the pictures without the part, or a training that led to nothing usable.
+/// No demonstration, one that lacks the model's required marks or is among the pictures without the part, or a training
+/// without a usable result.
 pub fn teach(
     demonstrations: &[Demonstration],
     options: &TeachOptions,
@@ -107,11 +108,13 @@ pub fn teach(
     Ok(taught)
 }
 
-/// Says whether a region can be searched for the part of these demonstrations with what [`TeachOptions`] says of it. Those that
-/// [`seen_from_above`](crate::seen_from_above) made are checked by [`check_region_from_above`](crate::check_region_from_above).
+/// Whether a region can be searched for the part of these demonstrations with these [`TeachOptions`]. Demonstrations
+/// made by [`seen_from_above`](crate::seen_from_above) are checked by
+/// [`check_region_from_above`](crate::check_region_from_above).
 ///
 /// # Errors
-/// A region without pixels; where it says what pictures it is for, one that reaches out of them, and one that the part does not fit in.
+/// A region without pixels; if it names the size of its pictures, one that extends beyond them, or one that the part
+/// does not fit in.
 pub fn check_teaching_region(demonstrations: &[Demonstration], options: &TeachOptions) -> Result<()> {
     match &options.region {
         Some(region) => check_region(region, Some(&taught(demonstrations, options)?)),
@@ -119,10 +122,12 @@ pub fn check_teaching_region(demonstrations: &[Demonstration], options: &TeachOp
     }
 }
 
-/// Smallest extent of a part in its photo: with less, whatever has two edges looks like it. Chosen by hand, not measured.
+/// Minimum extent of a part in its photo: below it, everything with two edges looks like it. Chosen by hand, not
+/// measured.
 const MIN_PART_PX: f64 = 20.0;
 
-/// Every model needs the grasp line and a part to look at; model D is taught what lies inside the outline, too.
+/// Every model needs the grasp line and enough pixels of the part; model D also needs texture or shape inside the
+/// outline.
 fn check_marks(demonstrations: &[Demonstration], kind: ModelKind) -> Result<()> {
     if demonstrations.is_empty() {
         return Err(GraspError::NoDemonstration);
@@ -140,7 +145,7 @@ fn check_marks(demonstrations: &[Demonstration], kind: ModelKind) -> Result<()> 
     check_agreement(demonstrations)
 }
 
-/// Several demonstrations must be of one part, and one photo must not be marked in two ways.
+/// Several demonstrations must show one part, and one photo must not be marked in two ways.
 fn check_agreement(demonstrations: &[Demonstration]) -> Result<()> {
     let contradiction = |expected: String, found: String| GraspError::ContradictingDemonstrations { expected, found };
     let first = &demonstrations[0].annotation.label;
@@ -167,8 +172,8 @@ fn check_agreement(demonstrations: &[Demonstration]) -> Result<()> {
     Ok(())
 }
 
-/// Scenes of other things that the agreement is calibrated on: for a network, and for model S, which is to be there in
-/// less than a second. Chosen by hand for time, not measured.
+/// Number of scenes of other objects that the agreement is calibrated on: for a network, and for model S, which is to
+/// be ready in less than a second. Chosen by hand for time, not measured.
 const NUM_NEGATIVE_SCENES: u64 = 12;
 pub(crate) const NUM_NEGATIVE_SCENES_WITHOUT_NETWORK: u64 = 8;
 
@@ -212,7 +217,7 @@ fn without_network(demonstrations: &[Demonstration], options: &TeachOptions, sta
     Ok(Taught { model, history: None })
 }
 
-/// Windows that last layers are made from.
+/// Windows from which last layers are made.
 const NUM_VIEWS: usize = 64;
 
 /// The models with a network, by a plan.
@@ -224,7 +229,7 @@ pub(crate) fn teach_network(
     start: Instant,
 ) -> Result<Taught> {
     let taught = taught(demonstrations, options)?;
-    // First, because what is wrong with base weights should not come out after minutes.
+    // First, so that an error in the base weights does not appear after minutes.
     let detector = plan.detector.initial(options.start.weights(), &options.device, options.seed)?;
     let comparison = match options.start.weights() {
         Some(base_weights) => base_weights.comparison(&options.device)?,
@@ -274,13 +279,14 @@ pub(crate) fn teach_network(
         }
         _ => detector,
     };
-    // Examined, calibrated and handed out is what a file will give back, without the head that only teaching has.
+    // The model that is examined, calibrated and returned equals the one that a file will give, without the head that
+    // only teaching has.
     let finished = |detector: &GeneralizedRcnn| -> Result<Network> {
         let own = plan.detector.network.init(&options.device, options.seed)?;
         let detector = state_dict::import(own, &state_dict::export(detector)).0;
         Ok(Network { detector, reading: reading.clone(), comparison: comparison.clone() }.rounded())
     };
-    // The samples show the part at other sizes than those that may be looked for later.
+    // The samples show the part at sizes outside the later search range, too.
     let of_any_size: Vec<TaughtDemonstration> =
         demonstrations.iter().map(TaughtDemonstration::new).collect::<Result<_>>()?;
     let mut proposed = Vec::new();

@@ -1,8 +1,9 @@
-//! Scenes of things that are not the part: how much of the demonstration is seen in them all the same.
+//! Scenes without the part: how much of the demonstration is still seen in them.
 //!
-//! How well a demonstration agrees with what it is not depends on the part: a ring agrees with anything round, a housing
-//! full of edges with nothing. It is therefore measured in composed scenes while teaching. The highest agreement varies more
-//! with the seed than from part to part, so the mean is taken: over the eight shipped parts it was 0.26 to 0.39 in 60 composed scenes each, within 0.04 of that in as many of the simulator's pictures.
+//! The agreement of a demonstration with other objects depends on the part: a ring agrees with everything round, a
+//! housing with many edges with nothing. It is therefore measured in composed scenes while teaching. The highest
+//! agreement varies more with the seed than between parts, so the mean is used: over the eight shipped parts it was
+//! 0.26 to 0.39 in 60 composed scenes each, within 0.04 of that in as many of the simulator's pictures.
 
 use sdg_demonstration::{
     Annotation, AugmentationConfig, AugmentationStyle, Augmenter, Demonstration, Sample, SceneStyle,
@@ -21,16 +22,17 @@ use crate::sizes::scaling;
 use crate::taught::TaughtDemonstration;
 use crate::verification::SearchedImage;
 
-/// With fewer scenes in which anything agrees at all there is no mean. Chosen by hand, not measured.
+/// Minimum number of scenes with any agreement for computing a mean. Chosen by hand, not measured.
 const MIN_SCENES: usize = 3;
 
-/// Scenes without the part, and the part as it is looked for in them: at the default tolerance, whatever the model's own is.
+/// Scenes without the part, and the part as it is searched in them: at the default size tolerance, not the model's.
 pub(crate) struct NegativeScenes {
     scenes: Vec<Sample>,
     demonstrations: Vec<TaughtDemonstration>,
 }
 
-/// Photos of more pixels are halved before scenes are composed of them. Chosen for time: model S is to be taught in a second.
+/// Photos of more pixels are halved before scenes are composed from them. Chosen for time: model S is to be taught in a
+/// second.
 const MAX_PIXELS: u64 = 2_000_000;
 
 impl NegativeScenes {
@@ -39,7 +41,7 @@ impl NegativeScenes {
     /// # Errors
     /// As [`Augmenter::new`].
     pub(crate) fn new(demonstrations: &[Demonstration], seed: u64, count: u64) -> Result<Self> {
-        // Pieces of the part itself agree with it, and lie on no table.
+        // Pieces of the part itself agree with it, and do not occur on a table.
         let style = SceneStyle { positive_share: 0.0, mutant_share: 0.0, ..SceneStyle::default() };
         let config = AugmentationConfig { style: AugmentationStyle::Scenes(style), ..AugmentationConfig::default() };
         let demonstrations: Vec<Demonstration> = demonstrations.iter().map(shrunk).collect();
@@ -50,7 +52,7 @@ impl NegativeScenes {
         Ok(Self { scenes, demonstrations })
     }
 
-    /// What looks most like the part in each scene, as the network proposes and as it is searched for.
+    /// The place most similar to the part in each scene, from the network's proposals and from the search.
     ///
     /// # Errors
     /// An image that the network refuses.
@@ -58,7 +60,7 @@ impl NegativeScenes {
         self.observe_with(network, &self.demonstrations)
     }
 
-    /// The same, compared in another way.
+    /// The same with other comparison settings.
     ///
     /// # Errors
     /// As [`Self::observe`]; a configuration out of range.
@@ -99,13 +101,13 @@ fn shrunk(demonstration: &Demonstration) -> Demonstration {
     shrunk
 }
 
-/// What looked most like the part in each scene in which anything agrees at all: its agreement and the network's score there.
+/// The place most similar to the part in each scene with any agreement: its agreement and the network's score there.
 pub(crate) struct Resemblances {
     highest: Vec<(f64, f64)>,
 }
 
 impl Resemblances {
-    /// How much other things resemble the part: the mean of the agreements.
+    /// The resemblance of other objects with the part: the mean of the agreements.
     pub(crate) fn resemblance(&self) -> f64 {
         if self.highest.len() < MIN_SCENES {
             return ScoreConfig::DEFAULT.resemblance.neutral;
@@ -135,7 +137,7 @@ mod tests {
             search(&SearchedImage::new(image, &taught)).iter().map(|placed| placed.agreement).fold(0.0, f64::max)
         };
         let agreements: Vec<f64> = negatives.scenes.iter().map(|sample| best(&sample.image)).collect();
-        // Some resemble it, or there would be nothing to tell apart.
+        // Some of them resemble it; otherwise the test would distinguish nothing.
         assert!(
             resemblance > 0.1 && agreements.iter().all(|&agreement| agreement < 0.6),
             "{resemblance} {agreements:?}"

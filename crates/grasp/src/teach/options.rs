@@ -23,30 +23,31 @@ use crate::region::SearchRegion;
 pub struct TeachOptions {
     /// The grasp model to teach.
     pub kind: ModelKind,
-    /// Which network and training; without effect on model S, which has neither.
+    /// The network and its training; not used by model S, which has neither.
     pub preset: Preset,
-    /// Decides every random choice.
+    /// The seed of every random choice.
     pub seed: u64,
     /// Wall-clock time for the training.
     pub time_budget: Option<Duration>,
-    /// Steps of the detector other than the preset's, with the orientation CNN's in proportion; for tests and trials.
+    /// Number of detector steps if not the preset's; the orientation CNN's change in proportion. For tests and trials.
     pub steps: Option<usize>,
-    /// How to teach; `None` for the preset's way from nothing, and for [`FineTuning::new`] from base weights of our own.
+    /// The fine-tuning; `None` for the preset's training from random values, and for [`FineTuning::new`] from our own
+    /// base weights.
     pub fine_tuning: Option<FineTuning>,
-    /// Turns of the part that look the same: they are neither taught nor held against the model.
+    /// The part's symmetry: its turns are neither taught nor counted as errors.
     pub symmetry: RotationalSymmetry,
-    /// Sizes over the nominal one at which the part is looked for.
+    /// Range of sizes over the nominal one within which the part is searched.
     pub size_tolerance: RangeInclusive<f64>,
-    /// The part of pictures that the model searches; teaching itself does not go by it.
+    /// The region of pictures that the model searches; teaching itself does not use it.
     pub region: Option<SearchRegion>,
-    /// What [`crate::seen_from_above`] says where the demonstrations come from there.
+    /// The result of [`crate::seen_from_above`], if the demonstrations come from there.
     pub lengths: Option<Lengths>,
-    /// The user's pictures without the part: some of the samples of a network, and what the score is calibrated on. Each counts
-    /// once; none is a background of other samples.
+    /// The user's pictures without the part: some of a network's samples, and data for the score's calibration. Each
+    /// counts once; none is used as a background of other samples.
     pub negatives: Vec<RgbImage>,
-    /// What the networks start from.
+    /// The initial weights of the networks.
     pub start: Start,
-    /// Where to compute; without gradients.
+    /// The computing device; without gradients.
     pub device: Device,
 }
 
@@ -70,21 +71,21 @@ impl TeachOptions {
         }
     }
 
-    /// The detector that is taught, which weights to start from must fit; `None` for model S, which has none.
+    /// The taught detector, which initial weights must fit; `None` for model S, which has none.
     pub fn network(&self) -> Option<RcnnConfig> {
         self.preset.detector(self.kind, true).map(|detector| detector.network)
     }
 
-    /// The detector while it is taught, which may have more heads than the model: what base weights of ours are read for.
+    /// The detector during teaching, which may have more heads than the model; our own base weights are read for it.
     pub fn taught_network(&self) -> Option<RcnnConfig> {
         self.preset.detector(self.kind, true).map(|detector| detector.taught())
     }
 
-    /// The same with the shipped weights read, where these options ask for them.
+    /// The same with the shipped weights read, if these options ask for them.
     ///
     /// # Errors
-    /// [`GraspError::NeedsBaseWeights`](crate::GraspError::NeedsBaseWeights) where the preset starts from weights and
-    /// this build carries none.
+    /// [`GraspError::NeedsBaseWeights`](crate::GraspError::NeedsBaseWeights) if the preset starts from weights and
+    /// this build contains none.
     pub(super) fn with_start_read(&self) -> Result<Self> {
         let Some(taught_network) = self.taught_network() else { return Ok(self.clone()) };
         let start = self.start.read(self.preset, &taught_network)?;

@@ -1,6 +1,6 @@
-//! Generated parts as negatives in the scenes that a part is taught on.
+//! Generated parts as negatives in the scenes of a teaching.
 //!
-//! They are none of the shipped parts, and not the ones that anything is measured on: a seed of their own draws them.
+//! They exclude the shipped parts and the parts of all measurements: their seeds are separate.
 
 use sdg_demonstration::{AugmentationConfig, AugmentationStyle, Augmenter, Demonstration, SceneStyle};
 use sdg_part_generator::{Part, PhotoConfig, demonstration};
@@ -15,10 +15,10 @@ use crate::verification::SearchedImage;
 /// Photos as large as the network's input.
 const PHOTO: PhotoConfig = PhotoConfig { width: 320, height: 240, fill: [0.4, 0.6] };
 
-/// Seeds of other parts start here, far from those of parts to measure and to pretrain on.
+/// First seed of the other parts, far from those of the parts for measurements and pretraining.
 const FIRST_SEED: u64 = 1 << 48;
 
-/// So many parts to learn with, and a third as many others to hold back.
+/// Number of parts for training; a third as many are held back.
 pub(super) fn draw(count: usize, seed: u64) -> [Vec<Demonstration>; 2] {
     let first = FIRST_SEED.wrapping_add(seed.wrapping_mul(10_000));
     let one = |i: usize| demonstration(&Part::generate(first.wrapping_add(i as u64)), &PHOTO, 0);
@@ -31,20 +31,20 @@ pub(super) fn draw(count: usize, seed: u64) -> [Vec<Demonstration>; 2] {
     [to_learn.to_vec(), held_back.to_vec()]
 }
 
-/// Pictures of other parts that the network's score is calibrated on: with them there are about as many without the part
-/// as with it. Chosen by that reasoning, not measured.
+/// Number of pictures of other parts on which the network's score is calibrated, so that there are about as many
+/// pictures without the part as with it. Derived from that, not measured.
 const NUM_PICTURES: u64 = 16;
 
 /// The scores of a network in pictures of other parts without the part.
 #[derive(Default)]
 pub(super) struct OnOtherParts {
-    /// Its highest score in each.
+    /// Its highest score in each picture.
     pub(super) highest: Vec<f64>,
-    /// Its score where each agrees best with the part; 0 where it proposes nothing.
+    /// Its score at the place of best agreement in each picture; 0 without a proposal.
     pub(super) best_agreement: Vec<f64>,
 }
 
-/// Shows a network pictures of other parts; none where there are no others.
+/// Applies a network to pictures of other parts; empty without other parts.
 ///
 /// # Errors
 /// As [`Augmenter::new`]; an image that the network refuses.

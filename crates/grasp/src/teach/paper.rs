@@ -3,9 +3,9 @@
 //! Kept as published: R50-FPN at a short side of 800 pixels, SGD, 1500 samples of the paper's own augmentation for 1000
 //! steps of two images (model A's detector: 500 steps of eight), 200 held-back ones, 5000 crops for the orientation CNN.
 //!
-//! Corrected, because it is an error of the original and no part of its protocol:
-//! - the learning rate runs one cycle, where the original's warm-up of 1000 steps ramps it up for the whole run;
-//! - colours reach the network in the order that it knows;
+//! Corrected, because it is an error of the original code and not part of the protocol:
+//! - the learning rate follows one cycle; the original's warm-up of 1000 steps increases it during the whole run;
+//! - the network gets the colour channels in the order of its weights;
 //! - no mirror images;
 //! - the angle is a least-squares line with `atan2`.
 //!
@@ -19,15 +19,16 @@ use sdg_training::{OneCycle, Optimizer, TrainingConfig, ValidationConfig};
 
 use crate::facts::ModelKind;
 
-/// Samples that come round again and again.
+/// Samples that are repeated in turn.
 pub(super) const DISTINCT_SAMPLES: u64 = 1500;
 /// Held-back samples.
 const HELD_BACK: usize = 200;
 /// Width and height of the samples, in pixels.
 const SAMPLE_SIZE: [u32; 2] = [640, 480];
 
-/// Detectron2's R50-FPN. With imported weights, stem and first stage are frozen, and so are the norms. From nothing there
-/// is nothing to keep: all of it learns, and the frozen norms, which would be none at all, are group norms.
+/// Detectron2's R50-FPN. With imported weights, stem and first stage are frozen, and so are the norms. From random
+/// values nothing is frozen: all layers learn, and the frozen norms, which would have no effect, are replaced by group
+/// norms.
 pub(super) fn network(kind: RcnnKind, has_base_weights: bool) -> RcnnConfig {
     let mut config = r50_detectron2(kind);
     if !has_base_weights {

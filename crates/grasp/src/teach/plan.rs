@@ -1,4 +1,4 @@
-//! How a model with a network is taught: detector, reading, samples, steps.
+//! The plan of a network model's teaching: detector, reading, samples, steps.
 
 use sdg_demonstration::{AugmentationConfig, AugmentationStyle};
 use sdg_training::TrainingConfig;
@@ -11,31 +11,31 @@ use super::preset::{OrientationPlan, Preset};
 use crate::base_weights::BaseWeights;
 use crate::facts::ModelKind;
 
-/// A network that leads the demonstration to fewer parts is of no use. Chosen by hand, not measured.
+/// Minimum share of parts that a useful network leads the demonstration to. Chosen by hand, not measured.
 const MIN_HIT_RATE: f64 = 0.5;
 
-/// Everything that decides how a network model is taught, but for the demonstrations and the weights to start from.
+/// Everything that determines the teaching of a network model except the demonstrations and the initial weights.
 #[derive(Debug, Clone)]
 pub(crate) struct Plan {
     /// The detector.
     pub(crate) detector: DetectorPlan,
-    /// How its detections are read, and what has to be taught for that.
+    /// The reading of its detections, and the training that it needs.
     pub(crate) reading: ReadingPlan,
     /// The detector's training.
     pub(crate) training: TrainingConfig,
-    /// What it is trained on.
+    /// The training samples.
     pub(crate) samples: AugmentationConfig,
-    /// Samples before the first comes round again; `None` for new ones for ever.
+    /// Samples before they repeat; `None` for unlimited new ones.
     pub(crate) distinct_samples: Option<u64>,
-    /// What it is validated and calibrated on.
+    /// The samples for validation and calibration.
     pub(crate) held_back: AugmentationConfig,
-    /// Least share of parts that a network must lead the demonstration to, so that it is kept.
+    /// Minimum share of parts that a network must lead the demonstration to.
     pub(crate) min_hit_rate: f64,
-    /// Generated parts that lie about while the part is taught, beside it and in its place.
+    /// Generated parts shown during teaching, beside the part and in its place.
     pub(crate) num_other_parts: usize,
 }
 
-/// How detections will be read as poses of the demonstration.
+/// The later reading of detections as poses of the demonstration.
 #[derive(Debug, Clone)]
 pub(crate) enum ReadingPlan {
     /// Model A, which has a second network.
@@ -49,7 +49,7 @@ pub(crate) enum ReadingPlan {
 }
 
 impl Plan {
-    /// The plan for options whose weights to start from are read; `None` for model S, which has no network.
+    /// The plan for options whose initial weights are read; `None` for model S, which has no network.
     pub(crate) fn new(options: &TeachOptions) -> Option<Self> {
         let &TeachOptions { kind, preset, seed, symmetry, .. } = options;
         let reading = match kind {
@@ -68,7 +68,7 @@ impl Plan {
             distinct_samples: (preset == Preset::Paper).then_some(paper::DISTINCT_SAMPLES),
             held_back: match preset {
                 Preset::Paper => AugmentationConfig::paper(),
-                // At the photo's own size, so that verification is calibrated on what it will see.
+                // At the photo's own size, so that verification is calibrated on the same resolution.
                 _ => AugmentationConfig::default(),
             },
             min_hit_rate: MIN_HIT_RATE,

@@ -15,8 +15,8 @@ use crate::error::{GraspError, Result};
 use crate::facts::ModelKind;
 use crate::{NUM_KEYPOINTS, models};
 
-/// As often as an orientation CNN may fold the circle: what is left of it, 5°, is negligible. Chosen by that
-/// reasoning.
+/// Maximum number of folds of the circle for an orientation CNN: the remaining 5° are negligible. Derived
+/// from that.
 const MAX_FOLD: usize = 72;
 
 /// A network, its training and its augmentation under one name.
@@ -47,7 +47,7 @@ impl Preset {
         }
     }
 
-    /// Whether its frozen stages are worth nothing without imported weights.
+    /// Whether its frozen stages require imported weights.
     pub(super) fn needs_base_weights(self) -> bool {
         match self {
             Self::Edge | Self::Paper => false,
@@ -55,7 +55,7 @@ impl Preset {
         }
     }
 
-    /// The detector of a model, taught from weights or from nothing; `None` for model S, which has none.
+    /// The detector of a model, taught from given weights or from random values; `None` for model S, which has none.
     pub(super) fn detector(self, kind: ModelKind, has_base_weights: bool) -> Option<DetectorPlan> {
         let rcnn = models::rcnn_kind(kind)?;
         let network = match self {
@@ -77,7 +77,7 @@ impl Preset {
         }
     }
 
-    /// The training samples: of the network's input size, so that nothing is computed to be thrown away.
+    /// The training samples: at the network's input size, so that no computation is wasted.
     pub(super) fn samples(self) -> AugmentationConfig {
         match self {
             Self::Edge => AugmentationConfig::default().with_output_size(320, 240),

@@ -4,13 +4,13 @@ use sdg_detection::RcnnConfig;
 use sdg_detection::config::ResizeRule;
 use sdg_training::{OneCycle, TrainingConfig, ValidationConfig, WindowPhase};
 
-/// Short side of the images that an R50 is taught on and looks at. Chosen by hand for time; what it costs was not measured.
+/// Short side of the images in teaching and detection with an R50. Chosen by hand for time; the loss was not measured.
 pub(super) const SHORT_SIDE_PX: u32 = 480;
 
-/// An R50 with the numerics of its weights, but for what would cost an ordinary computer minutes. Images are not enlarged
-/// to 800 pixels, which adds no detail to a photo of 480. And where COCO's images show dozens of objects, a
-/// demonstration's show one: fewer regions go through the heads, of which the keypoint head takes 7 GFLOP for each. The
-/// numbers were chosen by hand for time; what they cost was not measured.
+/// An R50 with the numerics of its weights, except for two changes that save an ordinary computer minutes. Images are
+/// not enlarged to 800 pixels, which adds no detail to a photo of 480. COCO's images show dozens of objects, but a
+/// demonstration's show one, so that fewer regions go through the heads; the keypoint head takes 7 GFLOP for each. The
+/// numbers were chosen by hand for time; the loss was not measured.
 pub(super) fn on_two_cores(mut config: RcnnConfig) -> RcnnConfig {
     const MAX_PROPOSALS: usize = 100;
     const MAX_DETECTIONS: usize = 5;
@@ -31,8 +31,8 @@ pub(super) fn on_two_cores(mut config: RcnnConfig) -> RcnnConfig {
     config
 }
 
-/// A lower learning rate, so that imported weights are not forgotten, and fewer, costlier steps. Chosen by hand, not
-/// measured.
+/// A lower learning rate, so that imported weights are not forgotten, and fewer steps, because each takes longer.
+/// Chosen by hand, not measured.
 pub(super) fn fine_tuning(seed: u64) -> TrainingConfig {
     TrainingConfig {
         steps: 200,

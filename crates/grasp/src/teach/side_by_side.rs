@@ -1,11 +1,11 @@
-//! Many pictures at once.
+//! Many pictures in parallel.
 
 use rayon::prelude::*;
 
 use crate::error::Result;
 
-/// What `work` makes of each input, in their order. Two cores that look at a picture each are done sooner than both at one
-/// picture after the other, whose kernels and searches are too short to be shared well.
+/// Applies `work` to each input; results are in their order. Two cores with one picture each finish earlier than both
+/// on one picture after the other, whose kernels and searches are too short to be shared well.
 ///
 /// # Errors
 /// The first that failed.

@@ -1,4 +1,4 @@
-//! What teaching starts from.
+//! The initial weights of teaching.
 
 use sdg_detection::RcnnConfig;
 
@@ -6,11 +6,11 @@ use super::preset::Preset;
 use crate::base_weights::BaseWeights;
 use crate::error::{GraspError, Result};
 
-/// What the networks start from.
+/// The initial weights of the networks.
 #[derive(Debug, Clone, Default)]
 pub enum Start {
-    /// The base weights that this build carries (feature `base-weights`); from nothing for preset `paper`, as the paper's
-    /// orientation CNN does and its detectors cannot.
+    /// The base weights in this build (feature `base-weights`); random values for preset `paper`, as for the paper's
+    /// orientation CNN; its detectors cannot start from these weights.
     #[default]
     Shipped,
     /// From random values.
@@ -21,7 +21,7 @@ pub enum Start {
 }
 
 impl Start {
-    /// The weights; none where they are not read yet or there are none.
+    /// The weights; none if they are not read yet or do not exist.
     pub(super) fn weights(&self) -> Option<&BaseWeights> {
         match self {
             Self::Weights(weights) => Some(weights),
@@ -29,10 +29,10 @@ impl Start {
         }
     }
 
-    /// The same with the shipped weights read, where they are asked for and the preset starts from them.
+    /// The same with the shipped weights read, if they are requested and the preset starts from them.
     ///
     /// # Errors
-    /// [`GraspError::NeedsBaseWeights`] where the preset starts from weights and this build carries none.
+    /// [`GraspError::NeedsBaseWeights`] if the preset starts from weights and this build contains none.
     pub(super) fn read(&self, preset: Preset, taught_network: &RcnnConfig) -> Result<Self> {
         match (self, preset) {
             (Self::Shipped, Preset::Edge) => shipped_weights(preset, taught_network).map(Self::Weights),

@@ -1,8 +1,8 @@
-//! Parts that look alike at several turns.
+//! Parts that look the same at several turns.
 //!
-//! A sample's record has the part's turn, which its picture does not show. A network trained on it would
-//! learn the mean of the turns, and a validation would call right answers wrong. So keypoints are taught where they
-//! would be at the smallest turn that looks the same, and turns that cannot be seen are no error.
+//! A sample's record has the part's turn, which its picture does not show. A network trained on it would learn the
+//! mean of the turns, and a validation would count right answers as wrong. So keypoints are taught at their
+//! positions for the smallest equivalent turn, and invisible turns are not errors.
 
 use nalgebra::Point2;
 use sdg_demonstration::{Demonstration, Sample};
@@ -11,7 +11,7 @@ use sdg_geometry::{Angle, Keypoint, PlanarGrasp, PlanarSimilarity, RotationalSym
 /// The symmetry of the part in some demonstrations.
 pub(crate) struct HiddenTurns {
     symmetry: RotationalSymmetry,
-    /// What each demonstration's part turns about, in pixels of its photo.
+    /// The rotation centre of the part in each demonstration, in pixels of its photo.
     centers: Vec<Point2<f64>>,
 }
 
@@ -20,7 +20,7 @@ impl HiddenTurns {
         Self { symmetry, centers: demonstrations.iter().map(|d| d.annotation.region().centroid()).collect() }
     }
 
-    /// The sample with its truth at the smallest turn from the demonstration that looks the same.
+    /// The sample with its truth at the smallest equivalent turn from the demonstration.
     pub(super) fn canonical(&self, mut sample: Sample) -> Sample {
         if self.symmetry == RotationalSymmetry::None {
             return sample;
@@ -34,7 +34,7 @@ impl HiddenTurns {
             for keypoint in &mut object.keypoints {
                 let at = back.apply(&keypoint.point());
                 let inside = (0.0..=width).contains(&at.x) && (0.0..=height).contains(&at.y);
-                // What covers the part was not turned with it: whether it covers this place is not known.
+                // An object that covers the part was not turned with it: whether it covers this place is unknown.
                 *keypoint = match inside {
                     true => Keypoint::visible(at),
                     false => Keypoint { x: at.x, y: at.y, visibility: Visibility::Unlabelled },
@@ -44,8 +44,8 @@ impl HiddenTurns {
         sample
     }
 
-    /// The grasp that looks like `grasp` and is turned least against the true one. `image_from_demonstration` says where
-    /// the demonstration `demonstration_idx` lies.
+    /// The equivalent of `grasp` with the smallest turn from the true one. `image_from_demonstration` is the pose of
+    /// the demonstration `demonstration_idx`.
     pub(crate) fn nearest(
         &self,
         grasp: &PlanarGrasp,
@@ -68,7 +68,7 @@ mod tests {
     use sdg_demonstration::{Annotation, AugmentationConfig, Augmenter};
     use sdg_geometry::{BoundingBox, GraspLine};
 
-    /// A square grasped beside its middle.
+    /// A square grasped beside its centre.
     fn square() -> Demonstration {
         let bbox = BoundingBox { x1: 60.0, y1: 40.0, x2: 120.0, y2: 100.0 };
         let grasp = Some(GraspLine::new(Point2::new(110.0, 60.0), Point2::new(110.0, 80.0)));
@@ -87,7 +87,7 @@ mod tests {
                 for object in turns.canonical(augmenter.sample(i)).objects {
                     let pose = object.image_from_demonstration;
                     assert!(pose.angle.degrees().abs() <= max_degrees + 1e-9, "{symmetry:?} {pose:?}");
-                    // The keypoints went with it; the warp tilts a little.
+                    // The keypoints moved with it; the warp tilts slightly.
                     let truth = pose.apply(&square().annotation.grasp.unwrap().start);
                     assert!((object.keypoints[0].point() - truth).norm() < 12.0, "{symmetry:?} {:?}", object.keypoints);
                 }
@@ -98,7 +98,7 @@ mod tests {
     #[test]
     fn a_grasp_a_quarter_turn_round_is_the_same_one() {
         let truth = PlanarGrasp::from_line(&square().annotation.grasp.unwrap(), 60.0);
-        // The middle is (90, 70): a quarter turn takes (110, 70) to (90, 90).
+        // The centre is (90, 70): a quarter turn maps (110, 70) to (90, 90).
         let turned = PlanarGrasp { x: 90.0, y: 90.0, angle: truth.angle + Angle::from_degrees(92.0), width: 60.0 };
         let nearest = |symmetry| {
             HiddenTurns::new(&[square()], symmetry).nearest(&turned, truth.angle, 0, &PlanarSimilarity::IDENTITY)

@@ -97,7 +97,7 @@ pub(super) fn taught(preset: Preset, kind: ModelKind) -> GraspModel {
 /// Steps of detector and orientation CNN.
 const STEPS: usize = 12;
 
-/// A model and the same model read from its file give the same detections in its own photo, to the bit.
+/// A model and the same model read from its file give bit-identical detections in its own photo.
 fn assert_same_after_a_file(model: &GraspModel) {
     let bytes = model.to_bytes().unwrap();
     let read = GraspModel::from_bytes(&bytes, &Device::flex()).unwrap();
@@ -107,7 +107,7 @@ fn assert_same_after_a_file(model: &GraspModel) {
         let found = model.detect(&photo, verification).unwrap();
         assert_eq!(found, read.detect(&photo, verification).unwrap(), "{} {verification:?}", model.kind());
     }
-    // Verified, the part is found in its own photo even by a network that has learnt nothing.
+    // With verification, the part is found in its own photo even with an untrained network.
     let best = &read.detect(&photo, Verification::ByShape).unwrap()[0];
     let truth = demonstration().annotation.grasp.unwrap().center();
     assert!(best.is_accepted() && (best.grasp.center() - truth).norm() < 1.0, "{} {best:?}", model.kind());
@@ -152,8 +152,8 @@ fn one_network_serves_the_models_that_are_taught_alike() {
     let taught = taught(Preset::Edge, ModelKind::C);
     let read = taught.clone().read_as(ModelKind::B).unwrap();
     assert_eq!((read.kind(), ModelKind::B.taught_as()), (ModelKind::B, ModelKind::C));
-    // The same boxes, in the order of another reading's scores; where the part lies is read otherwise, and a way there is a way
-    // back.
+    // The same boxes, in the order of another reading's scores; positions are read differently, and the conversion back
+    // restores them.
     let photo = demonstration().image;
     let said = |model: &GraspModel| model.detect(&photo, Verification::Off).unwrap();
     let boxes = |model: &GraspModel| {
@@ -170,7 +170,7 @@ fn one_network_serves_the_models_that_are_taught_alike() {
 fn model_s_is_taught_at_once_and_detects_the_same_after_a_file() {
     let options = TeachOptions { kind: ModelKind::S, ..TeachOptions::new(1) };
     let taught = teach(&[demonstration()], &options, &mut |_: &TeachingEvent| panic!("nothing is trained")).unwrap();
-    // How long it takes depends on the machine: `sdg evaluate` measures that.
+    // The duration depends on the machine: `sdg evaluate` measures it.
     assert!(taught.history.is_none() && taught.model.facts().steps == 0);
     let model = &taught.model;
     assert!(model.to_bytes().unwrap().len() < 100_000);
@@ -245,7 +245,7 @@ fn without_network(demonstrations: &[Demonstration]) -> crate::error::Result<Gra
     teach(demonstrations, &options, &mut |_| ControlFlow::Continue(())).map(|taught| taught.model)
 }
 
-/// The demonstration with so many times the pixels.
+/// The demonstration with this many times the pixels.
 fn resized(factor: f64) -> Demonstration {
     let mut demonstration = demonstration();
     let [width, height] =
@@ -268,7 +268,7 @@ fn a_photo_with_another_number_of_pixels_teaches_as_well() {
         let best = &model.detect(&picture, Verification::ByShape).unwrap()[0];
         assert!(best.is_accepted() && (best.grasp.center() - truth.center()).norm() < 1.5, "{factor}: {best:?}");
         assert!(best.grasp.angle.distance(truth.angle()) < 0.03, "{factor}: {best:?}");
-        // And the other way round: the photo as it was, the picture with more or fewer pixels.
+        // The reverse: the photo unchanged, the picture with more or fewer pixels.
         let model = without_network(&[demonstration()]).unwrap();
         let best = &model.detect(&resized(factor).image, Verification::ByShape).unwrap()[0];
         let scaled = truth.center() * factor;

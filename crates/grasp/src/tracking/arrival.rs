@@ -1,4 +1,4 @@
-//! What a search found in an older frame, brought to the newest one.
+//! The results of a search of an older frame, carried forward to the newest one.
 //!
 //! ```text
 //! detections in frame k ─┬─ on a track, where that was in frame k ─ about there: likeness, marks and network score are taken
@@ -15,11 +15,11 @@ use super::track::{PastPose, Standing, Track};
 use crate::detection::{Found, Placement};
 use crate::same_part::are_outlines_of_same_part;
 
-/// A pose this far from that of its track is carried forward like one of another part: from the track's own pose a capture does
-/// not reach it. In pixels of the cut-out, and in radians. Chosen by hand.
+/// A pose at this distance from its track's pose is carried forward like one of another part, because a capture from
+/// the track's own pose does not reach it. In pixels of the cut-out, and in radians. Chosen by hand.
 const FAR_PX: f64 = 8.0;
 const FAR_RAD: f64 = 0.15;
-/// What such a pose must gain in agreement. Chosen by hand.
+/// Minimum gain of agreement of such a pose. Chosen by hand.
 const MIN_GAIN: f64 = 0.02;
 
 /// Whether a track is near enough to the newest frame to be followed into it.
@@ -27,13 +27,13 @@ const MIN_GAIN: f64 = 0.02;
 pub(super) enum Carried {
     /// It is in the frame before the newest, or nearly so.
     ToNewest,
-    /// There are frames in between.
+    /// There are frames between them.
     Partly,
-    /// It was not there in a frame in between.
+    /// It was absent in a frame between them.
     Lost,
 }
 
-/// Carries an arriving track through buffered frames, at most `steps` of them, which it counts down.
+/// Carries an arriving track through buffered frames, at most `steps` of them; decreases `steps`.
 pub(super) fn carry(detector: &PartDetector, frames: &FrameBuffer, track: &mut Track, steps: &mut usize) -> Carried {
     while let Some(frame) = frames.next_after(track.number, track.time) {
         if *steps == 0 {
@@ -51,20 +51,20 @@ pub(super) fn carry(detector: &PartDetector, frames: &FrameBuffer, track: &mut T
     Carried::ToNewest
 }
 
-/// What a detection means for a track that it lies on.
+/// The meaning of a detection for a track that it overlaps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Match {
     /// Another part.
     Other,
-    /// The same part about where the track has it.
+    /// The same part at about the track's pose.
     Confirms,
-    /// The same part, elsewhere, and agreeing better.
+    /// The same part at another pose of better agreement.
     Corrects,
-    /// The same part, elsewhere or turned by its symmetry, and agreeing no better.
+    /// The same part, elsewhere or turned by its symmetry, without better agreement.
     Disagrees,
 }
 
-/// Compares a detection with where a track was in that frame.
+/// Compares a detection with the track's pose in that frame.
 pub(super) fn compare(detector: &PartDetector, found: &Found, placement: &Placement, past: &PastPose) -> Match {
     let demonstration = &detector.model().demonstrations()[placement.demonstration_idx];
     let there = demonstration.outline(&past.image_from_cutout);

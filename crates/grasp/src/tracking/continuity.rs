@@ -1,21 +1,22 @@
-//! Whether a frame follows from the one before.
+//! Whether a frame continues the one before.
 
 use image::RgbImage;
 use sdg_geometry::BoundingBox;
 
 use sdg_shape::PixelRect;
 
-/// Most cells across and down, of which the mean colours are compared, and the shortest side of a cell: the mean of fewer pixels would be
-/// noise. Chosen by hand.
+/// Maximum number of cells across and down whose mean colours are compared, and the minimum shorter side of a cell: the
+/// mean of fewer pixels would be noise. Chosen by hand.
 const MAX_CELLS: [u32; 2] = [32, 24];
 const MIN_CELL_PX: u32 = 8;
-/// Pixels across and down of which a cell's mean is made: more of a large picture would take longer than following a part.
+/// Pixels across and down from which a cell's mean is computed: more of a large picture would take longer than
+/// following a part.
 const MAX_SAMPLES: u32 = 20;
-/// A mean that changes by more, in grey values, shows other things. Chosen by hand: above what noise and lamps do, below what a
-/// part does that covers a tenth of a cell.
+/// A larger change of a mean, in grey values, shows other objects. Chosen by hand: above the changes by noise and
+/// lamps, below those by a part that covers a tenth of a cell.
 const MAX_CHANGE: f32 = 6.0;
 
-/// The mean colours of the cells of a picture, or of the part of it that is searched.
+/// The mean colours of the cells of a picture, or of its searched region.
 #[derive(Debug, Clone)]
 pub(super) struct CoarseView {
     window: PixelRect,
@@ -32,7 +33,7 @@ impl CoarseView {
         Self { window: *window, cells, means: places.map(|cell| mean(picture, window, cells, cell)).collect() }
     }
 
-    /// Whether anything changed that does not lie in one of the boxes, or at their border.
+    /// Whether there is a change outside the boxes and their borders.
     pub(super) fn has_changed_beside(&self, before: &Self, boxes: &[BoundingBox]) -> bool {
         let PixelRect { left, top, width, height } = self.window;
         let [left, top] = [left, top].map(f64::from);
@@ -96,7 +97,7 @@ mod tests {
         assert!(after.has_changed_beside(&before, &[on(300.0)]));
         // Fewer pixels than cells.
         assert!(!view(&RgbImage::new(5, 3)).has_changed_beside(&view(&RgbImage::new(5, 3)), &[]));
-        // Only in the part that is looked at, whose places are those of the picture.
+        // Only in the searched region, whose positions are those of the picture.
         let seen = |left: u32| {
             let window = PixelRect { left, top: 80, width: 64, height: 48 };
             [noisy(1), other.clone()].map(|picture| CoarseView::new(&picture, &window))

@@ -1,4 +1,4 @@
-//! What parts are searched for with and followed with: a model, with or without a calibrated camera.
+//! The detector for search and tracking: a model, with or without a calibrated camera.
 
 use std::sync::Arc;
 
@@ -13,10 +13,10 @@ use crate::model::{GraspModel, Verification};
 use crate::plan_view::{PlanViewDetector, PlanarPose};
 use crate::region::SearchRegion;
 
-/// A model, and the plan view that it works in where the camera is calibrated.
+/// A model, and its plan view if the camera is calibrated.
 #[derive(Debug, Clone)]
 pub enum PartDetector {
-    /// Poses in pixels alone.
+    /// Poses in pixels only.
     Picture(Box<GraspModel>),
     /// Poses in metres, too.
     PlanView(Box<PlanViewDetector>),
@@ -61,7 +61,7 @@ impl PartDetector {
         }
     }
 
-    /// What a whole picture shows; detections in the frame of reference.
+    /// The detections in a whole picture, in the frame of reference.
     fn find(&self, picture: &RgbImage) -> Result<Vec<Found>> {
         match self {
             Self::Picture(model) => read_sync(model.find_async(picture, Verification::ByShape)),
@@ -69,7 +69,7 @@ impl PartDetector {
         }
     }
 
-    /// The part of the picture that is searched, in its pixels; all of it where `None`.
+    /// The searched region of the picture, in its pixels; `None` for the whole picture.
     pub(super) fn region(&self) -> Option<&SearchRegion> {
         match self {
             Self::Picture(model) => model.region(),
@@ -77,7 +77,8 @@ impl PartDetector {
         }
     }
 
-    /// A detection of the frame of reference in pixels of the picture, and in metres; `None` where the camera does not show it.
+    /// A detection of the frame of reference in pixels of the picture, and in metres; `None` if the camera does not
+    /// show it.
     pub(super) fn output(&self, detection: GraspDetection) -> Option<(GraspDetection, Option<PlanarPose>)> {
         match self {
             Self::Picture(_) => Some((detection, None)),
@@ -89,7 +90,7 @@ impl PartDetector {
     }
 }
 
-/// A search of one frame, to be run where there is time for it.
+/// A search of one frame, to be run when there is time.
 #[derive(Debug)]
 pub struct PartSearch {
     pub(super) number: u64,
@@ -97,14 +98,14 @@ pub struct PartSearch {
     pub(super) detector: Arc<PartDetector>,
 }
 
-/// What a search found.
+/// The result of a search.
 pub struct SearchOutcome {
     pub(super) number: u64,
     pub(super) found: Result<Vec<Found>>,
 }
 
 impl PartSearch {
-    /// Searches: some tens to some hundreds of milliseconds.
+    /// Runs the search, which takes some tens to some hundreds of milliseconds.
     pub fn run(&self) -> SearchOutcome {
         SearchOutcome { number: self.number, found: self.detector.find(&self.picture) }
     }

@@ -1,4 +1,4 @@
-//! One part refined in one frame: a window about where it is expected, its gradients, and the edges in it.
+//! Refines one part in one frame: a window around its expected pose, its gradients, and the edges in it.
 //!
 //! ```text
 //! expected pose ─ outline's box and the reach ─ window, halved as the search halves ─ GradientField
@@ -20,14 +20,15 @@ use crate::prepared::{Prepared, WorkingSize};
 use crate::sizes::{SizeRange, scaling};
 use crate::taught::TaughtDemonstration;
 
-/// Pixels of the halved picture about the reach, which the gradients' smoothing and the crests beside an edge need: 3 and 6.
+/// Margin in pixels of the halved picture around the search range, for the gradients' smoothing and for crests beside
+/// an edge: 3 and 6.
 const BORDER_PX: f64 = 9.0;
-/// A pyramid has a level where both sides keep so many pixels; as in `sdg_shape`.
+/// Minimum side of a pyramid level; as in `sdg_shape`.
 const MIN_LEVEL_SIDE: u32 = 24;
-/// What a close look sees of a part, in lengths of the part: 1.25, and a pixel for interpolation.
+/// Range of a close look, in lengths of the part: 1.25, and a pixel for interpolation.
 const SEEN_CLOSELY: f64 = 1.28;
 
-/// A part that has not moved agrees as well as before, but for noise. Chosen by hand.
+/// Tolerance of the agreement of a part that has not moved, for noise. Chosen by hand.
 const STILL_AGREEMENT: f64 = 0.005;
 
 /// A demonstration at the size at which a part is followed.
@@ -40,7 +41,7 @@ pub(super) struct SizedPart {
     pub(super) colors: Colors,
 }
 
-/// How far from where it is expected a part is looked for.
+/// Search range around a part's expected pose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Effort {
     /// Some pixels: from frame to frame.
@@ -49,7 +50,7 @@ pub(super) enum Effort {
     Captured,
 }
 
-/// Where a search had a part, and how well that agreed then.
+/// The pose of a search, and its agreement.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct StillPose {
     pub(super) image_from_cutout: PlanarSimilarity,
@@ -59,11 +60,11 @@ pub(super) struct StillPose {
 /// A part in one frame.
 #[derive(Debug, Clone)]
 pub(super) struct Followed {
-    /// Whether it lies where the last search had it.
+    /// Whether it lies at the pose of the last search.
     pub(super) is_held: bool,
-    /// Where the edges alone have it.
+    /// The pose by edges alone.
     pub(super) by_edges: PlanarSimilarity,
-    /// Where edges and surface together have it: there, or corrected.
+    /// The pose by edges and surface: the same, or corrected.
     pub(super) image_from_cutout: PlanarSimilarity,
     /// Edges and surface together, in `[0, 1]`.
     pub(super) agreement: f64,
@@ -71,12 +72,13 @@ pub(super) struct Followed {
     pub(super) evidence: Evidence,
     /// ln of its size over the nearest nominal size.
     pub(super) log_size: f64,
-    /// Mean brightness over that of the demonstration.
+    /// Mean brightness divided by that of the demonstration.
     pub(super) light: f64,
 }
 
 impl Effort {
-    /// In pixels of the halved picture. The scale hardly changes from frame to frame; free, it would only be noise. Chosen by hand.
+    /// In pixels of the halved picture. The scale hardly changes from frame to frame; a free scale would add only
+    /// noise. Chosen by hand.
     fn reach(self) -> Reach {
         match self {
             Self::Snapped => Reach { shift_px: 12.0, turn_rad: 0.12, log_scale: 0.02 },
@@ -93,7 +95,7 @@ struct View {
 }
 
 impl SizedPart {
-    /// The demonstration for parts as large as one that was found; `None` where it shows nothing to compare at that size.
+    /// The demonstration for parts of the size of a found one; `None` if it shows nothing to compare at that size.
     pub(super) fn new(detector: &PartDetector, found: &Placement, frame_size: [u32; 2]) -> Option<Self> {
         let &Placement { demonstration_idx, colors, .. } = found;
         let scale = found.image_from_cutout.scale;
@@ -115,9 +117,9 @@ impl SizedPart {
         self.range.log_size(scale)
     }
 
-    /// Refines the part about `start`; `None` where too little of it lies in the frame. `correction` is where the part was last found
-    /// against where the edges alone had it; it is applied where the frame agrees better with it. Where the frame agrees with `still`
-    /// as well as it did, the part lies there, and nothing is refined.
+    /// Refines the part near `start`; `None` if too little of it lies in the frame. `correction` is the offset of the
+    /// last found pose from the pose by edges alone; it is applied if the frame agrees better with it. If the frame's
+    /// agreement with `still` is unchanged, the part lies there, and nothing is refined.
     ///
     /// # Units and frames
     /// Poses map pixels of the cut-out to the detector's frame of reference.
@@ -138,7 +140,7 @@ impl SizedPart {
         let step = search.template().coarsest_pixel(start.scale / self.working.shrink() / self.working.cutout_scale);
         let view = self.view(detector, picture, &bounds, margin, step)?;
         let field = GradientField::with_config(&view.image, &demonstration.check().search.shape.gradient);
-        // From afar the table's colours are not asked for.
+        // The table's colours are not needed from far away.
         let picture = Picture { image: &view.image, field: &field, table: &TableColors::default() };
         let comparison = search.comparison(&picture);
         let both = |pose: &PlanarSimilarity| comparison.agreement(pose).both();
@@ -173,7 +175,7 @@ impl SizedPart {
         })
     }
 
-    /// A close look at a pose; `None` where too little of it lies in the frame.
+    /// A close look at a pose; `None` if too little of it lies in the frame.
     pub(super) fn close_look(
         &self,
         detector: &PartDetector,
@@ -182,7 +184,7 @@ impl SizedPart {
     ) -> Option<CloseLook> {
         let demonstration = self.demonstration(detector);
         let own = demonstration.marks.region().bounds();
-        // A square about the part, however it is turned.
+        // A square around the part at any turn.
         let side = SEEN_CLOSELY * own.width().max(own.height()) * image_from_cutout.scale;
         let half = 0.5 * side * std::f64::consts::SQRT_2;
         let center = image_from_cutout.apply(&own.center());
@@ -194,7 +196,8 @@ impl SizedPart {
         Some(self.prepared.search.comparison(&picture).close_look(&pose))
     }
 
-    /// The window of the frame `margin` about `bounds`, its corner at a multiple of `step` pixels of the halved picture.
+    /// The window of the frame at `margin` around `bounds`, its corner at a multiple of `step` pixels of the halved
+    /// picture.
     fn view(
         &self,
         detector: &PartDetector,
@@ -209,7 +212,7 @@ impl SizedPart {
             let grid = step * shrink;
             let least = MIN_LEVEL_SIDE * grid;
             let from = ((low - margin).max(0.0) as u32).min(limit) / grid * grid;
-            // Toward the end of the frame the window grows to the other side.
+            // Near the frame's end the window grows to the other side.
             let from = from.min(limit.saturating_sub(least) / grid * grid);
             let to = ((high + margin).max(0.0).ceil() as u32).max(from + least).min(limit);
             (to >= from + shrink).then_some((from, to - from))

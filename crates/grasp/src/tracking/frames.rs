@@ -1,4 +1,4 @@
-//! The newest frame, and older ones as long as a search of one of them runs.
+//! The newest frame, and older ones while a search of one of them runs.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -6,10 +6,11 @@ use std::time::Duration;
 
 use image::RgbImage;
 
-/// Longest time from one frame that a detection is carried through to the next: a part at 0.5 m/s moves by 20 pixels of a
-/// millimetre, which a capture reaches. Chosen by that reasoning.
+/// Longest time between frames through which a detection is carried: a part at 0.5 m/s moves by 20 pixels of a
+/// millimetre, which is within a capture's range. Derived from that.
 const MAX_STRIDE: Duration = Duration::from_millis(40);
-/// Frames that are kept for a search that has not ended; of more, every second one is kept. Chosen by hand: 44 MB of 640×480.
+/// Maximum number of frames kept for a running search; beyond it, every second one is kept. Chosen by hand: 44 MB of
+/// 640×480.
 const MAX_BUFFERED: usize = 48;
 /// A frame that may still be needed.
 #[derive(Debug, Clone)]
@@ -19,7 +20,7 @@ pub(super) struct BufferedFrame {
     pub(super) time: Duration,
 }
 
-/// The newest frame, and those since the one that is being searched.
+/// The newest frame, and those since the one being searched.
 #[derive(Debug, Clone, Default)]
 pub(super) struct FrameBuffer {
     frames: VecDeque<BufferedFrame>,
@@ -38,7 +39,7 @@ impl FrameBuffer {
         }
     }
 
-    /// Drops the frames that are older than `oldest`, but for the newest of all.
+    /// Drops the frames older than `oldest`, except the newest.
     pub(super) fn forget_before(&mut self, oldest: u64) {
         while self.frames.len() > 1 && self.frames[0].number < oldest {
             self.frames.pop_front();
@@ -53,8 +54,8 @@ impl FrameBuffer {
         self.frames.iter().find(|frame| frame.number == number)
     }
 
-    /// The frame to which something that holds in frame `number` is to be carried next; `None` where that is the newest, which
-    /// every track is followed into.
+    /// The frame to which a result of frame `number` is carried next; `None` if that is the newest, into which every
+    /// track is followed.
     pub(super) fn next_after(&self, number: u64, time: Duration) -> Option<&BufferedFrame> {
         let newest = self.newest()?;
         if newest.time.saturating_sub(time) <= MAX_STRIDE {

@@ -7,16 +7,20 @@
 //!          │                                              through the frames since, or matched to tracks
 //!          └─ does not follow from frame n - 1: PartSearch, before frame n is answered ───────────────┘
 //! ```
-//! **Glossary.** *Frame of reference*: the pixels that a model works in, those of the picture or of its plan view. *Followed*:
-//! refined near the last pose, in a window; nothing outside the window is read. *Captured*: the same with a wider reach, about five
-//! times slower. *Held*: left where the last search had it, because the part has not moved since. *Carried forward*: a detection in an older frame, followed through the frames since until it is one of the newest.
+//! **Glossary.** *Frame of reference*: the pixels that a model works in, those of the picture or of its plan view.
+//! *Followed*: refined near the last pose, in a window; nothing outside the window is read. *Captured*: the same with a
+//! wider reach, about five times slower. *Held*: left at the pose of the last search, because the part has not moved
+//! since. *Carried forward*: a detection in an older frame, followed through the frames since until it is one of the
+//! newest.
 //!
-//! A track is scored in every frame by the verdict that scores detections ([`crate::Contributions`]), with one difference: the
-//! comparing network, which takes more time than all else, is asked only when the agreement of edges and surface has fallen since
-//! it was last asked; searches ask it too. A track whose score falls below [`TrackerConfig::lose_below`] is lost in that frame.
+//! A track is scored in every frame by the verdict that scores detections ([`crate::Contributions`]), with one
+//! difference: the comparing network, which takes the most time, is evaluated only when the agreement of edges and
+//! surface has decreased since its last evaluation; searches evaluate it too. A track whose score falls below
+//! [`TrackerConfig::lose_below`] is lost in that frame.
 //!
-//! What is deliberately absent: clocks and threads. Frames carry their times, and the owner of the [`Tracker`] runs the searches
-//! where and when it likes, so that the same code runs on two cores, in a browser, and in a test that is the same on any machine.
+//! This module deliberately has no clock and no thread. Frames carry their times, and the owner of the [`Tracker`]
+//! decides where and when searches run, so that the same code runs on two cores, in a browser, and in a test with the
+//! same result on any machine.
 
 mod arrival;
 mod continuity;
@@ -35,29 +39,30 @@ pub use self::tracker::Tracker;
 use crate::detection::GraspDetection;
 use crate::plan_view::PlanarPose;
 
-/// Whether a part is where its track says.
+/// The state of a track.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TrackState {
-    /// It was refined in this frame, and its score holds.
+    /// It was refined in this frame, and its score is high enough.
     Followed,
     /// As `Followed`, for the first time since it was lost: this frame only.
     FoundAgain,
-    /// It is not seen; the detection is the last one that held.
+    /// It is not seen; the detection is the last confirmed one.
     Lost,
 }
 
 /// A part in the newest frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrackedPart {
-    /// Stays the same while the part is followed and when it is found again; no other part gets it.
+    /// Number of the part, which stays the same while it is followed and when it is found again; no other part gets it.
     pub id: u64,
-    /// Whether it is where `detection` says.
+    /// Whether the part is at `detection`.
     pub state: TrackState,
     /// Time since it was first found.
     pub age: Duration,
     /// Time since it was last seen; zero while it is followed.
     pub unseen_for: Duration,
-    /// Where it is, in pixels of the picture as given, with its score in this frame; where it was last seen once it is lost.
+    /// Its detection, in pixels of the given picture, with its score in this frame; the last one while the part is
+    /// lost.
     pub detection: GraspDetection,
     /// In metres, with a calibrated camera.
     pub pose: Option<PlanarPose>,
@@ -70,26 +75,29 @@ impl TrackedPart {
     }
 }
 
-/// When parts are searched for, lost and forgotten.
+/// When parts are searched, lost and forgotten.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct TrackerConfig {
-    /// Time from the start of one search to that of the next while all known parts are followed, and the longest from one frame to
-    /// the next that follows from it; as soon as one is lost, or none is
-    /// known, searches follow each other. Chosen by hand: a new part is found within this and the time of a search.
+    /// Time from the start of one search to that of the next while all known parts are followed, and the longest time
+    /// between frames that continue each other. As soon as one is lost, or none is known, searches run without a pause.
+    /// Chosen by hand: a new part is found within this and the time of a search.
     pub search_every: Duration,
-    /// A track with a lower score is lost. Below 0.5, where detections are accepted: the part was there in the last frame. Chosen by
-    /// hand.
+    /// A track with a lower score is lost. It is below 0.5, the threshold for detections, because the part was there in
+    /// the last frame. Chosen by hand.
     pub lose_below: f64,
-    /// So long after it was lost a part is looked for where its velocity carries it, in every frame. Chosen by hand.
+    /// Time after its loss during which a part is tried in every frame at the place predicted by its velocity. Chosen
+    /// by hand.
     pub retry_for: Duration,
-    /// A part that was lost for longer is forgotten: found later it is another one. Chosen by hand.
+    /// A part lost for longer is forgotten; when found later, it is another part. Chosen by hand.
     pub forget_after: Duration,
-    /// Frames no further apart than this follow from each other: a thing that moves or covers the part is not told from another picture,
-    /// and the next search finds what is new. Further apart, a part that is lost and a change beside the followed parts are searched
-    /// before the frame is answered. Chosen by hand: just above the period of 30 frames a second. Zero where frames wait.
+    /// Frames at most this far apart continue each other: an object that moves or covers the part is not distinguished
+    /// from another picture, and the next search finds new parts. For frames further apart, a lost part or a change
+    /// beside the followed parts causes a search before the frame is answered. Chosen by hand: just above the period of
+    /// 30 frames per second. Zero if frames wait for the tracker.
     pub moves_within: Duration,
-    /// Most parts that are followed at once. Chosen by hand, for time: each takes some milliseconds a frame.
+    /// Maximum number of parts that are followed at once. Chosen by hand, for time: each takes some milliseconds per
+    /// frame.
     pub max_parts: usize,
 }
 

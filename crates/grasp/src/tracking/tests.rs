@@ -1,4 +1,4 @@
-//! A drawn part that moves, is taken away and comes back; searches end some frames after the one that they read.
+//! A drawn part that moves, is removed and comes back; searches end some frames after the frame that they read.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -13,9 +13,9 @@ use crate::region::SearchRegion;
 const SIZE: [u32; 2] = [320, 240];
 /// From one frame to the next.
 const PERIOD: Duration = Duration::from_millis(10);
-/// Frames that a search takes.
+/// Duration of a search in frames.
 const SEARCH_FRAMES: u64 = 7;
-/// The drawn part is flat and its picture without noise: what is left is the raster's.
+/// The drawn part is flat and its picture without noise: the remaining error is the raster's.
 const MAX_ERROR_PX: f64 = 0.5;
 const MAX_ERROR_RAD: f64 = 0.01;
 
@@ -27,7 +27,7 @@ fn tracker() -> Tracker {
     Tracker::new(drawn_part::model(SIZE).into(), TrackerConfig::default())
 }
 
-/// Feeds pictures of parts that lie where `poses` says in each frame; what is tracked in each.
+/// Feeds pictures of parts at `poses` in each frame; returns the tracks of each frame.
 fn run(tracker: &mut Tracker, count: u64, poses: impl Fn(u64) -> Vec<PlanarSimilarity>) -> Vec<Vec<TrackedPart>> {
     let mut pending: Option<(SearchOutcome, u64)> = None;
     (0..count)
@@ -55,7 +55,7 @@ fn assert_at(part: &TrackedPart, pose: &PlanarSimilarity, about: &str) {
 
 #[test]
 fn a_part_is_carried_to_the_newest_frame_followed_lost_and_found_again() {
-    // To the right and turning, gone from frame 30 to 44, then elsewhere, going down.
+    // To the right and turning, absent from frame 30 to 44, then elsewhere, going down.
     let pose = |number: u64| {
         let k = number as f64;
         match number {
@@ -87,7 +87,7 @@ fn a_part_is_carried_to_the_newest_frame_followed_lost_and_found_again() {
     }
 }
 
-/// Feeds pictures; frames that do not follow are searched before they are answered, others never.
+/// Feeds pictures; frames that do not continue the last one are searched before they are answered, others never.
 fn run_searching_before_answers(
     tracker: &mut Tracker,
     period: Duration,
@@ -110,7 +110,7 @@ fn run_searching_before_answers(
 fn a_frame_that_does_not_follow_is_answered_by_its_own_search() {
     let [here, there, elsewhere] = [at(80.0, 90.0, 0.0), at(230.0, 160.0, 90.0), at(240.0, 70.0, 200.0)];
     let frames = [vec![here], vec![here], vec![there], vec![], vec![elsewhere], vec![here, elsewhere], vec![elsewhere]];
-    // 10 pictures a second: what appears beside the part is another picture.
+    // 10 pictures per second: a new object beside the part means another picture.
     let answers = run_searching_before_answers(&mut tracker(), Duration::from_millis(100), &frames);
     let was_searched: Vec<bool> = answers.iter().map(|(was_searched, _)| *was_searched).collect();
     assert_eq!(was_searched, [true, false, true, true, true, true, true]);
@@ -124,7 +124,7 @@ fn a_frame_that_does_not_follow_is_answered_by_its_own_search() {
             assert_at(nearest, pose, &format!("frame {number}"));
         }
     }
-    // At 100 frames a second things move.
+    // At 100 frames per second objects move.
     let answers = run_searching_before_answers(&mut tracker(), PERIOD, &frames);
     let was_searched: Vec<bool> = answers.iter().map(|(was_searched, _)| *was_searched).collect();
     assert_eq!(was_searched, [true, false, false, false, false, false, false]);
@@ -138,13 +138,14 @@ fn a_part_that_lies_still_stays_where_the_search_has_it() {
     let found = &answers[0].1[0].detection;
     for (was_searched, parts) in &answers[1..] {
         let mut followed = parts[0].detection.clone();
-        // A window of the picture is read at other numbers, so that sums in single precision end in other bits.
+        // A window of the picture is read at other coordinates, so that sums in single precision differ in their last
+        // bits.
         let [seen, searched] = [&followed, found].map(|detection| [detection.agreement.unwrap(), detection.light]);
         assert!((0..2).all(|k| (seen[k] - searched[k]).abs() < 1e-6), "{seen:?} instead of {searched:?}");
         (followed.agreement, followed.light) = (found.agreement, found.light);
         assert_eq!((*was_searched, &followed), (false, found));
     }
-    // What moves by a pixel is followed.
+    // A movement of one pixel is followed.
     let moved = tracker.frame(Arc::new(picture(&[at(101.3, 90.8, 17.0)])), Duration::from_millis(1200));
     assert_at(&moved[0], &at(101.3, 90.8, 17.0), "moved");
 }
@@ -180,7 +181,7 @@ fn frames_of_another_size_begin_a_new_sequence() {
     let other = Arc::new(RgbImage::new(200, 100));
     assert!(tracker.frame(other, PERIOD * 12).is_empty());
     if let Some(search) = search {
-        // What belongs to the old sequence is ignored.
+        // Results of the old sequence are ignored.
         tracker.take_outcome(search.run()).unwrap();
     }
     assert!(tracker.frame(Arc::new(RgbImage::new(200, 100)), PERIOD * 13).is_empty());
@@ -193,13 +194,14 @@ fn the_same_frames_give_the_same_tracks() {
     assert_eq!(one, again);
 }
 
-/// A part that leaves the region is lost there, though it is still in the picture, and one that never lies in it is never found.
+/// A part that leaves the region is lost there, although it is still in the picture; one that is never in it is never
+/// found.
 #[test]
 fn with_a_region_parts_are_followed_in_it_alone() {
     let region = SearchRegion::new([40, 30, 180, 180]);
     let model = drawn_part::model(SIZE).with_region(Some(region)).unwrap();
     let mut tracker = Tracker::new(model.into(), TrackerConfig::default());
-    // To the right, 2 px a frame, and beyond the region.
+    // To the right, 2 px per frame, and beyond the region.
     let pose = |number: u64| at(110.0 + 2.0 * number as f64, 120.0, 0.0);
     let told = run(&mut tracker, 80, |number| vec![pose(number)]);
     let mut num_followed = 0;
@@ -213,7 +215,7 @@ fn with_a_region_parts_are_followed_in_it_alone() {
     }
     assert!(num_followed > 30, "{num_followed}");
     assert_eq!(told[79][0].state, TrackState::Lost);
-    // What changes beside the region is not searched for before the frame is answered.
+    // A change beside the region causes no search before the frame is answered.
     let config = TrackerConfig { moves_within: Duration::ZERO, ..TrackerConfig::default() };
     let model = drawn_part::model(SIZE).with_region(Some(region)).unwrap();
     let mut tracker = Tracker::new(model.into(), config);

@@ -1,4 +1,4 @@
-//! One part and what is known of it from frame to frame.
+//! One part and its state from frame to frame.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -17,32 +17,32 @@ use crate::sighting::Sighting;
 use crate::verdict::Contributions;
 use crate::verification::PlacedDemonstration;
 
-/// Share of a new measurement in the velocity. Chosen by hand: after a sudden turn the start is off by less than three frames'
-/// motion.
+/// Share of a new measurement in the velocity. Chosen by hand: after a sudden change of direction the start is wrong by
+/// less than three frames' motion.
 const VELOCITY_GAIN: f64 = 0.4;
 /// Share of a new frame in the running means of agreement and size. Chosen by hand.
 const STEADY_GAIN: f64 = 0.05;
-/// Every so many frames a track is captured: snapped from frame to frame, a long part slid along itself by 2 pixels. Chosen by
-/// hand.
+/// A track is captured once in this many frames: with snapping only, a long part slid along itself by 2 pixels. Chosen
+/// by hand.
 const CAPTURE_EVERY: u64 = 3;
 /// Longest time over which a pose is carried forward by its velocity. Chosen by hand.
 const MAX_FORWARD_SECS: f64 = 0.1;
-/// An agreement of less than this share of its running mean is tried again with more effort. Chosen by hand.
+/// If the agreement is below this share of its running mean, refinement is repeated with more effort. Chosen by hand.
 const POOR_SHARE: f64 = 0.85;
-/// Larger differences between a search and the edges alone are no correction but another place. In pixels of the cut-out, and in
-/// radians; chosen by hand.
+/// Larger differences between a search and the edges alone mean another place, not a correction. In pixels of the
+/// cut-out, and in radians; chosen by hand.
 const MAX_CORRECTION_PX: f64 = 3.0;
 const MAX_CORRECTION_RAD: f64 = 0.06;
-/// What the pose of a search must gain in agreement to replace the followed one. Chosen by hand.
+/// Minimum gain of agreement for a search's pose to replace the followed one. Chosen by hand.
 const MIN_GAIN: f64 = 0.005;
-/// The comparing network is asked again where the agreement is not within this ratio of what it was when it was asked last, and
-/// after this time. Chosen by hand: asking takes about as long as following.
+/// The comparing network is evaluated again if the agreement is not within this ratio of that at its last evaluation,
+/// and after this time. Chosen by hand: an evaluation takes about as long as following.
 const SAME_LOOKS: f64 = 0.85;
 const MAX_LOOK_AGE: Duration = Duration::from_secs(1);
-/// Frames whose poses are kept for searches that have not ended. Chosen by hand: two seconds at 100 frames a second.
+/// Number of frames whose poses are kept for running searches. Chosen by hand: two seconds at 100 frames per second.
 const MAX_HISTORY: usize = 200;
 
-/// The comparing network's log-odds, and when they were computed.
+/// The comparing network's log-odds, and the time of their computation.
 #[derive(Debug, Clone, Copy)]
 struct LastLook {
     look: CloseLook,
@@ -51,7 +51,7 @@ struct LastLook {
     at: Duration,
 }
 
-/// What a search found of a part; holds until the part moves or is covered.
+/// A search's result for a part; valid until the part moves or is covered.
 #[derive(Debug, Clone)]
 struct Still {
     pose: StillPose,
@@ -75,7 +75,7 @@ pub(super) enum Standing {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PastPose {
     pub(super) number: u64,
-    /// Where the edges alone had it.
+    /// The pose by edges alone.
     pub(super) by_edges: PlanarSimilarity,
     pub(super) image_from_cutout: PlanarSimilarity,
     pub(super) agreement: f64,
@@ -88,25 +88,25 @@ pub(super) struct Track {
     pub(super) standing: Standing,
     pub(super) first_seen: Duration,
     part: SizedPart,
-    /// Where the edges had it in the frame at `time`, the last in which it was seen.
+    /// The pose by edges in the frame at `time`, the last in which it was seen.
     by_edges: PlanarSimilarity,
     pub(super) time: Duration,
     pub(super) number: u64,
     velocity_px_per_s: Vector2<f64>,
     turn_rad_per_s: f64,
-    /// The scale without its noise from frame to frame.
+    /// The scale, smoothed over frames.
     steady_scale: f64,
     /// `None` before the first frame.
     steady_agreement: Option<f64>,
     close: Option<LastLook>,
-    /// Where the marks lie against the outline, as the last search refined them.
+    /// The position of the marks relative to the outline, as refined by the last search.
     cutout_from_marks: PlanarSimilarity,
     network_score: f64,
     keypoint_scores: Vec<f64>,
     turn_source: TurnSource,
-    /// Where searches have the part against where the edges alone have it, in the cut-out's frame.
+    /// The offset of the searches' poses from those by edges alone, in the cut-out's frame.
     correction: Option<PlanarSimilarity>,
-    /// Where the last search has the part, further off; tried in the next frame.
+    /// The more distant pose of the last search; tried in the next frame.
     alternative: Option<PlanarSimilarity>,
     /// `None` once it has moved.
     still: Option<Still>,
@@ -114,7 +114,7 @@ pub(super) struct Track {
 }
 
 impl Track {
-    /// A track of what a search found in a frame; `None` where its demonstration shows nothing to compare at that size.
+    /// A track from a search's result in a frame; `None` if its demonstration shows nothing to compare at that size.
     pub(super) fn new(detector: &PartDetector, frame: &BufferedFrame, found: &Found) -> Option<Self> {
         let placement = found.placement.as_ref()?;
         let part = SizedPart::new(detector, placement, detector.frame_size(&frame.picture))?;
@@ -145,7 +145,7 @@ impl Track {
         Some(made)
     }
 
-    /// Takes the place and the score that a search found of it in that picture for those of the frames that follow, until it moves.
+    /// Uses the pose and the score of a search in that picture for the following frames, until the part moves.
     pub(super) fn hold(
         &mut self,
         detector: &PartDetector,
@@ -162,13 +162,13 @@ impl Track {
         });
     }
 
-    /// The verdict of the last search, where it holds.
+    /// The verdict of the last search, while it is valid.
     pub(super) fn held_verdict(&self, followed: &Followed) -> Option<(f64, Contributions)> {
         let still = self.still.as_ref().filter(|_| followed.is_held)?;
         Some((still.score, still.evidence))
     }
 
-    /// Takes over what only a search measures: the marks' shift, the network's score, the close look.
+    /// Takes over the measurements that only a search makes: the marks' shift, the network's score, the close look.
     pub(super) fn take_over(&mut self, found: &Placement, time: Duration) {
         self.cutout_from_marks = found.image_from_cutout.inverse().compose(&found.image_from_marks);
         self.network_score = found.network_score;
@@ -179,8 +179,8 @@ impl Track {
         }
     }
 
-    /// Compares the pose that a search found with where the edges had the part in that frame: the difference corrects the frames
-    /// that follow, or is tried in the next one where it is large.
+    /// Compares a search's pose with the pose by edges in that frame: a small difference corrects the following frames,
+    /// a large one is tried in the next frame.
     pub(super) fn correct(&mut self, detector: &PartDetector, past: &PastPose, found: &Placement) {
         let difference = past.by_edges.inverse().compose(&found.image_from_cutout);
         let middle = self.part.demonstration(detector).marks.bbox.center();
@@ -193,7 +193,7 @@ impl Track {
             self.alternative = Some(difference);
             return;
         }
-        // Half of what it was before, so that the noise of one search does not move the part by all of it.
+        // Half of the previous correction is kept, so that the noise of one search does not move the part fully.
         let before = self.correction.unwrap_or(difference);
         let shift = 0.5 * (shift + (before.apply(&middle) - middle));
         let turn = Angle::from_radians(0.5 * (turn + before.angle.radians()));
@@ -201,12 +201,12 @@ impl Track {
         self.correction = Some(PlanarSimilarity::about(middle, middle + shift, turn, scale));
     }
 
-    /// The part's middle where the cut-out lies at `image_from_cutout`, in the frame of reference.
+    /// The part's centre for the cut-out's pose `image_from_cutout`, in the frame of reference.
     fn middle(&self, detector: &PartDetector, image_from_cutout: &PlanarSimilarity) -> Point2<f64> {
         image_from_cutout.apply(&self.part.demonstration(detector).marks.bbox.center())
     }
 
-    /// Where the part is expected at a time.
+    /// The expected pose at a time.
     pub(super) fn expected(&self, detector: &PartDetector, time: Duration) -> PlanarSimilarity {
         let secs = time.saturating_sub(self.time).as_secs_f64().min(MAX_FORWARD_SECS);
         let middle = self.middle(detector, &self.by_edges);
@@ -216,7 +216,7 @@ impl Track {
         moved.compose(&self.by_edges)
     }
 
-    /// Refines the part in a frame, wherever that leads; `None` where too little of it lies in the frame.
+    /// Refines the part in a frame, whatever the result; `None` if too little of it lies in the frame.
     pub(super) fn refine(
         &mut self,
         detector: &PartDetector,
@@ -277,12 +277,12 @@ impl Track {
         }
     }
 
-    /// ln of its size over the nearest nominal size, without the noise from frame to frame.
+    /// ln of its size over the nearest nominal size, smoothed over frames.
     pub(super) fn log_size(&self) -> f64 {
         self.part.log_size(self.steady_scale)
     }
 
-    /// How the track is refined in a frame from the last one.
+    /// The refinement of the track in a frame, starting from the last one.
     pub(super) fn default_effort(&self, number: u64) -> Effort {
         if (number + self.id).is_multiple_of(CAPTURE_EVERY) { Effort::Captured } else { Effort::Snapped }
     }
@@ -292,7 +292,7 @@ impl Track {
         self.steady_agreement.is_some_and(|steady| followed.agreement < POOR_SHARE * steady)
     }
 
-    /// The place as the verdict judges it.
+    /// The place in the form that the verdict judges.
     pub(super) fn sighting<'a>(
         &self,
         detector: &'a PartDetector,
@@ -318,7 +318,7 @@ impl Track {
         }
     }
 
-    /// Moves the track to where it was refined to.
+    /// Moves the track to its refined pose.
     pub(super) fn accept(&mut self, detector: &PartDetector, followed: &Followed, number: u64, time: Duration) {
         let secs = time.saturating_sub(self.time).as_secs_f64();
         let shift = self.middle(detector, &followed.by_edges) - self.middle(detector, &self.by_edges);
@@ -327,7 +327,7 @@ impl Track {
             self.velocity_px_per_s = Vector2::zeros();
             self.turn_rad_per_s = 0.0;
         } else if secs > 0.0 {
-            // The first measurement has nothing before it to be smoothed with.
+            // The first measurement has no predecessor to be smoothed with.
             let gain = if self.history.is_empty() { 1.0 } else { VELOCITY_GAIN };
             self.velocity_px_per_s += (shift / secs - self.velocity_px_per_s) * gain;
             self.turn_rad_per_s += (turn / secs - self.turn_rad_per_s) * gain;
@@ -344,13 +344,13 @@ impl Track {
         self.history.push_back(PastPose { number, by_edges, image_from_cutout, agreement });
     }
 
-    /// Where it was in a frame, if it was followed there.
+    /// Its pose in a frame, if it was followed there.
     pub(super) fn past_pose(&self, number: u64) -> Option<PastPose> {
         let idx = self.history.binary_search_by_key(&number, |past| past.number).ok()?;
         self.history.get(idx).copied()
     }
 
-    /// Goes on from another pose of the same part; its number, its age and its past stay.
+    /// Continues from another pose of the same part; its number, age and history stay.
     pub(super) fn replace_by(&mut self, other: Self) {
         let mut history = std::mem::take(&mut self.history);
         history.retain(|past| other.history.front().is_none_or(|first| past.number < first.number));

@@ -21,9 +21,10 @@ use crate::plan_view::PlanarPose;
 use crate::verdict::Clues;
 use sdg_shape::PixelRect;
 
-/// Scores from which a detection becomes a track, and a lost track is found again: where detections are accepted.
+/// Minimum score for a detection to become a track, and for a lost track to be found again: the acceptance threshold.
 const ACCEPTED: f64 = 0.5;
-/// Captures of arriving tracks in one frame, so that a search that ends does not hold up the frame. Chosen by hand.
+/// Maximum number of captures of arriving tracks in one frame, so that a finished search does not delay the frame.
+/// Chosen by hand.
 const MAX_CARRY_STEPS: usize = 3;
 
 /// Follows parts from frame to frame.
@@ -66,18 +67,18 @@ pub struct Tracker {
     searching: Option<u64>,
     /// When the last search began.
     searched_at: Option<Duration>,
-    /// The newest frame in small; `None` before the first.
+    /// The newest frame at low resolution; `None` before the first.
     coarse: Option<CoarseView>,
-    /// How the newest frame does not follow from the one before, until it was searched.
+    /// The discontinuity of the newest frame, until it was searched.
     gap: Option<Gap>,
 }
 
-/// How a frame does not follow from the one before.
+/// The kind of discontinuity between a frame and the one before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Gap {
-    /// Nothing is known of it: it is the first, or came long after the last.
+    /// Nothing is known: it is the first frame, or came long after the last.
     Unrelated,
-    /// Other things are seen, and the parts may be elsewhere.
+    /// Other objects are seen, and the parts may have moved.
     Changed,
 }
 
@@ -88,7 +89,7 @@ struct Tracked {
     part: TrackedPart,
 }
 
-/// What is told of a track.
+/// The reported data of a track.
 type Shown = (GraspDetection, Option<PlanarPose>);
 
 /// A track refined in the newest frame, before it is judged.
@@ -115,10 +116,11 @@ impl Tracker {
         }
     }
 
-    /// Follows all known parts into a frame; all of them, those that are lost too, in the order in which they were first found.
+    /// Follows all known parts into a frame; returns all of them, lost ones too, in the order in which they were first
+    /// found.
     ///
-    /// `captured` counts from any moment that is the same for all frames of the sequence. Frames of another size than the last ones
-    /// begin a new sequence.
+    /// `captured` is the time since any moment that is the same for all frames of the sequence. Frames of another size
+    /// than the last ones start a new sequence.
     pub fn frame(&mut self, picture: Arc<RgbImage>, captured: Duration) -> Vec<TrackedPart> {
         if self.frames.newest().is_some_and(|newest| newest.picture.dimensions() != picture.dimensions()) {
             self.restart();
@@ -142,15 +144,17 @@ impl Tracker {
         self.parts()
     }
 
-    /// The search that is to be run before the newest frame is answered, because that does not follow from the one before: it is the
-    /// first, a followed part is not where it was, or the picture changed where none is, as far as
-    /// [`TrackerConfig::moves_within`] lets that be told. [`Self::answer`] takes what it finds. A search that is running is given up.
+    /// The search to be run before the newest frame is answered, because that frame does not continue the one before:
+    /// it is the first, a followed part is not at its place, or the picture changed elsewhere, as far as
+    /// [`TrackerConfig::moves_within`] allows this to be detected. [`Self::answer`] takes its result. A running search
+    /// is abandoned.
     pub fn search_before_answer(&mut self) -> Option<PartSearch> {
         self.gap?;
         self.search_newest()
     }
 
-    /// Makes what [`Self::search_before_answer`] found the answer to the newest frame: parts that it did not find are lost.
+    /// Makes the result of [`Self::search_before_answer`] the answer to the newest frame: parts that it did not find
+    /// are lost.
     ///
     /// # Errors
     /// Those of [`crate::GraspModel::detect`].
@@ -187,7 +191,8 @@ impl Tracker {
         Ok(self.parts())
     }
 
-    /// What a search of the newest frame found as a track there, and what is told of it; `None` where the camera does not show it.
+    /// A search result of the newest frame as a track there, and its reported data; `None` if the camera does not show
+    /// it.
     fn arrived(&self, frame: &BufferedFrame, found: &Found) -> Option<(Track, Refined, Shown)> {
         let mut track = Track::new(&self.detector, frame, found)?;
         if let Some((idx, ..)) = self.matched(found, frame.number) {
@@ -200,7 +205,7 @@ impl Tracker {
         Some((track, Refined { followed, close }, shown))
     }
 
-    /// Parts of one sequence have one size, as those of one picture: a look-alike of another size is no lost part.
+    /// Parts of one sequence have one size, as those of one picture: a look-alike of another size is not a lost part.
     fn log_size(&self) -> Option<f64> {
         self.tracks.first().map(|tracked| tracked.track.log_size())
     }
@@ -226,7 +231,7 @@ impl Tracker {
         })
     }
 
-    /// How the newest frame does not follow from the one before, in which parts had those boxes.
+    /// The discontinuity of the newest frame, given the boxes of the parts in the frame before.
     fn gap_after(
         &mut self,
         before: Option<&BufferedFrame>,
@@ -250,7 +255,7 @@ impl Tracker {
         has_changed.then_some(Gap::Changed)
     }
 
-    /// The search that is to be run now, on the newest frame; `None` while one is running and while none is due.
+    /// The search to be run now, on the newest frame; `None` while one is running and while none is due.
     pub fn search_due(&mut self) -> Option<PartSearch> {
         let newest = self.frames.newest()?;
         if self.searching.is_some() {
@@ -273,13 +278,13 @@ impl Tracker {
         Some(PartSearch { number, picture, detector: self.detector.clone() })
     }
 
-    /// Takes what a search found; it is carried forward while the next frames are followed.
+    /// Takes the result of a search; it is carried forward while the next frames are followed.
     ///
     /// # Errors
     /// Those of [`crate::GraspModel::detect`].
     pub fn take_outcome(&mut self, outcome: SearchOutcome) -> Result<()> {
         if self.searching != Some(outcome.number) {
-            // Of a sequence that has ended.
+            // Of a finished sequence.
             return Ok(());
         }
         self.searching = None;
@@ -305,7 +310,7 @@ impl Tracker {
         Ok(())
     }
 
-    /// The track on which a detection of frame `number` lies, and where that was there.
+    /// The track that a detection of frame `number` overlaps, and its pose there.
     fn matched(&self, found: &Found, number: u64) -> Option<(usize, PastPose, Match)> {
         let placement = found.placement.as_ref()?;
         self.tracks.iter().enumerate().find_map(|(idx, tracked)| {
@@ -329,7 +334,7 @@ impl Tracker {
         arriving.chain(self.searching).min().unwrap_or(self.next_number)
     }
 
-    /// Carries what searches found through the buffered frames; returns what is near the newest.
+    /// Carries the results of searches through the buffered frames; returns those near the newest frame.
     fn carry_forward(&mut self) -> Vec<Track> {
         let mut steps = MAX_CARRY_STEPS;
         let mut arrived = Vec::new();
@@ -367,7 +372,7 @@ impl Tracker {
             .collect()
     }
 
-    /// Scores what was refined, all of one picture at once, and decides what is followed.
+    /// Scores the refined tracks, all of one picture together, and decides which are followed.
     fn judge_all(&mut self, refined: &mut Vec<Option<Refined>>, number: u64, captured: Duration, arrived: Vec<Track>) {
         let detector = self.detector.clone();
         let newcomers = refined.split_off(self.tracks.len());
@@ -414,7 +419,7 @@ impl Tracker {
         }
     }
 
-    /// Makes an arrived track one that is followed: the one that it corrects, one that was lost, or a new one.
+    /// Makes an arrived track a followed one: the one that it corrects, a lost one, or a new one.
     fn enter(&mut self, mut track: Track, followed: &Followed, number: u64, captured: Duration, shown: Shown) {
         track.accept(&self.detector, followed, number, captured);
         let lost_nearest = || {
@@ -447,7 +452,7 @@ impl Tracker {
         }
     }
 
-    /// Of two tracks on one part the older one stays.
+    /// Of two tracks on one part the older one is kept.
     fn drop_doubled(&mut self) {
         let mut idx = 1;
         while idx < self.tracks.len() {
@@ -466,8 +471,8 @@ impl Tracker {
     }
 }
 
-/// A detection of the frame of reference as it is told; `None` where the camera does not show it, and outside the part of the picture that
-/// is searched.
+/// A detection of the frame of reference in reported form; `None` if the camera does not show it, and outside the
+/// searched region of the picture.
 fn shown_within(detector: &PartDetector, mut detection: GraspDetection, size: [u32; 2]) -> Option<Shown> {
     detection.bbox = detection.bbox.clip(f64::from(size[0]), f64::from(size[1]));
     let is_in_region = |shown: &Shown| detector.region().is_none_or(|region| shown.0.lies_in(region));
@@ -506,7 +511,7 @@ impl Tracked {
         self.track.standing == Standing::Lost(captured)
     }
 
-    /// Goes on from where another track has the same part.
+    /// Continues from another track's pose of the same part.
     fn go_on_as(&mut self, other: Track, captured: Duration, (detection, pose): (GraspDetection, Option<PlanarPose>)) {
         let was_lost = matches!(self.track.standing, Standing::Lost(_));
         self.track.replace_by(other);

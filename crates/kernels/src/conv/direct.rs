@@ -1,8 +1,8 @@
-//! A convolution as one matrix product whose left side is read where it stands.
+//! A convolution as one matrix product whose left side is read in place.
 //!
-//! Maps stand channels last, so what a row of the kernel sees at a position is one run of floats, and the next
-//! position's begins `stride · C` later: rows of the product are positions, its depth is (row of the kernel, run).
-//! Where the kernel looks past the edges, a unit first copies its rows with zeros around them.
+//! Maps are channels last, so that the input of a kernel row at a position is one run of floats, and the next
+//! position's run starts `stride · C` later: rows of the product are positions, its depth is (row of the kernel,
+//! run). If the kernel extends beyond the edges, a unit first copies its rows with zeros around them.
 
 use super::panels::Panels;
 use crate::parallel::{Raw, for_each_unit};
@@ -10,14 +10,14 @@ use crate::product::{Epilogue, Operand, PANEL, PanelProduct, Prefetch};
 use crate::scratch::Scratch;
 use crate::simd::Isa;
 
-/// Positions a unit of work has, roughly: 96 rows of 256 floats are 98 KB.
+/// Approximate number of positions per unit of work: 96 rows of 256 floats are 98 KB.
 const UNIT_POSITIONS: usize = 96;
-/// The same where a unit copies what its rows share, which pays for larger ones.
+/// The same if a unit copies the data shared by its rows, for which larger units are better.
 const COPYING_UNIT_POSITIONS: usize = 240;
-/// Units to aim at, so that no thread waits long for the last.
+/// Target number of units, so that no thread waits long for the last.
 const MIN_UNITS: usize = 8;
 
-/// Maps that stand channels last, `[N, H, W, C]`.
+/// Channels-last maps, `[N, H, W, C]`.
 #[derive(Clone, Copy)]
 pub(crate) struct Maps<'a> {
     pub(crate) values: &'a [f32],
@@ -26,26 +26,26 @@ pub(crate) struct Maps<'a> {
     pub(crate) channels: usize,
 }
 
-/// Where grid positions land in the output maps.
+/// The positions of grid points in the output maps.
 #[derive(Clone, Copy)]
 pub(crate) struct Target {
     /// Size of the output maps.
     pub(crate) size: [usize; 2],
     /// Pixel of the first grid position.
     pub(crate) origin: [usize; 2],
-    /// From one grid position to the next.
+    /// Step from one grid position to the next.
     pub(crate) step: [usize; 2],
 }
 
 /// One product.
 pub(crate) struct DirectConv<'a> {
     pub(crate) source: Maps<'a>,
-    /// Pixel that the window's first cell sees from the first position.
+    /// Input pixel of the window's first cell at the first position.
     pub(crate) first: [isize; 2],
     /// Cells of the window.
     pub(crate) window: [usize; 2],
     pub(crate) stride: [usize; 2],
-    /// Positions computed.
+    /// Number of computed positions.
     pub(crate) grid: [usize; 2],
     pub(crate) filters: &'a Panels,
     pub(crate) epilogue: Epilogue<'a>,
@@ -56,7 +56,7 @@ impl DirectConv<'_> {
     /// Computes all positions and writes them to `output`, `[N, H, W, M]` of the target's size.
     ///
     /// # Safety
-    /// Nothing else touches the grid's pixels of `output`.
+    /// Nothing else accesses the grid's pixels of `output`.
     pub(crate) unsafe fn run(&self, isa: Isa, output: Raw) {
         let pointwise = self.window == [1, 1]
             && self.stride == [1, 1]
@@ -175,7 +175,7 @@ impl DirectConv<'_> {
         }
     }
 
-    /// What is read after a panel: the next panel, or after the last (`end`) the next unit's positions, `next`.
+    /// The data read after a panel: the next panel or, after the last (`end`), the next unit's positions, `next`.
     fn prefetch<'a>(&'a self, panel: usize, end: usize, next: &'a [f32]) -> Prefetch<'a> {
         let run = if panel + 1 < end { self.filters.panel(0, panel + 1).0 } else { next };
         Prefetch { runs: [run, &[]] }

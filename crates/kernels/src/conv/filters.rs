@@ -1,4 +1,4 @@
-//! A convolution's weights, packed for the way in which it is computed.
+//! A convolution's weights, packed for the method of computation.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use crate::simd::Isa;
 /// Packed weights of one convolution.
 #[derive(Clone)]
 pub(crate) enum Filters {
-    /// A product for each phase of the stride (forwards there is one).
+    /// A product for each phase of the stride (one in the forward direction).
     Direct(Vec<Panels>),
     /// A product for each of the 36 frequencies.
     Winograd(Panels),

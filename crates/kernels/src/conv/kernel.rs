@@ -1,6 +1,6 @@
 //! Convolution forwards, its input's gradient, and its bias's gradient, on `f32` slices.
 //!
-//! Maps stand channels last, `[N, H, W, C]`.
+//! Maps are channels last, `[N, H, W, C]`.
 
 use super::direct::{DirectConv, Maps, Target};
 use super::filters::Filters;
@@ -11,8 +11,9 @@ use crate::parallel::{Output, Raw};
 use crate::product::Epilogue;
 use crate::simd::Isa;
 
-/// Runs a convolution in either direction: `[N, Ho, Wo, Co]` from `x` going forwards, `[N, Hi, Wi, Ci]` from the
-/// output's gradient going back. `filters` packs the weight, for Winograd's way or directly.
+/// Runs a convolution in either direction: `[N, Ho, Wo, Co]` from `x` in the forward direction, `[N, Hi, Wi,
+/// Ci]` from the output's gradient backwards. `filters` contains the packed weight, for Winograd's method or
+/// directly.
 pub(crate) fn convolve(
     isa: Isa,
     direction: Direction,
@@ -49,7 +50,7 @@ pub(crate) fn convolve(
 }
 
 /// # Safety
-/// Nothing else touches `output`.
+/// Nothing else accesses `output`.
 unsafe fn run_direct(
     isa: Isa,
     direction: Direction,
@@ -100,7 +101,7 @@ unsafe fn run_direct(
 /// Writes pixels that no kernel cell reaches.
 ///
 /// # Safety
-/// Nothing else touches the phase's pixels of `output`.
+/// Nothing else accesses the phase's pixels of `output`.
 unsafe fn fill_phase(shape: &ConvShape, target: Target, grid: [usize; 2], epilogue: Epilogue<'_>, output: Raw) {
     let channels = shape.in_channels;
     for image in 0..shape.num_images {

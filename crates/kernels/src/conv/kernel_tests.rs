@@ -1,4 +1,4 @@
-//! The convolution kernels against plain loops, on every instruction set that this machine has.
+//! Compares the convolution kernels with plain loops, on every instruction set of this machine.
 
 use proptest::prelude::*;
 
@@ -16,7 +16,7 @@ use crate::reference::{
 };
 use crate::simd::Isa;
 
-/// Which way a 3×3 convolution of stride 1 may take.
+/// The methods for a 3×3 convolution of stride 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Way {
     Any,
@@ -25,7 +25,7 @@ enum Way {
 
 const WAYS: [Way; 2] = [Way::Any, Way::Direct];
 
-/// The kernels on maps that stand channels first, as the plain loops have them.
+/// The kernels on channels-first maps, as the plain loops use them.
 fn run(
     isa: Isa,
     way: Way,
@@ -128,7 +128,7 @@ fn every_path_agrees_with_plain_loops() {
         // Read in place: 1 × 1, and 3 × 3 without padding.
         ([2, 64, 12, 50], [16, 1, 1], [1, 1], [0, 0]),
         ([2, 6, 9, 60], [10, 3, 3], [1, 1], [0, 0]),
-        // Unequal strides, kernels, and a stride beyond the kernel, which leaves pixels unseen.
+        // Unequal strides, kernels, and a stride larger than the kernel, which skips pixels.
         ([2, 3, 6, 5], [3, 2, 3], [3, 2], [0, 2]),
         ([1, 3, 4, 130], [20, 3, 5], [1, 3], [2, 0]),
         ([1, 3, 5, 5], [2, 1, 1], [3, 3], [1, 1]),
@@ -136,7 +136,7 @@ fn every_path_agrees_with_plain_loops() {
         // Several units of work and several blocks of K.
         ([1, 24, 40, 70], [8, 3, 3], [1, 1], [1, 1]),
         ([3, 9, 30, 41], [11, 3, 3], [1, 1], [1, 1]),
-        // Winograd's way: whole and cut tiles, every padding, one panel and several, many tiles and few.
+        // Winograd's method: whole and clipped tiles, every padding, one panel and several, many tiles and few.
         ([1, 16, 3, 3], [16, 3, 3], [1, 1], [1, 1]),
         ([2, 16, 8, 9], [48, 3, 3], [1, 1], [1, 1]),
         ([1, 48, 10, 7], [16, 3, 3], [1, 1], [0, 2]),
@@ -180,7 +180,7 @@ proptest! {
 #[test]
 fn results_do_not_depend_on_the_number_of_threads() {
     let isa = Isa::detect();
-    // Large maps, and small maps whose filters are shared out.
+    // Large maps, and small maps whose filters are distributed.
     for x in [[2, 12, 50, 70], [3, 40, 6, 5], [2, 16, 70, 70], [1, 96, 9, 9]] {
         for stride in [1, 2] {
             let case = ConvCase { x, out_channels: 48, kernel: [3, 3], params: Conv2dParams::square(stride, 1) };
@@ -210,7 +210,7 @@ fn results_do_not_depend_on_the_number_of_threads() {
 
 #[test]
 fn nan_and_infinity_reach_what_they_touch_and_nothing_else() {
-    // Two channels are convolved directly; sixteen Winograd's way, which has to notice.
+    // Two channels are convolved directly; sixteen by Winograd's method, which must detect it.
     for channels in [2, 16] {
         let x = [1, channels, 6, 60];
         let case = ConvCase { x, out_channels: channels, kernel: [3, 3], params: Conv2dParams::square(1, 1) };
@@ -230,8 +230,8 @@ fn nan_and_infinity_reach_what_they_touch_and_nothing_else() {
                 assert_eq!(value.is_infinite(), near_infinity, "{isa:?}: {value} at {y}, {x}");
             }
             let grad = weight_gradient(isa, Way::Any, &x, &vec![1.0; channels * 360], &shape);
-            // Every cell of channel 0 passes over the NaN. The infinity stands in the corner below on the left,
-            // which only the cells of kernel rows 1, 2 and columns 0, 1 reach.
+            // Every cell of channel 0 passes over the NaN. The infinity is in the lower left corner, which only
+            // the cells of kernel rows 1, 2 and columns 0, 1 reach.
             assert!(grad[..9].iter().all(|value| value.is_nan()));
             for (cell, value) in grad[9..18].iter().enumerate() {
                 let reaches = cell / 3 >= 1 && cell % 3 <= 1;
@@ -244,7 +244,7 @@ fn nan_and_infinity_reach_what_they_touch_and_nothing_else() {
 
 #[test]
 fn what_follows_is_done_to_every_element() {
-    // Directly in one piece and in windows, and Winograd's way; backwards with pixels that nothing reaches.
+    // Directly in one piece and in windows, and by Winograd's method; backwards with pixels that no cell reaches.
     let cases = [
         ([2, 16, 9, 10], [48, 1, 1], 1, 0),
         ([1, 3, 9, 10], [37, 3, 3], 2, 1),
@@ -336,7 +336,7 @@ fn a_shape_knows_its_transpose() {
     assert_eq!(transposed, ConvShape::forward([3, 5, 28, 28], [8, 5, 4, 4], params));
 }
 
-/// A convolution of 32 channels, as often as `SDG_COUNTED` says: `vectors|portable|loops direct|any ROUNDS`.
+/// A convolution of 32 channels, repeated as given in `SDG_COUNTED`: `vectors|portable|loops direct|any ROUNDS`.
 #[test]
 #[ignore = "its instructions are counted under qemu: scripts/packages/count_arm64.sh"]
 fn counted() {

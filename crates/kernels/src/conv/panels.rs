@@ -1,7 +1,7 @@
 //! Weights in the order in which the matrix products read them.
 //!
-//! A product's columns are output channels going forwards, input channels going back; its depth is the other
-//! channels times the kernel's cells. Columns are packed in panels of 32.
+//! A product's columns are output channels in the forward direction, input channels backwards; its depth is
+//! the other channels times the kernel's cells. Columns are packed in panels of 32.
 
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ use crate::product::{PANEL, packed_len, panel_width};
 use crate::scratch::Scratch;
 use crate::simd::{Isa, transpose};
 
-/// Which way a convolution runs.
+/// The direction of a convolution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Direction {
     /// From input to output.
@@ -46,7 +46,7 @@ impl Panels {
     }
 }
 
-/// One panel's weights as `[channel, cell, 32]`, zeros where the columns end.
+/// One panel's weights as `[channel, cell, 32]`, with zeros after the last column.
 pub(super) fn gather(
     isa: Isa,
     weight: &[f32],

@@ -2,7 +2,7 @@
 
 use crate::params::Conv2dParams;
 
-/// The sizes of one convolution, however it is computed.
+/// The sizes of one convolution, for any method of computation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct ConvShape {
     pub(crate) num_images: usize,
@@ -74,14 +74,14 @@ impl ConvShape {
 
 /// Input pixels with the same remainder of `i + padding`, which share the kernel cells that reach them.
 ///
-/// Input pixel i is reached by output pixel o through kernel cell k where `i + padding = o·stride + k`: each phase is
-/// a convolution of stride 1 over the output's gradient, with those cells only.
+/// Input pixel i is reached by output pixel o through kernel cell k if `i + padding = o·stride + k`: each phase is a
+/// convolution of stride 1 over the output's gradient, with those cells only.
 pub(super) struct Phase {
     /// First pixel.
     pub(super) origin: [usize; 2],
     /// Pixels.
     pub(super) grid: [usize; 2],
-    /// Output pixel that the first of the cells comes from, at the first pixel.
+    /// Output pixel of the first of the cells, at the first pixel.
     pub(super) first: [isize; 2],
     /// Rows of the kernel, by ascending output pixel.
     pub(super) cells_y: Vec<usize>,

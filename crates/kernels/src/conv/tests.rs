@@ -1,4 +1,4 @@
-//! The functions on tensors: against burn's own convolution and its gradients, and finite differences.
+//! Compares the functions on tensors with burn's own convolution and its gradients, and with finite differences.
 
 use burn::tensor::module;
 use burn::tensor::ops::{ConvOptions, ConvTransposeOptions};
@@ -69,7 +69,7 @@ fn conv_transpose2d_agrees_with_burn_and_its_gradients() {
         ([2, 6, 7, 7], [6, 5, 4, 4], [2, 2], [1, 1]),
         ([3, 4, 5, 6], [4, 7, 2, 2], [2, 2], [0, 0]),
         ([1, 3, 4, 5], [3, 2, 3, 3], [1, 1], [1, 1]),
-        // A stride beyond the kernel leaves pixels that only the bias reaches.
+        // A stride larger than the kernel leaves pixels that only the bias reaches.
         ([1, 3, 4, 5], [3, 2, 2, 1], [3, 2], [0, 0]),
     ];
     for (x, weight, stride, padding) in cases {
@@ -86,7 +86,7 @@ fn conv_transpose2d_agrees_with_burn_and_its_gradients() {
 
 #[test]
 fn gradients_agree_with_finite_differences() {
-    // The operations are linear in each operand, so that a central difference is exact but for rounding.
+    // The operations are linear in each operand, so that a central difference is exact except for rounding.
     const STEP: f32 = 0.5;
     const TOLERANCE: f32 = 1e-4;
     let params = Conv2dParams::square(2, 1);
@@ -141,7 +141,7 @@ fn transposed_and_sliced_tensors_are_read_as_what_they_show() {
         let w = w.swap_dims(0, 1).slice([0..4, 0..3, 0..3, 0..3]);
         (x, w)
     };
-    // The output is transposed too, so that the gradient that comes back is no contiguous tensor.
+    // The output is transposed, too, so that the incoming gradient is not a contiguous tensor.
     let ours = |x, w, b| {
         let (x, w) = views(x, w);
         conv2d(x, w, Some(b), params).swap_dims(2, 3)
@@ -154,8 +154,8 @@ fn transposed_and_sliced_tensors_are_read_as_what_they_show() {
     assert_all_close(&run(ours, x, weight, 4), &run(burns, x, weight, 4));
 }
 
-/// Output and gradients of `Σ output · pattern` of a convolution and all that may follow it, or, with `in_steps`, of
-/// the same in operations of their own.
+/// Output and gradients of `Σ output · pattern` of a convolution with all its epilogue or, with `in_steps`, of the
+/// same as separate operations.
 fn run_fused(x: [usize; 4], weight: [usize; 4], params: Conv2dParams, in_steps: bool) -> Vec<Vec<f32>> {
     let device = Device::flex().autodiff();
     let channels = weight[0];
@@ -167,7 +167,7 @@ fn run_fused(x: [usize; 4], weight: [usize; 4], params: Conv2dParams, in_steps: 
     let residual = tensor(plain.dims(), 5, &device).require_grad();
     let per_channel = |vector: Tensor<1>| vector.reshape([1, channels, 1, 1]);
     let before = plain * per_channel(scale.clone()) + per_channel(bias.clone()) + residual.clone();
-    // At the ReLU's kink rounding decides: outputs within 1e-3 of it weigh nothing.
+    // At the ReLU's kink rounding decides: outputs within 1e-3 of it have zero weight.
     let pattern = tensor(before.dims(), 6, &device).mask_fill(before.clone().detach().abs().lower_elem(1e-3), 0.0);
     let output = if in_steps {
         burn::tensor::activation::relu(before)
@@ -191,7 +191,7 @@ fn run_fused(x: [usize; 4], weight: [usize; 4], params: Conv2dParams, in_steps: 
 
 #[test]
 fn a_fused_convolution_has_the_gradients_of_its_steps() {
-    // Winograd's way, directly in one piece, and directly with a stride.
+    // By Winograd's method, directly in one piece, and directly with a stride.
     for (x, weight, stride, padding) in
         [([2, 16, 9, 10], [32, 16, 3, 3], 1, 1), ([2, 5, 6, 7], [9, 5, 1, 1], 1, 0), ([1, 5, 9, 8], [9, 5, 3, 3], 2, 1)]
     {
@@ -210,7 +210,7 @@ fn packed_weights_are_forgotten_with_the_weights() {
     let device = Device::flex();
     let x = tensor([1, 16, 6, 6], 1, &device);
     let params = Conv2dParams::square(1, 1);
-    // The same network twice, then changed in place and as a new tensor at what may well be the same address.
+    // The same network twice, then changed in place, and as a new tensor at possibly the same address.
     for seed in 2..6 {
         let mut weight: Tensor<4> = tensor([16, 16, 3, 3], seed, &device);
         let first = to_vec(conv2d(x.clone(), weight.clone(), None, params));
@@ -326,7 +326,7 @@ fn gradients_of_what_is_read_more_than_once_are_added() {
         let map = conv(image.clone(), &weights[0]);
         let loss = conv(map.clone(), &weights[1]).square().sum()
             + conv(map.clone(), &weights[2]).exp().sum()
-            // By burn itself, in between and beside ours.
+            // By burn itself, between ours and in parallel.
             + (map * 3.0).sum()
             + conv(image.clone() * 0.5, &weights[0]).square().sum()
             + conv(image.clone(), &weights[0]).exp().sum();

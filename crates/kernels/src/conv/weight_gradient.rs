@@ -2,11 +2,11 @@
 //!
 //! `grad[m, ky, kx, c] = Σ_p output_grad[p, m] · x[position(p)·stride + (ky, kx) − padding, c]`
 //!
-//! Maps stand channels last, so the values that a kernel row ky needs of a position are one run of Kw·C floats, and
-//! the next position's begin stride·C later: rows of the product are output channels, columns run along (kx, c), and
-//! its depth is the positions, all read where they stand (x after zeros were put around it, where it is padded).
+//! Maps are channels last, so that the values that a kernel row ky needs at a position are one run of Kw·C floats,
+//! and the next position's run starts stride·C later: rows of the product are output channels, columns run along
+//! (kx, c), and its depth is the positions, all read in place (x after zeros were added around it, if it is padded).
 //!
-//! Sums over positions are cut into chunks by the shapes alone, computed apart and added in order.
+//! Sums over positions are divided into chunks by the shapes alone, computed separately and added in order.
 
 use super::direct::{Maps, copy_row};
 use super::shape::ConvShape;
@@ -16,13 +16,13 @@ use crate::scratch::Scratch;
 use crate::simd::lanes::LANES;
 use crate::simd::{Isa, transpose};
 
-/// Positions summed at a time, at most, so that they are read from a near cache again and again.
+/// Maximum number of positions summed at a time, so that they are read repeatedly from a near cache.
 const BLOCK_POSITIONS: usize = 256;
-/// Positions that are worth a chunk of their own.
+/// Minimum number of positions of a chunk.
 const CHUNK_POSITIONS: usize = 2048;
-/// Units to aim at, so that no thread waits long for the last.
+/// Target number of units, so that no thread waits long for the last.
 const MIN_UNITS: usize = 8;
-/// Rows that a product works off at a time.
+/// Rows that a product processes at a time.
 const TILE_ROWS: usize = 12;
 
 /// The gradient with respect to the weight, `[Co, Ci, Kh, Kw]`.
@@ -43,7 +43,7 @@ pub(super) fn direct_weight_gradient(isa: Isa, x: Maps<'_>, output_grad: Maps<'_
     let (in_channels, out_channels) = (shape.in_channels, shape.out_channels);
     let positions = shape.num_images * out_height * out_width;
 
-    // Blocks of whole output rows of one image, as even as they come.
+    // Blocks of whole output rows of one image, as equal as possible.
     let blocks_per_image = (out_height * out_width).div_ceil(BLOCK_POSITIONS).min(out_height);
     let block_rows = out_height.div_ceil(blocks_per_image);
     let blocks_per_image = out_height.div_ceil(block_rows);
@@ -120,13 +120,13 @@ pub(super) fn direct_weight_gradient(isa: Isa, x: Maps<'_>, output_grad: Maps<'_
     grad
 }
 
-/// x with zeros around it, `[N, Hp, Wp, C]`, and room to read past the end.
+/// x with zeros around it, `[N, Hp, Wp, C]`, and room for reads beyond the end.
 struct PaddedInput<'a> {
     values: PaddedValues<'a>,
     height: usize,
     width: usize,
     channels: usize,
-    /// From one output pixel to the next, in padded pixels.
+    /// Step from one output pixel to the next, in padded pixels.
     stride: [usize; 2],
 }
 
@@ -140,13 +140,13 @@ impl<'a> PaddedInput<'a> {
         let [in_height, in_width] = shape.in_size;
         let [out_height, out_width] = shape.out_size;
         let channels = shape.in_channels;
-        // Kernel rows that end between two vectors read on; in the last pixel that would leave the maps.
+        // Kernel rows that end within a vector read further; at the last pixel that would be outside the maps.
         let whole = (shape.kernel[1] * channels).is_multiple_of(LANES);
         if shape.params.padding == [0, 0] && whole {
             let values = PaddedValues::InPlace(x.values);
             return Self { values, height: in_height, width: in_width, channels, stride: shape.params.stride };
         }
-        // A 1 × 1 kernel looks at every stride-th pixel only, so only those are copied.
+        // A 1 × 1 kernel reads only every stride-th pixel, so that only those are copied.
         let pointwise = shape.kernel == [1, 1] && shape.params.padding == [0, 0];
         let (sampling, stride) = if pointwise { (shape.params.stride, [1, 1]) } else { ([1, 1], shape.params.stride) };
         let height = (out_height - 1) * stride[0] + shape.kernel[0];
@@ -173,13 +173,13 @@ impl<'a> PaddedInput<'a> {
             }
             copy_row(row, source, -((padding_x * channels) as isize));
         });
-        // What lies past the end is multiplied into columns that nobody reads.
+        // Values beyond the end are multiplied into columns that are never read.
         let end = values.len() - PANEL;
         values[end..].fill(0.0);
         Self { values: PaddedValues::Copied(values), height, width, channels, stride }
     }
 
-    /// What kernel row `kernel_y` sees from output row `y` of an image on, from column `first` of its run on.
+    /// The input of kernel row `kernel_y` from output row `y` of an image on, from column `first` of its run on.
     fn rows(&self, image: usize, y: usize, kernel_y: usize, first: usize) -> Operand<'_> {
         let values: &[f32] = match &self.values {
             PaddedValues::InPlace(values) => values,

@@ -8,8 +8,8 @@
 //! filters. The weight's gradient is the adjoint: `Gᵀ [Σ_tiles (Bᵀ d B) ⊙ (A ȳ Aᵀ)] G`.
 //!
 //! The points are 0, ±1/√2, ±√2, ∞: with those the error grows several times less than with 0, ±1, ±2, ∞. Values
-//! that are not finite would spread over their tile, so each result is looked at, and computed directly if it has
-//! one.
+//! that are not finite would spread over their tile, so that each result is checked, and computed directly if it
+//! contains one.
 //!
 //! Source: Lavin and Gray, Fast Algorithms for Convolutional Neural Networks (2015); the points after Barabasz et
 //! al., Error Analysis and Improving the Accuracy of Winograd Convolution (2018).
@@ -33,15 +33,15 @@ mod weight_gradient;
 use tiling::{FREQUENCIES, Frequencies, Tiling};
 pub(super) use weight_gradient::weight_gradient;
 
-/// Tiles a unit of work has: the transformed values of 48 tiles and 64 channels are 442 KB.
+/// Tiles per unit of work: the transformed values of 48 tiles and 64 channels are 442 KB.
 const UNIT_TILES: usize = 48;
-/// Units to aim at, so that no thread waits long for the last. A single thread takes few tiles at a
-/// time through all steps, which stay in its cache (a browser's 64→64 on 64×80: 5.2 ms with eight, 3.5 with one).
+/// Target number of units, so that no thread waits long for the last. A single thread takes few tiles at a time
+/// through all steps, which stay in its cache (a browser's 64→64 on 64×80: 5.2 ms with eight, 3.5 with one).
 const MIN_UNITS: usize = if cfg!(all(feature = "parallel", not(target_arch = "wasm32"))) { 8 } else { 1 };
 
-/// Whether a convolution is computed this way.
+/// Whether a convolution is computed by this method.
 ///
-/// Channels are worked off sixteen at a time; on tiny maps most of a tile would lie outside.
+/// Channels are processed sixteen at a time; on very small maps most of a tile would lie outside.
 pub(crate) fn suits(shape: &ConvShape) -> bool {
     let [height, width] = shape.out_size;
     shape.kernel == [3, 3]
@@ -78,10 +78,10 @@ pub(super) fn pack(isa: Isa, weight: &[f32], shape: &ConvShape, direction: Direc
     packed
 }
 
-/// Convolves `source` and writes all of `output`, `[N, H, W, M]`; false where a sum is not finite.
+/// Convolves `source` and writes all of `output`, `[N, H, W, M]`; returns false if a sum is not finite.
 ///
 /// # Safety
-/// Nothing else touches `output`.
+/// Nothing else accesses `output`.
 pub(super) unsafe fn run(
     isa: Isa,
     source: Maps<'_>,
@@ -95,7 +95,8 @@ pub(super) unsafe fn run(
     let num_tiles = tiling.len();
     let finite = AtomicBool::new(true);
     let conv = Winograd { isa, source, padding, out_size, filters, epilogue, output, tiling, finite: &finite };
-    // Many tiles: each unit takes some through all steps. Few: they go together, and the steps are shared out.
+    // Many tiles: each unit takes some through all steps. Few: they are processed together, and the steps are
+    // distributed.
     let units = num_tiles.div_ceil(UNIT_TILES);
     if units >= MIN_UNITS {
         let per_unit = num_tiles.div_ceil(units);
@@ -126,13 +127,13 @@ impl Winograd<'_> {
     /// Takes `count` tiles from `first` on through all steps.
     ///
     /// # Safety
-    /// Nothing else touches these tiles of the output.
+    /// Nothing else accesses these tiles of the output.
     unsafe fn tiles(&self, first: usize, count: usize, shared_out: bool) {
         let (channels, columns) = (self.source.channels, self.filters.columns);
         let mut transformed_input = Frequencies::new(count, channels);
         let mut products = Frequencies::new(count, columns);
         let (input_step, products_step) = (transformed_input.step, products.step);
-        // Parts of the tiles that are transformed apart.
+        // Parts of the tiles that are transformed separately.
         let part = if shared_out { count.div_ceil(MIN_UNITS) } else { count };
         let parts = count.div_ceil(part);
 

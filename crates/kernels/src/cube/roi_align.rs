@@ -1,11 +1,11 @@
-//! ROIAlign in CubeCL: one unit of work an output value.
+//! ROIAlign in CubeCL: one unit of work per output value.
 //!
 //! ```text
 //! output (r, c, i, j) = mean over the bin's samples (y, x) of the bilinear feature (image of r, c, y, x)
 //! ```
 //!
-//! The conventions are those of [`AxisBins`](crate::roi_bins::AxisBins), sample by sample. What differs: an image index
-//! beyond the batch is taken for the last image, since a kernel cannot refuse.
+//! The conventions are those of [`AxisBins`](crate::roi_bins::AxisBins), sample by sample. One difference: an image
+//! index beyond the batch means the last image, since a kernel cannot return an error.
 
 use burn::backend::Cube;
 use burn::backend::ops::FloatTensorOps;
@@ -16,7 +16,7 @@ use cubecl::prelude::*;
 
 use crate::params::{RoiAlignParams, RoiAlignment, SamplingRatio};
 
-/// As [`roi_align`](crate::roi_align()), of `f32` tensors whose shapes were checked.
+/// As [`roi_align`](crate::roi_align()), for `f32` tensors whose shapes were checked.
 pub(super) fn launched(
     features: FloatTensor<Cube>,
     rois: FloatTensor<Cube>,
@@ -47,7 +47,7 @@ pub(super) fn launched(
     crops
 }
 
-/// `samples` a bin and axis, 0 for as many as the bin is feature pixels long.
+/// `samples` per bin and axis; 0 for the length of the bin in feature pixels.
 #[cube(launch)]
 fn roi_align_kernel(
     features: &Tensor<f32>,
@@ -73,7 +73,8 @@ fn roi_align_kernel(
     let (height, width) = (features.shape(2), features.shape(3));
     let (stride_y, stride_x) = (features.stride(2), features.stride(3));
 
-    // An axis each: where the bin begins, its length, its first sample, how many there are, how many the mean is over.
+    // For each axis: the start of the bin, its length, its first sample, the number of samples, and the divisor of the
+    // mean.
     let low_y = rois[roi + 2 * column];
     let high_y = rois[roi + 4 * column];
     let (start_y, bin_size_y, first_y, count_y, grid_y) =
@@ -86,7 +87,7 @@ fn roi_align_kernel(
     let mut sum = f32::new(0.0);
     for sample_y in 0..count_y {
         let at_y = start_y + (first_y + f32::cast_from(sample_y) + f32::new(0.5)) * bin_size_y / grid_y;
-        // Samples up to one pixel outside are pulled onto the border, those beyond count as zero.
+        // Samples up to one pixel outside are moved onto the border; those further away count as zero.
         if at_y >= f32::new(-1.0) && at_y <= f32::cast_from(height) {
             let from_y = max(at_y, f32::new(0.0));
             let top = min(usize::cast_from(from_y), height - 1);
@@ -111,8 +112,8 @@ fn roi_align_kernel(
     crops[ABSOLUTE_POS] = sum / max(grid_y * grid_x, f32::new(1.0));
 }
 
-/// The samples of one bin along one axis that may lie on the map: the bin's start and length in feature pixels, the first
-/// sample, how many follow; and the number of samples on the map and off it. None where a corner is no finite number.
+/// The samples of one bin along one axis that may lie on the map: the bin's start and length in feature pixels, the
+/// first sample, how many follow; and the number of samples on the map and off it. None if a corner is not finite.
 #[cube]
 fn axis_samples(
     low: f32,
@@ -137,8 +138,8 @@ fn axis_samples(
     let mut count = grid;
     let size = f32::cast_from(map_size);
     if comptime!(samples == 0) && grid >= f32::new(1024.0) {
-        // So that a huge ROI costs no more than the map is long: a step is at least half a pixel here. One sample of
-        // slack either side for rounding.
+        // So that a huge ROI costs no more than the map's length: a step is at least half a pixel here. One
+        // additional sample on both sides for rounding.
         let step = bin / grid;
         first = max(((f32::new(-1.0) - bin_start) / step - f32::new(1.5)).floor(), f32::new(0.0));
         let end = min(((size - bin_start) / step + f32::new(1.5)).ceil(), grid);
@@ -150,7 +151,7 @@ fn axis_samples(
     (bin_start, bin, first, u32::cast_from(count), grid)
 }
 
-/// By its bits: shading languages may take it for granted that every number is finite.
+/// By its bits: shading languages may assume that every number is finite.
 #[cube]
 fn is_real(value: f32) -> bool {
     u32::reinterpret(value) & 0x7f80_0000u32 != 0x7f80_0000u32

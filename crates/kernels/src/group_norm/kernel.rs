@@ -1,12 +1,12 @@
-//! Group normalisation on `f32` slices that stand channels last, `[N, P, C]`.
+//! Group normalisation on channels-last `f32` slices, `[N, P, C]`.
 //!
-//! Forwards every value becomes `scale_c · (x − mean) + beta_c (+ residual)` with `scale_c = gamma_c / σ`; the mean is
-//! taken off first, since with it in the shift a large mean would cost digits. Mean and variance come from one pass:
-//! sums of x − p and (x − p)², p being the channel's value at the image's first pixel.
+//! In the forward pass every value becomes `scale_c · (x − mean) + beta_c (+ residual)` with `scale_c = gamma_c / σ`;
+//! the mean is subtracted first, since a large mean inside the shift would cost digits. Mean and variance come from
+//! one pass: sums of x − p and (x − p)², where p is the channel's value at the image's first pixel.
 //!
-//! Backwards, with `x̂ = (x − mean) / σ` and g the gradient of the output (zero where the ReLU cut):
-//! `grad_beta_c = Σ g`, `grad_gamma_c = Σ g·x̂`, and
-//! `grad_x = (gamma_c·g − mean(gamma·g) − x̂·mean(gamma·g·x̂)) / σ`, means over the group.
+//! In the backward pass, with `x̂ = (x − mean) / σ` and g the gradient of the output (zero where the
+//! ReLU is inactive): `grad_beta_c = Σ g`, `grad_gamma_c = Σ g·x̂`, and `grad_x = (gamma_c·g −
+//! mean(gamma·g) − x̂·mean(gamma·g·x̂)) / σ`, means over the group.
 
 use std::mem::MaybeUninit;
 
@@ -15,13 +15,13 @@ use crate::params::{Activation, GroupNormParams};
 use crate::scratch::Scratch;
 use crate::simd::{Isa, widest};
 
-/// Pixels of a unit, summed in `f32` before they go into an `f64`.
+/// Pixels of a unit, summed in `f32` before they are added to an `f64`.
 const CHUNK: usize = 256;
 
 /// Mean and inverse standard deviation of every group of every image, `[N, G, 2]`.
 pub(crate) type Statistics = Vec<[f32; 2]>;
 
-/// Sizes of the maps, and how they are cut into units.
+/// Sizes of the maps, and their division into units.
 #[derive(Clone, Copy)]
 struct Sizes {
     num_images: usize,
@@ -90,11 +90,11 @@ pub(crate) fn forward(
             let squares: f64 = moments
                 .map(|(pivot, shift, second)| {
                     let pixels = sizes.pixels as f64;
-                    // Around the channel's mean, and that around the group's.
+                    // Around the channel's mean, and of the channel's mean around the group's.
                     second - pixels * shift * shift + pixels * (pivot + shift - mean).powi(2)
                 })
                 .sum();
-            // Rounding must not make it negative; a NaN stays one.
+            // Rounding must not make it negative; a NaN stays NaN.
             let variance = squares / sizes.group_len();
             let variance = if variance < 0.0 { 0.0 } else { variance };
             [mean as f32, (1.0 / (variance + f64::from(params.epsilon)).sqrt()) as f32]
@@ -126,7 +126,7 @@ pub(crate) struct GroupNormGrads {
     pub(crate) x: Vec<f32>,
     pub(crate) gamma: Vec<f32>,
     pub(crate) beta: Vec<f32>,
-    /// The gradient of the output where the ReLU let it through, which is that of the residual; none without a ReLU.
+    /// The gradient of the output where the ReLU passed it, which is that of the residual; none without a ReLU.
     pub(crate) masked: Option<Vec<f32>>,
 }
 
@@ -219,7 +219,7 @@ fn affine_of_images(sizes: &Sizes, statistics: &[[f32; 2]], gamma: &[f32]) -> Ve
     (0..sizes.num_images).map(of_image).collect()
 }
 
-/// Two sums for every image and channel, of units added in their order.
+/// Two sums for every image and channel, from units added in order.
 fn sum_units(
     sizes: &Sizes,
     add: impl Fn(usize, std::ops::Range<usize>, [&mut [f32]; 2]) + Sync + Send,
@@ -274,9 +274,9 @@ widest! {
     }
 }
 
-/// Writes `value(channel)` for every pixel of `target`, with the pixel's run of each of the `maps` at hand.
+/// Writes `value(channel)` for every pixel of `target`, with the pixel's run of each of the `maps` available.
 ///
-/// All slices are cut to the number of channels, so that the loop over them has no bounds to check.
+/// All slices are limited to the number of channels, so that the loop over them has no bounds checks.
 macro_rules! along_channels {
     ($target:ident, $channels:ident, [$($map:ident),*], [$($vector:ident),*], |$channel:ident| $value:expr) => {
         $(let $vector = &$vector[..$channels];)*
@@ -328,7 +328,7 @@ widest! {
     }
 }
 
-/// Written so that a NaN stays one.
+/// Written so that a NaN stays NaN.
 #[inline(always)]
 fn relu(value: f32) -> f32 {
     if value <= 0.0 { 0.0 } else { value }

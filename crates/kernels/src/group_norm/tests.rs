@@ -1,4 +1,5 @@
-//! Group normalisation against its composed default, whose gradients are burn's, and by hand.
+//! Compares group normalisation with its composed default, whose gradients are burn's, and with values computed by
+//! hand.
 
 use burn::tensor::{DType, Device, Tensor};
 
@@ -31,7 +32,7 @@ fn run(shape: [usize; 4], params: GroupNormParams, added: bool, dtype: DType) ->
     let summand = added.then(|| residual.clone());
     let output = group_norm_residual(x.clone(), gamma.clone(), beta.clone(), summand.clone(), params);
     let pattern = make(len, 4, 0.0).reshape(shape);
-    // At the ReLU's kink rounding decides: outputs within 1e-3 of it weigh nothing.
+    // At the ReLU's kink rounding decides: outputs within 1e-3 of it have zero weight.
     let identity = GroupNormParams { activation: Activation::Identity, ..params };
     let before = group_norm_residual(x.clone(), gamma.clone(), beta.clone(), summand, identity).detach();
     let pattern = pattern.mask_fill(before.abs().lower_elem(1e-3), 0.0);

@@ -1,4 +1,4 @@
-//! Max pooling and doubling on `f32` slices that stand channels last, `[N, H, W, C]`.
+//! Max pooling and doubling on channels-last `f32` slices, `[N, H, W, C]`.
 
 use super::MaxPool2dParams;
 use crate::parallel::{SharedSlice, for_each_unit};
@@ -68,7 +68,7 @@ pub(crate) fn max_pool(isa: Isa, x: &[f32], shape: &PoolShape) -> Vec<f32> {
     output
 }
 
-/// The gradient with respect to the input: each output's goes to the first of the window's largest.
+/// The gradient with respect to the input: each output's gradient goes to the first of the window's largest values.
 pub(crate) fn max_pool_gradient(
     isa: Isa,
     output_grad: &[f32],
@@ -76,7 +76,7 @@ pub(crate) fn max_pool_gradient(
     output: &[f32],
     shape: &PoolShape,
 ) -> Vec<f32> {
-    /// Channels that a unit takes, so that few images are shared out too.
+    /// Number of channels of a unit, so that few images are also distributed.
     const BLOCK: usize = 16;
     let channels = shape.channels;
     let [out_height, out_width] = shape.out_size;
@@ -91,7 +91,7 @@ pub(crate) fn max_pool_gradient(
             for x_out in 0..out_width {
                 let at = ((image * out_height + y) * out_width + x_out) * channels + first;
                 let (largest, from) = (&output[at..at + count], &output_grad[at..at + count]);
-                // What is still to be given away.
+                // The gradient that remains to be distributed.
                 let mut left = [0.0_f32; BLOCK];
                 left[..count].copy_from_slice(from);
                 shape.for_each_cell([y, x_out], |_, pixel| {
@@ -151,7 +151,7 @@ pub(crate) fn upsample_gradient(
 widest! {
     fn keep_larger(largest: &mut [f32], values: &[f32]) -> () {
         for (largest, value) in largest.iter_mut().zip(values) {
-            // A NaN wins, and stays.
+            // A NaN is the maximum, and stays NaN.
             *largest = if *value <= *largest || largest.is_nan() { *largest } else { *value };
         }
     }

@@ -1,4 +1,4 @@
-//! Pooling and doubling against burn's own and its gradients, and by hand.
+//! Compares pooling and doubling with burn's own and its gradients, and with values computed by hand.
 
 use burn::tensor::module;
 use burn::tensor::ops::MaxPoolOptions;

@@ -1,7 +1,6 @@
 //! ROIAlign on `f32` slices, forwards and backwards.
 //!
-//! Maps and crops stand channels last, where a pixel is one run of C floats, so that every weight is applied to a
-//! whole run.
+//! Maps and crops are channels last: a pixel is one run of C floats, and every weight is applied to a whole run.
 
 use crate::parallel::{SharedSlice, for_each_unit};
 use crate::params::RoiAlignParams;
@@ -57,7 +56,7 @@ pub(crate) fn backward(crop_grad: &[f32], shape: [usize; 4], rois: &[f32], param
         let image_idx = unit / channel_blocks;
         let first_channel = unit % channel_blocks * CHANNEL_BLOCK;
         let block = CHANNEL_BLOCK.min(channels - first_channel);
-        // ROIs are added in their order, whatever the threads do.
+        // ROIs are added in order, independent of the threads.
         for (roi_idx, bins) in bins.iter().enumerate().filter(|(_, bins)| bins.image_idx == image_idx) {
             for bin in 0..bins_y * bins_x {
                 let at = (roi_idx * bins_y * bins_x + bin) * channels + first_channel;

@@ -1,4 +1,4 @@
-//! ROIAlign against plain loops, its composed default, hand-checked numbers and finite differences.
+//! Compares ROIAlign with plain loops, its composed default, values computed by hand and finite differences.
 
 use burn::backend::Flex;
 use burn::tensor::{Device, Tensor};
@@ -35,7 +35,7 @@ fn params(output_size: [usize; 2], alignment: RoiAlignment, sampling_ratio: Samp
     RoiAlignParams { output_size, spatial_scale: 0.5, sampling_ratio, alignment }
 }
 
-/// The kernels on maps that stand channels first, as the plain loops have them.
+/// The kernels on channels-first maps, as the plain loops use them.
 fn forward(features: &[f32], shape: [usize; 4], rois: &[f32], params: &RoiAlignParams) -> Vec<f32> {
     let [bins_y, bins_x] = params.output_size;
     let crops = super::kernel::forward(&to_last(features, shape), shape, rois, params);
@@ -114,7 +114,7 @@ fn the_composed_default_agrees() {
             assert_close(values(&crops), &expected, "composed");
         }
     }
-    // And its gradient, where f64 takes the default.
+    // And its gradient, where f64 uses the default.
     let grad_of = |dtype| {
         let device = device.clone().autodiff();
         let features = Tensor::<1>::from_floats(features.as_slice(), &device).reshape(SHAPE).cast(dtype).require_grad();
@@ -145,7 +145,7 @@ fn a_ramp_gives_the_bins_centres() {
 
 #[test]
 fn gradients_agree_with_finite_differences() {
-    // Linear in the features: a central difference is exact but for rounding.
+    // Linear in the features: a central difference is exact except for rounding.
     const STEP: f32 = 0.5;
     const TOLERANCE: f32 = 1e-4;
     let shape = [2, 2, 4, 5];
@@ -201,7 +201,7 @@ fn odd_rois_neither_hang_nor_poison() {
     let unreal = [0.0, f32::NAN, 0.0, 9.0, 9.0, 1.0, 0.0, 0.0, f32::INFINITY, 9.0];
     let crops = forward(&features, SHAPE, &unreal, &params);
     assert!(crops.iter().all(|value| *value == 0.0));
-    // A feature that is no number shows in the bins that sample it, and in no other.
+    // A NaN feature appears in the bins that sample it, and in no other.
     let mut poisoned = features;
     poisoned[0] = f32::NAN;
     let rois = [0.0, 0.0, 0.0, 3.0, 3.0, 0.0, 10.0, 5.0, 20.0, 12.0];

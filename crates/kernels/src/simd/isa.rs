@@ -1,15 +1,16 @@
-//! The vector instructions that there are.
+//! The available vector instructions.
 
 use std::sync::OnceLock;
 
-/// The instructions a kernel is computed with.
+/// The instructions of a kernel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Isa {
     #[cfg(target_arch = "x86_64")]
     Avx512,
     #[cfg(target_arch = "x86_64")]
     Avx2,
-    /// NEON, which every aarch64 has, and WebAssembly's: a module has them or not when it is compiled, because a page cannot ask inside it.
+    /// NEON, which every aarch64 has, and WebAssembly's, whose presence is fixed when a module is compiled, because a
+    /// page cannot query it from inside.
     #[cfg(any(target_arch = "aarch64", all(target_arch = "wasm32", target_feature = "simd128")))]
     Quads,
     Portable,

@@ -1,8 +1,8 @@
 //! Sixteen floats at a time, as one AVX-512 register, two AVX2 registers, four of NEON's or WebAssembly's (quads.rs), or an array.
 //!
 //! Kernels are written once over [`Lanes`] and compiled for every instruction set by
-//! [`lanes_kernel!`](super::lanes_kernel), inside functions that have the instructions switched on: only
-//! there do these methods become single instructions.
+//! [`lanes_kernel!`](super::lanes_kernel), inside functions with enabled instructions: only there do
+//! these methods become single instructions.
 
 #[cfg(target_arch = "x86_64")]
 use std::arch::x86_64::*;
@@ -13,8 +13,8 @@ pub(crate) const LANES: usize = 16;
 /// Sixteen floats.
 ///
 /// # Safety
-/// Pointers must be good for as many floats as a method reads or writes, and the machine must have the
-/// implementation's instructions.
+/// Pointers must be valid for as many floats as a method reads or writes, and the machine must have
+/// the implementation's instructions.
 pub(crate) trait Lanes: Copy {
     /// Rows of a tile whose sums, with [`Self::VECTORS`] columns of lanes, stay in registers.
     const ROWS: usize;
@@ -24,7 +24,7 @@ pub(crate) trait Lanes: Copy {
     unsafe fn splat(value: f32) -> Self;
     unsafe fn load(from: *const f32) -> Self;
     unsafe fn store(self, to: *mut f32);
-    /// The first `len` of sixteen, zeros behind them.
+    /// The first `len` of sixteen, followed by zeros.
     #[inline(always)]
     unsafe fn load_first(from: *const f32, len: usize) -> Self {
         let mut values = [0.0_f32; LANES];
@@ -34,7 +34,7 @@ pub(crate) trait Lanes: Copy {
             Self::load(values.as_ptr())
         }
     }
-    /// The first `len` of sixteen; what is behind them in memory stays.
+    /// The first `len` of sixteen; the memory after them is not changed.
     #[inline(always)]
     unsafe fn store_first(self, to: *mut f32, len: usize) {
         let mut values = [0.0_f32; LANES];
@@ -47,11 +47,11 @@ pub(crate) trait Lanes: Copy {
     unsafe fn add(self, other: Self) -> Self;
     unsafe fn sub(self, other: Self) -> Self;
     unsafe fn mul(self, other: Self) -> Self;
-    /// `self · factor + summand`, fused where that is one instruction.
+    /// `self · factor + summand`, fused if that is one instruction.
     unsafe fn mul_add(self, factor: Self, summand: Self) -> Self;
-    /// `max(self, 0)`; a NaN stays one.
+    /// `max(self, 0)`; a NaN stays NaN.
     unsafe fn relu(self) -> Self;
-    /// Fetches a cache line that is read soon; a hint that reads nothing, whatever the pointer.
+    /// Prefetches a cache line that is read soon; a hint that reads nothing, for any pointer.
     #[inline(always)]
     fn prefetch(at: *const f32) {
         #[cfg(target_arch = "x86_64")]
@@ -138,7 +138,7 @@ fn first_mask(len: usize) -> __mmask16 {
 #[derive(Clone, Copy)]
 pub(crate) struct Ymm2([__m256; 2]);
 
-/// An intrinsic on both halves; no closure, which would have none of the instructions switched on.
+/// An intrinsic on both halves; no closure, which would lack the enabled instructions.
 #[cfg(target_arch = "x86_64")]
 macro_rules! halves {
     ($intrinsic:ident, $a:expr, $b:expr) => {
@@ -200,7 +200,7 @@ impl Lanes for Ymm2 {
     }
 }
 
-/// An array, which compilers turn into what vectors a machine has.
+/// An array, which compilers turn into the vectors of the machine.
 #[derive(Clone, Copy)]
 pub(crate) struct Plain([f32; LANES]);
 

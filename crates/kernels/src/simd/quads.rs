@@ -1,5 +1,5 @@
-//! Lanes of four vectors of 128 bits: NEON's on aarch64, and WebAssembly's. Either is there or not when a kernel is compiled, so that
-//! their intrinsics touch registers without a promise.
+//! Lanes of four vectors of 128 bits: NEON's on aarch64, and WebAssembly's. Their presence is fixed when a kernel is
+//! compiled, so that their intrinsics need no runtime check.
 
 use super::lanes::Lanes;
 
@@ -11,7 +11,7 @@ mod vector {
         vsubq_f32, vzip1q_f32, vzip1q_f64, vzip2q_f32, vzip2q_f64,
     };
 
-    /// Thirty-two registers: twenty-four sums, the four vectors that they share, a factor.
+    /// Thirty-two registers: twenty-four sums, their four common vectors, a factor.
     pub(super) const ROWS: usize = 6;
 
     #[inline(always)]
@@ -44,7 +44,7 @@ mod vector {
         unsafe { vfmaq_f32(summand, a, factor) }
     }
 
-    /// The instruction gives a NaN where either operand is one.
+    /// The instruction gives a NaN if either operand is one.
     #[inline(always)]
     pub(super) fn relu(a: Vector) -> Vector {
         // SAFETY: every aarch64 has NEON; no memory is touched.
@@ -77,8 +77,8 @@ mod vector {
     };
     use std::arch::wasm32::{f32x4_pmax, i32x4_shuffle as shuffle, v128_load, v128_store};
 
-    /// A browser maps vectors onto sixteen registers of 128 bits (fifteen are its own to use on x86). A tile of two rows has
-    /// eight sums, the four vectors that they share, a factor and a product: fourteen. A third row would spill.
+    /// A browser maps vectors onto sixteen registers of 128 bits (of which it can use fifteen on x86). A tile of two
+    /// rows has eight sums, four common vectors, a factor and a product: fourteen. A third row would spill.
     pub(super) const ROWS: usize = 2;
 
     /// # Safety
@@ -102,7 +102,7 @@ mod vector {
         add(mul(a, factor), summand)
     }
 
-    /// `if a < b { b } else { a }`, one instruction where `f32x4_max` is many: a NaN stays one.
+    /// `if a < b { b } else { a }`, one instruction, unlike `f32x4_max`: a NaN stays NaN.
     #[inline(always)]
     pub(super) fn relu(a: Vector) -> Vector {
         f32x4_pmax(a, splat(0.0))
@@ -133,7 +133,7 @@ use vector::Vector;
 #[derive(Clone, Copy)]
 pub(crate) struct Quads([Vector; 4]);
 
-/// An intrinsic on all four; no closure, which would be a function of its own in builds without optimisation.
+/// An intrinsic on all four; no closure, which would be a separate function in builds without optimisation.
 macro_rules! quads {
     ($intrinsic:path, $($a:expr),*) => {
         Quads([$intrinsic($($a[0]),*), $intrinsic($($a[1]),*), $intrinsic($($a[2]),*), $intrinsic($($a[3]),*)])

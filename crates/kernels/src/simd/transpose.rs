@@ -1,4 +1,4 @@
-//! Transposition, the way between channels first and channels last.
+//! Transposition between channels first and channels last.
 
 use super::isa::Isa;
 
@@ -42,7 +42,7 @@ pub(crate) fn transpose(
             (block_rows, block_columns)
         }
     };
-    // What the blocks left over: the columns beside them, then the rows below.
+    // The remainder of the blocks: the columns beside them, then the rows below.
     for row in 0..block_rows {
         for column in block_columns..columns {
             target[column * target_step + row] = source[row * source_step + column];
@@ -56,7 +56,7 @@ pub(crate) fn transpose(
 }
 
 /// # Safety
-/// AVX is there; `rows` and `columns` are multiples of 8 and within both buffers.
+/// AVX is available; `rows` and `columns` are multiples of 8 and within both buffers.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx")]
 unsafe fn transpose_blocks_avx(

@@ -1,9 +1,9 @@
 //! Franka Research 3.
 //!
 //! # Source
-//! Lengths: as the Panda's, see franka_description (commit 566ba44), robots/fr3/kinematics.yaml, which is the same as robots/fer/kinematics.yaml.
-//! Limits: libfranka 0.21, `rate_limiting.h`, whose functions of the position tell the ranges, too; torques as Franka publishes them. Shape and
-//! masses are the Panda's: they were not measured.
+//! Lengths: as the Panda's, see franka_description (commit 566ba44), robots/fr3/kinematics.yaml, which is the same as
+//! robots/fer/kinematics.yaml. Limits: libfranka 0.21, `rate_limiting.h`, whose position-dependent functions also give
+//! the ranges; torques as published by Franka. Shape and masses are the Panda's: they were not measured.
 
 use crate::geometry::ArmGeometry;
 use crate::limits::{CartesianLimits, JointLimits};
@@ -30,7 +30,7 @@ impl JointLimits {
 }
 
 impl CartesianLimits {
-    /// The FR3's limits; the tcp is not allowed to be faster than a Panda's.
+    /// The FR3's limits; the tcp has the speed limit of a Panda's.
     pub const fn fr3() -> Self {
         Self {
             velocity_m_s: Self::panda().velocity_m_s,

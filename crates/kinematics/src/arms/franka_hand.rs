@@ -15,18 +15,18 @@ pub const TCP_OFFSET_M: f64 = 0.1034;
 pub const HAND_OPENING_MAX_M: f64 = 0.08;
 /// Half the width of a finger across its motion, m.
 pub const FINGER_HALF_WIDTH_M: f64 = 0.011;
-/// Thickness of a finger along its motion, m: of its tip, and of its root, which begins so far above the tcp.
+/// Thickness of a finger along its motion, m: of its tip, and of its root, which starts this far above the tcp.
 const FINGER_THICKNESS_M: f64 = 0.015;
 const FINGER_ROOT_THICKNESS_M: f64 = 0.026;
 const FINGER_ROOT_ABOVE_TCP_M: f64 = 0.015;
 
-/// How thick a finger is along its motion, m, up to a height above the tcp, m.
+/// Thickness of a finger along its motion, m, up to a height above the tcp, m.
 pub fn finger_thickness_m(above_tcp_m: f64) -> f64 {
     if above_tcp_m <= FINGER_ROOT_ABOVE_TCP_M { FINGER_THICKNESS_M } else { FINGER_ROOT_THICKNESS_M }
 }
 
 impl HandGeometry {
-    /// Franka's hand, a small camera on it.
+    /// Franka's hand with a small camera on it.
     pub fn franka() -> Self {
         let c = Capsule::new;
         Self {

@@ -1,4 +1,4 @@
-//! The arms that are known: a file each.
+//! The known arms, one file each.
 
 mod fr3;
 mod franka_hand;

@@ -1,8 +1,9 @@
 //! Franka Emika Robot, "Panda".
 //!
 //! # Source
-//! Lengths and limits: Franka Control Interface documentation, "Robot and interface specifications". Franka publishes no masses: those here are the
-//! simulated arm's (crates/simulation/assets/panda.xml), plausible, not identified.
+//! Lengths and limits: Franka Control Interface documentation, "Robot and interface specifications". Franka publishes
+//! no masses: these are the simulated arm's (crates/simulation/assets/panda.xml), which are plausible but not
+//! identified.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -80,10 +81,11 @@ impl CartesianLimits {
     }
 }
 
-/// The hand, and what it holds, among the bodies.
+/// The hand and the held part, as indices of the bodies.
 const HAND: usize = 8;
 const HELD: usize = 9;
-/// Pairs of bodies that are missing are neighbours or kept apart by the joints' ranges, which a test in `simulation` compares with MuJoCo.
+/// Missing pairs of bodies are neighbours or kept apart by the joints' ranges; a test in `simulation` compares this
+/// with MuJoCo.
 const SELF_PAIRS: [(usize, usize); 23] = [
     (0, 5),
     (0, 6),
@@ -110,8 +112,9 @@ const SELF_PAIRS: [(usize, usize); 23] = [
     (5, HELD),
 ];
 
-/// Each capsule was placed by hand around shapes of crates/simulation/assets/panda.xml; crates/simulation/tests/collision_model.rs
-/// measures how far they stand out and that nothing of the arm stands out of them.
+/// Each capsule was placed by hand around shapes of crates/simulation/assets/panda.xml;
+/// crates/simulation/tests/collision_model.rs measures how far they extend beyond the arm and that they contain all of
+/// it.
 fn capsules() -> [Vec<Capsule>; NUM_JOINTS + 1] {
     let c = Capsule::new;
     [

@@ -1,4 +1,4 @@
-//! The arm's shape: capsules that hold every link, the hand and what it holds.
+//! The arm's shape: capsules that contain every link, the hand and the held part.
 
 use nalgebra::{Isometry3, Point3, Translation3, Vector3};
 
@@ -6,12 +6,12 @@ use crate::capsule::Capsule;
 use crate::geometry::{ArmGeometry, DhJoint, Frames};
 use crate::joints::NUM_JOINTS;
 
-/// Bodies of the arm: base, links 1 to 7, hand with fingers and camera, and what the hand holds.
+/// Bodies of the arm: base, links 1 to 7, hand with fingers and camera, and the held part.
 pub(super) const NUM_BODIES: usize = 10;
 /// The first body that moves.
 pub(super) const FIRST_MOVING: usize = 1;
 const HAND: usize = 8;
-/// What the hand holds.
+/// The held part.
 pub(super) const HELD: usize = 9;
 
 /// A rigid part of the arm.
@@ -19,7 +19,7 @@ pub(super) const HELD: usize = 9;
 pub struct Body(usize);
 
 impl Body {
-    /// The base, which stands still.
+    /// The fixed base.
     pub const BASE: Self = Self(0);
     /// The hand with its fingers and the camera.
     pub const HAND: Self = Self(HAND);
@@ -36,7 +36,7 @@ impl Body {
         Self(index)
     }
 
-    /// The place in the chain: 0 the base, 8 the hand, 9 the held part.
+    /// The index in the chain: 0 the base, 8 the hand, 9 the held part.
     pub fn index(self) -> usize {
         self.0
     }
@@ -58,11 +58,13 @@ impl std::fmt::Display for Body {
 pub(super) struct ArmShape {
     joints: [DhJoint; NUM_JOINTS],
     link7_from_tcp: Isometry3<f64>,
-    /// Of each body in its frame: the base frame, the links' by Denavit and Hartenberg, and link 7's for hand and held part.
+    /// For each body in its frame: the base frame, the links' by Denavit and Hartenberg, and link 7's for hand and held
+    /// part.
     pub(super) capsules: [Vec<Capsule>; NUM_BODIES],
     /// A ball around each body's capsules: centre in the body's frame, radius.
     pub(super) bounds: [(Point3<f64>, f64); NUM_BODIES],
-    /// `reach_m[body][joint]`: no point of the body is ever farther from the joint's axis, m; 0 for joints that do not move it.
+    /// `reach_m[body][joint]`: upper bound of the distance of the body's points from the joint's axis, m; 0 for joints
+    /// that do not move it.
     pub(super) reach_m: [[f64; NUM_JOINTS]; NUM_BODIES],
 }
 
@@ -120,7 +122,7 @@ fn hand_capsules(arm: &ArmGeometry, opening_m: f64) -> impl Iterator<Item = Caps
     arm.hand.capsules.iter().copied().chain(fingers)
 }
 
-/// A ball that holds capsules: its centre is the middle of the box around them.
+/// A ball that contains capsules: its centre is the centre of the box around them.
 fn bounding_ball(capsules: &[Capsule]) -> (Point3<f64>, f64) {
     let ends =
         || capsules.iter().flat_map(|capsule| [(capsule.from, capsule.radius_m), (capsule.to, capsule.radius_m)]);
@@ -159,14 +161,14 @@ fn reach_m(joints: &[DhJoint; NUM_JOINTS], body: usize, capsules: &[Capsule]) ->
     })
 }
 
-/// A bound of the distance between the origins of two links, the first before the second, m.
+/// An upper bound of the distance between the origins of two links, the first before the second, m.
 fn origin_distance_m(joints: &[DhJoint; NUM_JOINTS], first: usize, second: usize) -> f64 {
     let step = |link: usize| joints[link - 1].a_m.hypot(joints[link - 1].d_m);
     let mut distance_m = 0.0;
     let mut at = first;
     while at < second {
-        // Where a link's origin lies on the next joint's axis, and the link after that one begins across that axis, the distance to it is the same
-        // whatever the joint does.
+        // If a link's origin lies on the next joint's axis, and the link after that starts perpendicular to that axis,
+        // the distance to it is independent of the joint.
         if at + 2 <= second && joints[at].a_m == 0.0 && joints[at + 1].d_m == 0.0 {
             distance_m += step(at + 1).hypot(step(at + 2));
             at += 2;

@@ -1,10 +1,11 @@
-//! Collision checks of several configurations side by side, and of whole motions.
+//! Parallel collision checks of several configurations, and checks of whole motions.
 //!
-//! An edge is the straight motion in joint space between two configurations. It is checked by *conservative advancement*: at a
-//! configuration each pair of bodies has a distance d, and a bound v of how fast the two approach each other along the edge, from the joints' turns
-//! and the bodies' reach. Up to d / v further along, that pair cannot touch. So steps are long in free space and short beside obstacles, and what lies
-//! between two checked configurations is proven free, too. Lanes start at evenly spread places of the edge and each advances to the next one's start.
-//! Curves are proven in the same way, with the greatest rate of each joint along them.
+//! An edge is the straight motion in joint space between two configurations. It is checked by *conservative
+//! advancement*: at a configuration each pair of bodies has a distance d, and an upper bound v of their approach speed
+//! along the edge, from the joints' turns and the bodies' reach. Within d / v further along, that pair cannot touch. So
+//! steps are long in free space and short near obstacles, and the edge between two checked configurations is proven
+//! free, too. Lanes start at evenly distributed points of the edge and each advances to the next one's start. Curves
+//! are proven in the same way, with the largest rate of each joint along them.
 #![allow(clippy::needless_range_loop, reason = "one index for the lanes of several arrays")]
 
 use super::lanes::{Lane, NUM_LANES};
@@ -12,7 +13,7 @@ use super::model::CollisionModel;
 use super::pair_search::{Found, Placed, Weights, evaluate};
 use crate::joints::{JointVector, NUM_JOINTS};
 
-/// Checks configurations and motions against a [`CollisionModel`], and counts them.
+/// Checks configurations and motions against a [`CollisionModel`], and counts the checks.
 #[derive(Debug, Clone)]
 pub struct Checker<'a> {
     model: &'a CollisionModel,
@@ -22,7 +23,7 @@ pub struct Checker<'a> {
     num_checked: usize,
 }
 
-/// The lanes that are not at their ends.
+/// The lanes that have not reached their ends.
 #[derive(Debug, Clone, Copy)]
 struct Lanes {
     lanes: [usize; NUM_LANES],
@@ -45,15 +46,16 @@ impl Lanes {
 }
 
 impl<'a> Checker<'a> {
-    /// For motions that keep `margin_m` away from everything at every configuration that is checked, and never touch anything between these.
+    /// For motions that keep `margin_m` from everything at every checked configuration, and never touch anything
+    /// between these.
     ///
-    /// A larger margin makes longer steps beside obstacles.
+    /// A larger margin allows longer steps near obstacles.
     pub fn new(model: &'a CollisionModel, margin_m: f64) -> Self {
         assert!(margin_m > 0.0 && margin_m.is_finite(), "a margin is positive, found {margin_m} m");
         Self { model, margin_m, arch: pulp::Arch::new(), placed: Placed::new(model), num_checked: 0 }
     }
 
-    /// The model that this checks against.
+    /// The model of the checks.
     pub fn model(&self) -> &'a CollisionModel {
         self.model
     }
@@ -63,14 +65,14 @@ impl<'a> Checker<'a> {
         self.margin_m
     }
 
-    /// How many configurations were checked so far; lanes that had nothing to do are not counted.
+    /// Number of configurations checked so far; idle lanes do not count.
     pub fn num_checked(&self) -> usize {
         self.num_checked
     }
 
-    /// The distance between the two nearest things at each configuration, m, negative where they overlap.
+    /// The smallest distance between two bodies at each configuration, m, negative if they overlap.
     ///
-    /// Distances to boxes, cylinders and capsules are at most a 2⁻¹³th of the body's length too large (0.03 mm).
+    /// Distances to boxes, cylinders and capsules are too large by at most 2⁻¹³ of the body's length (0.03 mm).
     pub fn distances_m(&mut self, configurations: &[JointVector]) -> Vec<f64> {
         let mut distances = Vec::with_capacity(configurations.len());
         for chunk in configurations.chunks(NUM_LANES) {
@@ -93,21 +95,23 @@ impl<'a> Checker<'a> {
         self.blocked_share(from, to).is_none()
     }
 
-    /// The first place found on the straight motion that does not keep the margin, as a share of the way; not always the one nearest to the start.
+    /// The first point found on the straight motion that violates the margin, as a share of its length; not always the
+    /// one nearest to the start.
     pub fn blocked_share(&mut self, from: &JointVector, to: &JointVector) -> Option<f64> {
         let delta = to - from;
         self.blocked_share_of_curve(|share| from + delta * share, &delta.abs())
     }
 
-    /// As [`Checker::blocked_share`] on any curve, told by its configuration at a share of the way; `max_turns` is how far each joint would turn on all
-    /// of it at its greatest rate, rad.
+    /// As [`Checker::blocked_share`] on any curve, given by its configuration at a share of its length; `max_turns` is
+    /// each joint's turn over the whole curve at its largest rate, rad.
     pub(crate) fn blocked_share_of_curve(
         &mut self,
         at: impl Fn(f64) -> JointVector,
         max_turns: &JointVector,
     ) -> Option<f64> {
         let weights = self.edge_weights(max_turns);
-        // Lane i starts at i of L - 1 parts of the way and goes to where the next one started; the last one is at the end.
+        // Lane i starts at i of L - 1 parts of the length and goes to where the next one started; the last one is at
+        // the end.
         let start = |lane: usize| lane as f64 / (NUM_LANES - 1) as f64;
         let mut share: Lane = std::array::from_fn(start);
         let mut active: Lanes = Lanes::all();
@@ -127,23 +131,23 @@ impl<'a> Checker<'a> {
         None
     }
 
-    /// How far along an edge, as a share of it, each pair may go for a metre of distance.
+    /// Distance along an edge, as a share of it, that each pair allows per metre of distance.
     fn edge_weights(&self, max_turns: &JointVector) -> Weights {
         let reach_m = &self.model.arm.reach_m;
         let speed_m = |body: usize, since_joint: usize| -> f64 {
             (since_joint..NUM_JOINTS).map(|joint_idx| reach_m[body][joint_idx] * max_turns[joint_idx]).sum()
         };
-        // A pair that does not move against each other gets infinity: any distance lasts for the whole edge.
+        // A pair without relative motion gets infinity: any distance lasts for the whole edge.
         let per_metre = |speed_m: f64| if speed_m > 0.0 { 1.0 / speed_m } else { f64::INFINITY };
         Weights {
-            // What happens before the first body's own joint moves both alike.
+            // Joints before the first body's own joint move both equally.
             self_pairs: std::array::from_fn(|one| std::array::from_fn(|other| per_metre(speed_m(other, one)))),
             bodies: std::array::from_fn(|body| per_metre(speed_m(body, 0))),
             offset_m: self.margin_m,
         }
     }
 
-    /// Compares all pairs; ends early, with some lane blocked, where `until_blocked` allows it.
+    /// Compares all pairs; ends early, with some lane blocked, if `until_blocked` allows it.
     fn evaluate(&mut self, q: &[JointVector; NUM_LANES], weights: &Weights, until_blocked: bool) -> Found {
         let Self { model, margin_m, arch, placed, .. } = self;
         arch.dispatch(
@@ -190,7 +194,7 @@ mod tests {
 
     #[test]
     fn lanes_agree_with_pair_by_pair() {
-        // A 2⁻¹³th of the longest capsule's axis, 0.2 m.
+        // 2⁻¹³ of the longest capsule's axis, 0.2 m.
         const TOLERANCE_M: f64 = 3e-5;
         let mut rng = Pcg64Mcg::seed_from_u64(21);
         let mut num_inside = 0;
@@ -219,7 +223,7 @@ mod tests {
             let model = crowded(&mut rng);
             let q = random_configuration(&mut rng);
             let found = model.nearest(&q);
-            // With a capsule's axis inside an obstacle, the way out may change from one face to another.
+            // With a capsule's axis inside an obstacle, the closest face may change.
             if found.distance_m < -0.01 {
                 continue;
             }
@@ -228,7 +232,7 @@ mod tests {
                 step[joint_idx] = STEP_RAD;
                 let [before, after] = [-1.0, 1.0].map(|sign| model.nearest(&(q + step * sign)).distance_m);
                 let numeric = (after - before) / (2.0 * STEP_RAD);
-                // Where two pairs are equally near, or a segment lies along a face, the distance has no derivative.
+                // If two pairs are equally close, or a segment lies along a face, the distance has no derivative.
                 let is_kink = (after + before - 2.0 * found.distance_m).abs() > 1e-9;
                 if is_kink {
                     num_kinks += 1;
@@ -270,7 +274,7 @@ mod tests {
 
     #[test]
     fn an_allowed_pair_may_touch_and_others_may_not() {
-        // A plate in reach of the finger tips only: they are at 0.4869 m in the ready pose.
+        // A plate that only the finger tips reach: they are at 0.4869 m in the ready pose.
         let table = Obstacle {
             name: "table".to_owned(),
             shape: Shape::Box { half_m: [0.1, 0.1, 0.005] },

@@ -1,4 +1,4 @@
-//! Obstacles that make no sense.
+//! Errors of obstacles.
 
 /// Errors of building a collision model.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -11,9 +11,9 @@ pub enum CollisionError {
         obstacle: String,
         /// Which of its lengths.
         what: &'static str,
-        /// What is accepted.
+        /// The accepted values.
         expected: &'static str,
-        /// What was given, m.
+        /// The given value, m.
         found: f64,
     },
     /// A pose holds NaN or an infinity, or its quaternion is not of unit length.
@@ -21,10 +21,10 @@ pub enum CollisionError {
     Pose {
         /// Which obstacle.
         obstacle: String,
-        /// What is wrong with its pose.
+        /// The error of its pose.
         reason: String,
     },
-    /// Two obstacles of one name, which a message could not tell apart.
+    /// Two obstacles with one name, which a message could not distinguish.
     #[error("two obstacles are named \"{name}\"")]
     NameTwice {
         /// The name that is given twice.

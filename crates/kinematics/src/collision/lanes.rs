@@ -1,4 +1,5 @@
-//! The arm at several configurations at once, one a lane: arrays of one coordinate each, which the compiler turns into vectors.
+//! The arm at several configurations at once, one per lane: arrays of one coordinate each, which the compiler
+//! vectorises.
 //!
 //! L lanes; every function is one loop over them without branches.
 #![allow(clippy::needless_range_loop, reason = "one index for the lanes of several arrays")]
@@ -9,13 +10,13 @@ use crate::joints::{JointVector, NUM_JOINTS};
 
 use super::shape::DistanceAndSlope;
 
-/// Configurations that are computed side by side.
+/// Number of configurations computed in parallel.
 pub const NUM_LANES: usize = 8;
 
-/// One number a lane.
+/// One number per lane.
 pub(super) type Lane = [f64; NUM_LANES];
 
-/// A point or a vector a lane.
+/// One point or vector per lane.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Lane3 {
     pub(super) x: Lane,
@@ -170,7 +171,8 @@ pub(super) fn shape_distances(points: &Lane3, shape: impl Fn([f64; 3], [f64; 3])
     distances
 }
 
-/// Least signed distances of segments to a shape in its own frame, at most a 2⁻¹³th of the segment's length too large.
+/// Smallest signed distances of segments to a shape in its own frame, too large by at most 2⁻¹³ of the segment's
+/// length.
 #[inline(always)]
 pub(super) fn segment_shape_distances(
     segment: &(Lane3, Lane3),

@@ -1,4 +1,4 @@
-//! What the arm can touch: itself, and the obstacles around it.
+//! Collisions of the arm: with itself, and with the obstacles around it.
 //!
 //! ```text
 //! capsules of every body ─┐
@@ -6,7 +6,8 @@
 //! pairs that may touch ───┘                   └─> nearest: names, distance, gradient
 //! ```
 //!
-//! Capsules hold the real shapes with some room, so arms whose capsules are apart are apart. crates/simulation compares them with MuJoCo.
+//! Capsules contain the real shapes with some margin, so that arms with separate capsules are separate.
+//! crates/simulation compares them with MuJoCo.
 
 mod arm_shape;
 mod checker;

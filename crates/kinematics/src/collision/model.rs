@@ -1,4 +1,4 @@
-//! The arm among obstacles: which bodies may not touch, and how far they are apart.
+//! The arm among obstacles: the pairs of bodies that may not touch, and their distances.
 
 use nalgebra::{Isometry3, Point3};
 
@@ -11,7 +11,7 @@ use crate::check::check_pose;
 use crate::geometry::{ArmGeometry, Frames};
 use crate::joints::{JointVector, NUM_JOINTS};
 
-/// A solid thing that stands still in the base frame.
+/// A fixed solid in the base frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Obstacle {
     /// Its name in messages.
@@ -22,7 +22,7 @@ pub struct Obstacle {
     pub base_from_obstacle: Isometry3<f64>,
 }
 
-/// Two things that are near each other, and how near.
+/// Two bodies that are close to each other, and their distance.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Proximity {
     /// The body of the arm.
@@ -31,8 +31,8 @@ pub struct Proximity {
     pub other: String,
     /// Distance of their surfaces, m; negative where they overlap.
     pub distance_m: f64,
-    /// Derivative of the distance by each joint, m/rad; one of several where a capsule's axis is inside an obstacle or parallel to
-    /// what is nearest.
+    /// Derivative of the distance by each joint, m/rad; one of several if a capsule's axis is inside an obstacle or
+    /// parallel to the nearest surface.
     pub gradient: JointVector,
 }
 
@@ -61,10 +61,10 @@ pub struct CollisionModel {
 impl CollisionModel {
     /// An arm with its fingers at an opening (m) among obstacles.
     ///
-    /// The base is not compared with obstacles: it is bolted to one.
+    /// The base is not compared with obstacles, because it is bolted to one.
     ///
     /// # Errors
-    /// [`CollisionError`] for lengths and poses that make no sense, and for names given twice.
+    /// [`CollisionError`] for impossible lengths and poses, and for duplicate names.
     pub fn new(arm: &ArmGeometry, obstacles: Vec<Obstacle>, opening_m: f64) -> Result<Self, CollisionError> {
         for (index, obstacle) in obstacles.iter().enumerate() {
             check_obstacle(obstacle)?;
@@ -85,7 +85,8 @@ impl CollisionModel {
         Ok(Self { geometry: arm.clone(), arm: ArmShape::new(arm, opening_m), obstacles, obstacle_frames, may_touch })
     }
 
-    /// Puts a part into the hand: capsules that hold it, in the tcp's frame. It may touch hand and links 6 and 7.
+    /// Puts a part into the hand: capsules that contain it, in the tcp's frame. It may touch the hand and links 6 and
+    /// 7.
     ///
     /// # Errors
     /// [`CollisionError`] for coordinates that are not finite and radii that are not positive.
@@ -102,7 +103,7 @@ impl CollisionModel {
         Ok(())
     }
 
-    /// Lets a body touch an obstacle, as the fingers the table on an approach.
+    /// Allows a body to touch an obstacle, as the fingers the table on an approach.
     ///
     /// # Errors
     /// [`CollisionError::UnknownObstacle`].
@@ -120,7 +121,7 @@ impl CollisionModel {
         }
     }
 
-    /// The arm, with any opening.
+    /// The arm, at any opening.
     pub fn arm(&self) -> &ArmGeometry {
         &self.geometry
     }
@@ -135,9 +136,9 @@ impl CollisionModel {
         &self.arm.capsules[body.index()]
     }
 
-    /// The two things that are nearest to each other, with the derivative of their distance.
+    /// The two closest bodies, with the derivative of their distance.
     ///
-    /// Computed pair by pair and without bounds: slow, and what [`super::Checker`] is tested against.
+    /// Computed pair by pair and without bounds: slow; it is the reference for tests of [`super::Checker`].
     pub fn nearest(&self, q: &JointVector) -> Proximity {
         let frames = self.geometry.frames(q);
         let placed: [Vec<Capsule>; NUM_BODIES] = std::array::from_fn(|body| {
@@ -157,7 +158,8 @@ impl CollisionModel {
                     let distance_m = (q - p).norm() - a.radius_m - b.radius_m;
                     if distance_m < nearest.distance_m {
                         let normal = (q - p).try_normalize(0.0).unwrap_or_else(nalgebra::Vector3::x);
-                        // The surfaces' nearest points move as the axes' do: turning about an axis leaves its radius.
+                        // The closest points of the surfaces move as those of the axes: a turn about an axis keeps its
+                        // radius.
                         let gradient =
                             moved_along(&frames, other, &q, &normal) - moved_along(&frames, one, &p, &normal);
                         let other_name = Body::of_index(one).to_string();
@@ -193,8 +195,8 @@ impl CollisionModel {
         nearest
     }
 
-    /// The obstacle that overlaps the arm's column the deepest, if one does, and how deep (m): the part of link 1 around joint 1's axis, which stands
-    /// still in every motion.
+    /// The obstacle with the deepest overlap with the arm's column, if any, and the depth (m): the column is the part
+    /// of link 1 around joint 1's axis, which does not move in any motion.
     pub fn overlap_with_column(&self) -> Option<(String, f64)> {
         let column = self.arm.capsules[1][0].moved(&Isometry3::translation(0.0, 0.0, self.geometry.joints[0].d_m));
         let mut deepest: Option<(String, f64)> = None;
@@ -210,7 +212,7 @@ impl CollisionModel {
     }
 }
 
-/// How fast a point of a body moves along a direction by each joint, m/rad.
+/// Speed of a point of a body along a direction by each joint, m/rad.
 fn moved_along(frames: &Frames, body: usize, point: &Point3<f64>, direction: &nalgebra::Vector3<f64>) -> JointVector {
     JointVector::from_fn(|joint_idx, _| {
         if joint_idx >= body.min(NUM_JOINTS) {

@@ -1,6 +1,7 @@
 //! The smallest distance between the arm and everything around it, for the configurations of all lanes.
 //!
-//! Bodies are compared as balls, then as capsules around their middles; the exact distance is computed where these bounds leave something to find.
+//! Bodies are compared as balls, then as capsules around their centres; the exact distance is computed only if these
+//! bounds do not decide.
 #![allow(clippy::needless_range_loop, reason = "one index for the lanes of several arrays")]
 
 use super::arm_shape::{FIRST_MOVING, NUM_BODIES};
@@ -12,7 +13,7 @@ use super::model::CollisionModel;
 use super::shape::{self, DistanceAndSlope, Shape};
 use crate::joints::{JointVector, NUM_JOINTS};
 
-/// Where the bodies' balls and capsules are, for each lane.
+/// Positions of the bodies' balls and capsules, for each lane.
 #[derive(Debug, Clone)]
 pub(super) struct Placed {
     balls: [Lane3; NUM_BODIES],
@@ -20,14 +21,15 @@ pub(super) struct Placed {
 }
 
 impl Placed {
-    /// Room for the bodies of a model; [`evaluate`] fills it.
+    /// Memory for the bodies of a model; [`evaluate`] fills it.
     pub(super) fn new(model: &CollisionModel) -> Self {
         let capsules = std::array::from_fn(|body| vec![(Lane3::ZERO, Lane3::ZERO); model.arm.capsules[body].len()]);
         Self { balls: [Lane3::ZERO; NUM_BODIES], capsules }
     }
 }
 
-/// Factors of the distances before the smallest is sought: for each pair of bodies, and for each body and what stands still.
+/// Factors of the distances before the minimum is taken: for each pair of bodies, and for each body and the fixed
+/// bodies.
 #[derive(Debug, Clone)]
 pub(super) struct Weights {
     pub(super) self_pairs: [[f64; NUM_BODIES]; NUM_BODIES],
@@ -41,7 +43,7 @@ impl Weights {
         Self { self_pairs: [[1.0; NUM_BODIES]; NUM_BODIES], bodies: [1.0; NUM_BODIES], offset_m: 0.0 };
 }
 
-/// What was found in each lane.
+/// The result of each lane.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Found {
     /// The smallest weighted distance.
@@ -50,7 +52,7 @@ pub(super) struct Found {
     pub(super) is_blocked: [bool; NUM_LANES],
 }
 
-/// Compares all pairs; ends early, with some lane blocked, where `until_blocked` allows it.
+/// Compares all pairs; ends early, with some lane blocked, if `until_blocked` allows it.
 #[inline(always)]
 pub(super) fn evaluate(
     model: &CollisionModel,
@@ -113,7 +115,7 @@ struct Search {
 }
 
 impl Search {
-    /// Whether distances of at least `bounds - radius_m` leave nothing to find in any lane.
+    /// Whether lower bounds of the distances, `bounds - radius_m`, exclude a smaller distance in every lane.
     #[inline(always)]
     fn can_skip(&self, bounds: &Lane, radius_m: f64, weight: f64) -> bool {
         let mut is_needed = false;
@@ -149,7 +151,7 @@ impl Search {
         weights: &Weights,
         shape: impl Fn([f64; 3], [f64; 3]) -> DistanceAndSlope + Copy,
     ) {
-        // From the hand inwards: what is far out is most often near something.
+        // From the hand inwards: the outer bodies are most often close to something.
         for body in (FIRST_MOVING..NUM_BODIES).rev() {
             let capsules = &model.arm.capsules[body];
             if model.may_touch[body][index] || capsules.is_empty() {

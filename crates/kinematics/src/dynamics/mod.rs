@@ -1,7 +1,8 @@
-//! Torques of the arm: masses, and what the joints have to exert for a motion.
+//! Torques of the arm: its masses, and the joint torques of a motion.
 //!
-//! `τ = M(q) q̈ + C(q, q̇) q̇ + g(q) + rotor inertia · q̈ + damping · q̇`, by the recursive Newton-Euler algorithm: velocities and accelerations of
-//! the links go outwards from the base, forces and torques back. The tcp's velocity and acceleration come of the same pass.
+//! `τ = M(q) q̈ + C(q, q̇) q̇ + g(q) + rotor inertia · q̈ + damping · q̇`, by the recursive Newton-Euler algorithm:
+//! velocities and accelerations of the links are computed outwards from the base, forces and torques inwards. The same
+//! pass gives the tcp's velocity and acceleration.
 //!
 //! # Source
 //! J. Craig, "Introduction to Robotics", chapter 6 (frames by modified Denavit-Hartenberg parameters).
@@ -15,7 +16,7 @@ use crate::joints::{JointVector, NUM_JOINTS};
 /// Acceleration of free fall, m/s².
 pub const GRAVITY_M_S2: f64 = 9.81;
 
-/// Masses of the arm and of what it carries, fingers and load at rest in the hand.
+/// Masses of the arm and its load, with fingers and load at rest in the hand.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ArmDynamics {
     joints: [DhJoint; NUM_JOINTS],
@@ -30,7 +31,7 @@ pub struct ArmDynamics {
     damping: JointVector,
 }
 
-/// Motion of a link against the base, and its turn: linear in m/s and m/s², angular in rad/s and rad/s².
+/// Motion of a link relative to the base, and its rotation: linear in m/s and m/s², angular in rad/s and rad/s².
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct TcpMotion {
     pub(crate) velocity: Vector3<f64>,
@@ -39,7 +40,7 @@ pub(crate) struct TcpMotion {
     pub(crate) angular_acceleration: Vector3<f64>,
 }
 
-/// The turns and places of the links at a configuration, to be used for several motions there.
+/// Rotations and positions of the links at a configuration, for several motions there.
 #[derive(Debug, Clone)]
 pub(crate) struct Placed {
     /// Each link's axes in its parent's frame.
@@ -76,7 +77,7 @@ impl ArmDynamics {
     /// For a negative mass or numbers that are not finite.
     pub fn with_load(mut self, mass_kg: f64, center_in_flange_m: [f64; 3]) -> Self {
         assert!(mass_kg >= 0.0 && mass_kg.is_finite(), "a mass is not negative, found {mass_kg} kg");
-        assert!(center_in_flange_m.iter().all(|x| x.is_finite()), "{center_in_flange_m:?} m is no place");
+        assert!(center_in_flange_m.iter().all(|x| x.is_finite()), "{center_in_flange_m:?} m is not a finite position");
         let load = LinkInertia::new(mass_kg, center_in_flange_m, [0.0; 3]);
         self.links[NUM_JOINTS - 1].add(&load, &Isometry3::translation(0.0, 0.0, self.flange_offset_m));
         self
@@ -88,20 +89,20 @@ impl ArmDynamics {
         torques + self.damping.component_mul(velocity)
     }
 
-    /// What holds the arm against its weight, N·m.
+    /// The torques that hold the arm against gravity, N·m.
     pub fn gravity_nm(&self, q: &JointVector) -> JointVector {
         let zero = JointVector::zeros();
         self.of_motion(&self.placed(q), &zero, &zero, GRAVITY_M_S2).0
     }
 
-    /// Where the links are at a configuration.
+    /// The poses of the links at a configuration.
     pub(crate) fn placed(&self, q: &JointVector) -> Placed {
         let parent_from_link: [Matrix3<f64>; NUM_JOINTS] = std::array::from_fn(|joint| {
             let (sin_a, cos_a) = self.joints[joint].twist();
             let (sin_q, cos_q) = q[joint].sin_cos();
             Matrix3::new(cos_q, -sin_q, 0.0, sin_q * cos_a, cos_q * cos_a, -sin_a, sin_q * sin_a, cos_q * sin_a, cos_a)
         });
-        // The hand's turn about z leaves vectors' lengths and the axis to the tcp as they are.
+        // The hand's turn about z changes neither vector lengths nor the axis to the tcp.
         let base_from_tcp = parent_from_link.iter().fold(Matrix3::identity(), |product, turn| product * turn);
         Placed { parent_from_link, base_from_tcp }
     }
@@ -120,7 +121,7 @@ impl ArmDynamics {
         gravity_m_s2: f64,
     ) -> (JointVector, TcpMotion) {
         let zero = Vector3::zeros();
-        // Of the parent, in its own frame; the base is accelerated upwards in place of gravity.
+        // Of the parent, in its own frame; an upward acceleration of the base replaces gravity.
         let (mut turning, mut turning_rate) = (zero, zero);
         let (mut moving, mut moving_rate) = (zero, Vector3::new(0.0, 0.0, gravity_m_s2));
         let mut forces = [(zero, zero); NUM_JOINTS];

@@ -9,7 +9,8 @@ use crate::test_poses::random_configuration;
 
 #[test]
 fn a_load_straight_out_weighs_what_its_lever_says() {
-    // The arm stretched to the side at the height of its shoulder: joint 2 at a right angle, the others at zero; the load 1 m outside of joint 2's axis.
+    // The arm stretched to the side at the height of its shoulder: joint 2 at a right angle, the others at zero; the
+    // load is 1 m from joint 2's axis.
     let mut q = JointVector::zeros();
     q[1] = std::f64::consts::FRAC_PI_2;
     let bare = ArmDynamics::new(&ArmGeometry::panda(), 0.08);

@@ -8,7 +8,7 @@ use super::*;
 use crate::joints::ready_pose;
 use crate::test_poses::{random_configuration, top_grasp};
 
-/// What the closed form and the polish leave.
+/// Remaining errors of the closed form and the refinement.
 const POSITION_TOLERANCE_M: f64 = 1e-6;
 const ANGLE_TOLERANCE_RAD: f64 = 1e-6;
 
@@ -20,7 +20,7 @@ fn assert_reaches(panda: &ArmGeometry, target: &Isometry3<f64>, solution: &IkSol
     assert!(solution.limit_margin_rad >= 0.0);
 }
 
-/// Inverse kinematics that shares nothing with the closed form: descent from random configurations.
+/// Inverse kinematics independent of the closed form: descent from random configurations.
 fn reaches_by_descent(panda: &ArmGeometry, target: &Isometry3<f64>, rng: &mut Pcg64Mcg) -> bool {
     (0..30).any(|_| {
         let start = random_configuration(rng);
@@ -97,7 +97,7 @@ fn the_search_mostly_finds_the_cheapest_of_a_dense_scan() {
         assert!(best.cost < found.cost + 1e-3);
         num_worse += usize::from(found.cost > best.cost * 1.01);
     }
-    // What the coarse grid misses are stretches of q7 narrower than its step, and passages of the upright upper arm.
+    // The coarse grid misses intervals of q7 narrower than its step, and configurations with the upper arm upright.
     assert!(num_worse <= 16, "{num_worse} of 200");
 }
 
@@ -134,8 +134,9 @@ fn a_margin_asked_for_is_kept() {
 #[test]
 fn out_of_reach_names_the_distance() {
     let panda = ArmGeometry::panda();
-    // Arm stretched level at shoulder height: the wrist centre reaches 0.7193 m (both triangle sides), hand and wrist in line
-    // at most hypot(0.088, 0.107 + 0.1034) further. 3 m away, whatever the hand does, at least 2.05 m are missing.
+    // Arm stretched level at shoulder height: the wrist centre reaches 0.7193 m (both triangle sides), hand and wrist
+    // in line at most hypot(0.088, 0.107 + 0.1034) further. For a pose 3 m away at least 2.05 m are missing for any
+    // pose of the hand.
     let target = top_grasp(3.0, 0.0, 0.333, 0.0);
     let error = panda.inverse(&target, &ready_pose(), &IkOptions::default()).unwrap_err();
     let KinematicsError::OutOfReach { target_m, nearest, .. } = &error else {
@@ -152,7 +153,7 @@ fn out_of_reach_names_the_distance() {
 #[test]
 fn a_limit_that_forbids_a_pose_is_named() {
     let panda = ArmGeometry::panda();
-    // So close to the base the elbow would have to fold beyond its 3.0718 rad.
+    // So close to the base, the elbow would have to fold beyond its 3.0718 rad.
     let error = panda.inverse(&top_grasp(0.1, 0.0, 0.1, 0.0), &ready_pose(), &IkOptions::default()).unwrap_err();
     let KinematicsError::JointLimit { violation, nearest } = &error else {
         panic!("{error}");
@@ -195,7 +196,7 @@ fn the_same_question_has_the_same_bits_in_its_answer() {
 #[test]
 fn singular_configurations_are_reached_too() {
     let panda = ArmGeometry::panda();
-    // Upper arm upright (q1 and q3 share an axis); wrist with z6 in line with the arm; elbow as straight as it gets.
+    // Upper arm upright (q1 and q3 share an axis); wrist with z6 in line with the arm; elbow as straight as possible.
     let mut upright = ready_pose();
     upright[1] = 0.0;
     let mut straight = ready_pose();
@@ -308,7 +309,7 @@ fn a_third_arm_of_six_joints_is_another_value() {
         let target =
             top_grasp(-rng.random_range(0.35..0.55), rng.random_range(-0.3..0.3), 0.3, rng.random_range(-PI..PI));
         let solutions = arm.inverse_all(&target, &arm.ready, &IkOptions::default()).unwrap();
-        // Elbow, shoulder and wrist, two ways each.
+        // Elbow, shoulder and wrist, two solutions each.
         assert!(solutions.len() >= 4, "{}", solutions.len());
         for solution in &solutions {
             assert_reaches(&arm, &target, solution);

@@ -17,7 +17,7 @@ fn descent(panda: &ArmGeometry) -> JointPath {
 
 #[test]
 fn the_tcp_stays_on_the_line_between_waypoints_too() {
-    // Quintic pieces of 5 mm: far below what any robot resolves.
+    // Quintic pieces of 5 mm: far below the resolution of any robot.
     const TOLERANCE: f64 = 1e-8;
     let panda = ArmGeometry::panda();
     let path = descent(&panda);
@@ -38,7 +38,7 @@ fn derivatives_agree_with_finite_differences() {
     let path = descent(&ArmGeometry::panda());
     let step = 1e-4;
     for i in 1..100 {
-        // Off the waypoints, where the third derivative jumps.
+        // Between waypoints, where the third derivative does not jump.
         let s = path.length_m() * (i as f64 + 0.37) / 101.0;
         let (before, here, after) = (path.at(s - step), path.at(s), path.at(s + step));
         let error = |numeric: JointVector, exact: JointVector| (numeric - exact).amax();
@@ -91,7 +91,7 @@ fn most_descents_from_the_best_configuration_succeed() {
             }
         }
     }
-    // The others need another configuration to start from: that is the choice `Panda::approach` makes.
+    // The others need another start configuration, which `Panda::approach` chooses.
     assert!(num_followed >= 285, "{num_followed}");
 }
 
@@ -99,7 +99,7 @@ fn most_descents_from_the_best_configuration_succeed() {
 fn the_elbow_slides_away_from_limits_without_moving_the_tcp() {
     let panda = ArmGeometry::panda();
     let limits = &panda.limits;
-    // Sum of the fourth powers of the joints' places in their ranges, -1 to 1.
+    // Sum of the fourth powers of the joints' positions in their ranges, -1 to 1.
     let crowding = |q: &JointVector| {
         let half_range = (limits.position_max - limits.position_min) * 0.5;
         (q - limits.middle()).component_div(&half_range).map(|u| u.powi(4)).sum()

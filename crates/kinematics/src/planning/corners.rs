@@ -1,17 +1,18 @@
-//! Round corners: a way that the arm follows without stopping at its waypoints, where that touches nothing.
+//! Rounded corners: a path that the arm follows without stopping at its waypoints, where it is free of collisions.
 
 use crate::collision::Checker;
 use crate::joints::JointVector;
 use crate::rounded_path::{Corner, RoundedPath, length_secs};
 
-/// Sizes that are tried for a corner, each so many times the one before, down to the least; below it the arm is as good as at rest, and stops.
+/// Sizes tried for a corner, each this factor times the one before, down to the minimum; below it the arm stops
+/// instead.
 const SMALLER: f64 = 0.7;
 const MIN_SIZE_SECS: f64 = 2e-3;
-/// A size that was found may be made larger by less than this; trying is not worth its checks.
+/// If a found size could be increased only by less than this, no further check is made.
 const MIN_GROWTH: f64 = 1.15;
 
-/// The way through waypoints, its corners as large as there is room for and as is free, each proven as a whole. There are several ways, each
-/// beginning where the one before ends, where no rounding of a waypoint is free.
+/// The path through waypoints, with corners as large as the space and the obstacles allow, each proven as a whole.
+/// There are several paths, each starting where the one before ends, if no rounding of a waypoint is free.
 pub(super) fn round(checker: &mut Checker<'_>, waypoints: &[JointVector]) -> Vec<RoundedPath> {
     let mut waypoints = waypoints.to_vec();
     waypoints.dedup_by(|next, before| length_secs(before, next) < MIN_LENGTH_SECS);
@@ -23,7 +24,8 @@ pub(super) fn round(checker: &mut Checker<'_>, waypoints: &[JointVector]) -> Vec
         waypoints.windows(3).map(|three| Corner { before: three[0], waypoint: three[1], after: three[2] }).collect();
     let last = corners.len();
     let mut sizes = vec![0.0; corners.len()];
-    // First each has half of the straight parts beside it, or all where these begin or end the way; then what its neighbours leave.
+    // First each corner gets half of the straight parts beside it, or all if these start or end the path; then the rest
+    // that its neighbours leave.
     for index in 0..last {
         let before = lengths[index] * if index == 0 { 1.0 } else { 0.5 };
         let after = lengths[index + 1] * if index + 1 == last { 1.0 } else { 0.5 };
@@ -37,7 +39,7 @@ pub(super) fn round(checker: &mut Checker<'_>, waypoints: &[JointVector]) -> Vec
     split_at_stops(&waypoints, &sizes)
 }
 
-/// The largest size up to `room` of those tried for which the corner is free, at least `known_free`; 0 where there is none.
+/// The largest tried size up to `room` for which the corner is free, at least `known_free`; 0 if there is none.
 fn largest_free(checker: &mut Checker<'_>, corner: &Corner, room: f64, known_free: f64) -> f64 {
     let mut size = room;
     while size > (known_free * MIN_GROWTH).max(MIN_SIZE_SECS) {
@@ -64,5 +66,5 @@ fn split_at_stops(waypoints: &[JointVector], sizes: &[f64]) -> Vec<RoundedPath> 
     ways
 }
 
-/// Waypoints that are nearer to each other are one.
+/// Waypoints closer together than this are one.
 const MIN_LENGTH_SECS: f64 = 1e-9;

@@ -1,4 +1,4 @@
-//! Why there is no plan: which link, which obstacle, which limit.
+//! The reason why there is no plan: the link, the obstacle, the limit.
 
 use crate::collision::Proximity;
 use crate::error::KinematicsError;
@@ -7,12 +7,12 @@ use crate::error::KinematicsError;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlanError {
-    /// An input that makes no sense, a start beyond the joints' ranges, or a goal that no configuration reaches.
+    /// An invalid input, a start beyond the joints' ranges, or a goal that no configuration reaches.
     #[error("{what}: {cause}")]
     Kinematics {
         /// Which input.
         what: String,
-        /// What is wrong with it.
+        /// Its error.
         cause: KinematicsError,
     },
     /// No goal was given.
@@ -23,12 +23,12 @@ pub enum PlanError {
     InvalidOption {
         /// Which option.
         option: &'static str,
-        /// What is accepted.
+        /// The accepted values.
         expected: &'static str,
-        /// What was given.
+        /// The given value.
         found: f64,
     },
-    /// An obstacle stands where the arm's first link always is.
+    /// An obstacle overlaps the fixed part of the arm's first link.
     #[error(
         "the obstacle \"{obstacle}\" encloses the robot: it overlaps the arm's column by {:.0} mm, which no motion changes",
         .depth_m * 1e3
@@ -36,43 +36,43 @@ pub enum PlanError {
     EnclosesRobot {
         /// Its name.
         obstacle: String,
-        /// How deep, m.
+        /// The depth of the overlap, m.
         depth_m: f64,
     },
-    /// The start is in collision, or nearer to something than the margin.
-    #[error("the start is not free: {nearest}; at least {:.1} mm are asked for", .margin_m * 1e3)]
+    /// The start is in collision, or closer to something than the margin.
+    #[error("the start is not free: {nearest}; at least {:.1} mm are required", .margin_m * 1e3)]
     StartBlocked {
-        /// What it is too near to.
+        /// The body that is too close.
         nearest: Proximity,
-        /// The distance asked for, m.
+        /// The required distance, m.
         margin_m: f64,
     },
-    /// Every configuration that reaches the goal is in collision, or nearer to something than the margin.
+    /// Every configuration that reaches the goal is in collision, or closer to something than the margin.
     #[error(
-        "the goal is not free: {num_configurations} configurations reach it, and in the best of them {nearest}; at least {:.1} mm are \
-         asked for",
+        "the goal is not free: {num_configurations} configurations reach it, and in the best of them {nearest}; at \
+         least {:.1} mm are required",
         .margin_m * 1e3
     )]
     GoalBlocked {
-        /// How many configurations within the joints' ranges were tried.
+        /// Number of tried configurations within the joints' ranges.
         num_configurations: usize,
-        /// What the freest of them is too near to.
+        /// The body that is too close to the best of them.
         nearest: Proximity,
-        /// The distance asked for, m.
+        /// The required distance, m.
         margin_m: f64,
     },
     /// The straight approach ends early from every configuration that reaches its start.
-    #[error("the approach can be followed for {:.0} % of its way at best: {why}", .share * 100.0)]
+    #[error("at most {:.0} % of the approach can be followed: {why}", .share * 100.0)]
     ApproachBlocked {
-        /// The largest share of the way that was free, 0 to 1.
+        /// The largest free share of the approach, 0 to 1.
         share: f64,
-        /// What ends it there.
+        /// The reason for its end there.
         why: String,
     },
     /// The search ended without a path.
     #[error("no path found in {num_checks} collision checks; the search was stopped most often by: {}", list(.blockers))]
     NotFound {
-        /// Configurations that were checked.
+        /// Number of checked configurations.
         num_checks: usize,
         /// Pairs that blocked motions, the most frequent first, each with its share.
         blockers: Vec<(String, f64)>,

@@ -1,24 +1,24 @@
-//! A plan part by part: how long each takes, and what the arm comes nearest to on it.
+//! A plan part by part: the duration of each part, and the closest body during it.
 
 use crate::collision::{Checker, CollisionModel, Proximity};
 use crate::planning::plan::Plan;
 use crate::{JointVector, Trajectory};
 
-/// Places on the straight motion at which distances are looked at.
+/// Number of points on the straight motion at which distances are computed.
 const NUM_PLACES: usize = 64;
 
-/// The path from one waypoint to the next, each as near as its rounded corner comes.
+/// The path from one waypoint to the next, each at the closest point of its rounded corner.
 #[derive(Debug, Clone)]
 pub struct PlanPart {
     /// The waypoint at its end.
     pub end: JointVector,
-    /// How long it takes.
+    /// Its duration.
     pub secs: f64,
-    /// What the arm comes nearest to on it.
+    /// The closest body during it.
     pub nearest: Proximity,
 }
 
-/// What happens between waypoints: a motion is past one where it is nearest to it.
+/// The motion between waypoints: it passes a waypoint where it is closest to it.
 pub fn plan_parts(model: &CollisionModel, plan: &Plan, motions: &[Trajectory]) -> Vec<PlanPart> {
     let mut parts = Vec::new();
     let mut waypoints = plan.waypoints[1..].iter();
@@ -40,9 +40,9 @@ pub fn plan_parts(model: &CollisionModel, plan: &Plan, motions: &[Trajectory]) -
     parts
 }
 
-/// Places on a motion at which its nearest place to a waypoint is sought.
+/// Number of points on a motion among which the closest to a waypoint is searched.
 const NUM_SAMPLES: usize = 1000;
-/// Configurations that are nearer to each other are the same.
+/// Configurations closer together than this are the same.
 const SAME_RAD: f64 = 1e-9;
 
 fn at_share(motion: &Trajectory, sample: usize) -> (JointVector, f64) {
@@ -50,16 +50,16 @@ fn at_share(motion: &Trajectory, sample: usize) -> (JointVector, f64) {
     (motion.sample(secs).0, secs)
 }
 
-/// What the arm comes nearest to on a straight motion.
+/// The closest body during a straight motion.
 pub fn nearest_on(model: &CollisionModel, from: &JointVector, to: &JointVector) -> Proximity {
     let places: Vec<JointVector> =
         (0..=NUM_PLACES).map(|place| from + (to - from) * (place as f64 / NUM_PLACES as f64)).collect();
     nearest_of(model, &places)
 }
 
-/// What the arm comes nearest to at some configurations.
+/// The closest body at some configurations.
 fn nearest_of(model: &CollisionModel, places: &[JointVector]) -> Proximity {
-    // The margin plays no part in distances.
+    // The margin has no effect on distances.
     let distances = Checker::new(model, 1e-3).distances_m(places);
     let place = (0..places.len()).min_by(|&a, &b| distances[a].total_cmp(&distances[b])).unwrap_or(0);
     model.nearest(&places[place])

@@ -1,4 +1,5 @@
-//! Configurations that reach a goal: every way of the arm at many angles of joint 7, of which the free ones are kept.
+//! Configurations that reach a goal: every branch of the arm at many angles of joint 7, of which the free ones are
+//! kept.
 
 use nalgebra::Isometry3;
 
@@ -11,27 +12,27 @@ use crate::geometry::ArmGeometry;
 use crate::ik::IkOptions;
 use crate::joints::JointVector;
 
-/// Angles of joint 7 that are tried.
+/// Number of tried angles of joint 7.
 const NUM_ANGLES: usize = 48;
-/// Configurations that are kept at most, the quickest to reach first.
+/// Maximum number of kept configurations, the quickest to reach first.
 const MAX_KEPT: usize = 24;
-/// Those that are kept differ by at least this, rad.
+/// Minimum difference of the kept configurations, rad.
 const MIN_APART_RAD: f64 = 0.25;
-/// Positions this far beyond a limit are rounding.
+/// Positions this far beyond a limit are rounding errors.
 const LIMIT_ROUNDING_RAD: f64 = 1e-9;
 
 /// A configuration that reaches a goal.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct GoalConfiguration {
     pub(super) q: JointVector,
-    /// Which of the poses that were asked for.
+    /// The index of the goal pose.
     pub(super) pose_idx: usize,
 }
 
 /// The free configurations of all poses, the quickest to reach from `start` first.
 ///
 /// # Errors
-/// Poses that make no sense or cannot be reached, or whose configurations are all blocked.
+/// Poses that are invalid or cannot be reached, or whose configurations are all blocked.
 pub(super) fn free_configurations(
     arm: &ArmGeometry,
     checker: &mut Checker<'_>,
@@ -47,7 +48,8 @@ pub(super) fn free_configurations(
         reaching.extend(configurations(arm, start, pose).into_iter().map(|q| GoalConfiguration { q, pose_idx }));
     }
     if reaching.is_empty() {
-        // The grid may pass by what only a sliver of angles reaches; inverse kinematics looks closer, and says why not.
+        // The grid may miss poses that only a narrow range of angles reaches; inverse kinematics searches more finely,
+        // and gives the reason of a failure.
         for (pose_idx, pose) in poses.iter().enumerate() {
             match arm.inverse(pose, start, &IkOptions::default()) {
                 Ok(solution) => reaching.push(GoalConfiguration { q: solution.q, pose_idx }),
@@ -61,7 +63,7 @@ pub(super) fn free_configurations(
     free_of(arm, checker, start, reaching)
 }
 
-/// Of configurations those that are free, the quickest to reach from `start` first.
+/// The free ones of some configurations, the quickest to reach from `start` first.
 ///
 /// # Errors
 /// None at all, or all blocked.

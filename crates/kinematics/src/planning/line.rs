@@ -8,24 +8,24 @@ use crate::geometry::ArmGeometry;
 use crate::joints::JointVector;
 use crate::path::{JointPath, LineOptions};
 
-/// A straight motion of the tcp, and how much of it is free.
+/// A straight motion of the tcp, and its free share.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CheckedLine {
-    /// Share of the way that can be followed without touching anything that may not be touched, 0 to 1.
+    /// Share of the motion that can be followed without a forbidden contact, 0 to 1.
     pub share: f64,
-    /// The whole motion, where [`CheckedLine::share`] is 1.
+    /// The whole motion, if [`CheckedLine::share`] is 1.
     pub path: Option<JointPath>,
-    /// What ends it, where it is less.
+    /// The reason for its end, if the share is smaller.
     pub blocked_by: Option<String>,
 }
 
 /// Follows the straight line from the tcp's pose at `start` to a pose, and checks it against the checker's model.
 ///
-/// What may be touched on the way (the part by the fingers, the table by the part) is a matter of that model:
+/// The model defines the allowed contacts (of the fingers with the part, of the part with the table):
 /// [`crate::collision::CollisionModel::allow`].
 ///
 /// # Errors
-/// [`KinematicsError`] for input that makes no sense; a line that cannot be followed is no error but a share below 1.
+/// [`KinematicsError`] for invalid input; a line that cannot be followed is not an error but has a share below 1.
 pub fn checked_line(
     arm: &ArmGeometry,
     checker: &mut Checker<'_>,
@@ -38,7 +38,7 @@ pub fn checked_line(
         Err(
             error @ (KinematicsError::PathJointLimit { at_share, .. } | KinematicsError::PathBlocked { at_share, .. }),
         ) => {
-            // What comes before that place may be blocked as well.
+            // The path before that point may be blocked as well.
             let base_from_start = arm.forward(start);
             let share = at_share * FOLLOWED_AGAIN;
             let end = base_from_start.lerp_slerp(base_from_tcp_end, share);
@@ -56,14 +56,14 @@ pub fn checked_line(
     })
 }
 
-/// Of the part that could be followed, so much is followed again to be checked: its end is where a joint meets its limit.
+/// This share of the part that could be followed is followed again for the check: at its end a joint reaches its limit.
 const FOLLOWED_AGAIN: f64 = 0.98;
 
-/// Where a path is blocked first, as a share of it, and by what.
+/// The first blocked point of a path, as a share of it, and the obstacle.
 fn first_blocked(checker: &mut Checker<'_>, path: &JointPath) -> Option<(f64, String)> {
     let margin_mm = checker.margin_m() * 1e3;
     let why = |checker: &Checker<'_>, q: &JointVector| {
-        format!("{}, at least {margin_mm:.1} mm are asked for", checker.model().nearest(q))
+        format!("{}, at least {margin_mm:.1} mm are required", checker.model().nearest(q))
     };
     let waypoints: Vec<&JointVector> = path.waypoints().collect();
     if !checker.is_free(waypoints[0]) {
@@ -71,7 +71,7 @@ fn first_blocked(checker: &mut Checker<'_>, path: &JointPath) -> Option<(f64, St
     }
     let num_pieces = waypoints.len() - 1;
     for (piece, pair) in waypoints.windows(2).enumerate() {
-        // Between waypoints the joints' path is straight up to some µm.
+        // Between waypoints the joints' path is straight up to a few µm.
         if let Some(share) = checker.blocked_share(pair[0], pair[1]) {
             let q = pair[0] + (pair[1] - pair[0]) * share;
             return Some((piece as f64 / num_pieces as f64, why(checker, &q)));

@@ -6,7 +6,8 @@
 //! CollisionModel ─> Checker ────┘                                      approach ──┘
 //! ```
 //!
-//! There is no clock here: a search ends after so many collision checks, and gives the same plan on every machine.
+//! The planner has no clock: a search ends after a number of collision checks, and gives the same plan on every
+//! machine.
 
 mod corners;
 mod error;

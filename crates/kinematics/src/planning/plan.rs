@@ -27,17 +27,17 @@ use crate::trajectory::Trajectory;
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct PlanOptions {
-    /// Decides the random configurations: the same seed gives the same plan.
+    /// Seed of the random configurations: the same seed gives the same plan.
     pub seed: u64,
     /// Distance kept to obstacles and between links that may not touch, m.
     pub margin_m: f64,
-    /// The longest motion that is added to a tree at once, rad.
+    /// The longest motion added to a tree at once, rad.
     pub step_rad: f64,
-    /// Configurations that the search may check before it gives up.
+    /// Maximum number of configurations that the search checks.
     pub max_checks: usize,
-    /// Attempts to shorten a way.
+    /// Number of attempts to shorten a path.
     pub num_shortcuts: usize,
-    /// Searches of which the cheapest way is taken, where no straight motion leads to a goal.
+    /// Number of searches, of which the cheapest path is used, if no straight motion leads to a goal.
     pub num_searches: usize,
 }
 
@@ -52,34 +52,35 @@ impl Default for PlanOptions {
 pub struct StraightApproach<'a> {
     /// Length, m.
     pub length_m: f64,
-    /// What may be touched on it: the same obstacles with more pairs that may touch.
+    /// The allowed contacts on it: the same obstacles with more pairs that may touch.
     pub model: &'a CollisionModel,
 }
 
-/// A way around obstacles.
+/// A path around obstacles.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
-    /// Configurations, start and end included, between which the way is straight in joint space but for its corners, rad.
+    /// Configurations, start and end included, connected by straight lines in joint space except for the corners, rad.
     pub waypoints: Vec<JointVector>,
-    /// The way through them with rounded corners. Most often one; several, each beginning where the one before ends, where nothing rounder than a stop is
-    /// free; none where start and end are the same.
+    /// The path through them with rounded corners. Usually one; several, each starting where the one before ends, if at
+    /// a waypoint no rounding is free and the arm must stop; none if start and end are the same.
     pub ways: Vec<RoundedPath>,
-    /// The straight end, where one was asked for.
+    /// The straight end, if one was requested.
     pub approach: Option<JointPath>,
-    /// Which of the goal poses is reached.
+    /// The index of the reached goal pose.
     pub goal_idx: usize,
-    /// Configurations that were checked in all.
+    /// Total number of checked configurations.
     pub num_checks: usize,
-    /// Of these, before the first way was shortened.
+    /// Number of these before the first path was shortened.
     pub num_search_checks: usize,
-    /// About how long the first way took before it was shortened, and the plan takes, with stops at the waypoints at full speed, s.
+    /// Approximate duration of the first path before it was shortened, and of the plan, with stops at the waypoints at
+    /// full speed, s.
     pub cost_secs: [f64; 2],
 }
 
 impl Plan {
     /// The motions in time, each from rest to rest: one along each of [`Plan::ways`], and the straight approach.
     ///
-    /// `dynamics` are the arm's with its load; the approach's torques are not looked at.
+    /// `dynamics` are the arm's with its load; the approach's torques are not checked.
     ///
     /// # Errors
     /// As [`Trajectory::along_rounded_path`] and [`Trajectory::along_path`].
@@ -95,7 +96,7 @@ impl Plan {
         ways.chain(approach).collect()
     }
 
-    /// How long the free part would take, s, if the arm stopped at each waypoint, within the same limits.
+    /// Duration of the free part, s, if the arm stopped at each waypoint, within the same limits.
     ///
     /// # Errors
     /// As [`Trajectory::along_rounded_path`].
@@ -119,15 +120,16 @@ impl Plan {
 impl ArmGeometry {
     /// Plans a motion from `start` to one of several goal poses, around the obstacles of a model.
     ///
-    /// Tried are all poses of `goals` (turns about a part's symmetry, exchanged fingers) with every way of the arm and many angles of joint 7: the
-    /// quickest that a straight motion reaches, or else the cheapest of what [`PlanOptions::num_searches`] searches towards all of them find.
-    /// With an approach, the way ends where the approach begins, at a configuration from which the whole approach is free.
+    /// All poses of `goals` (turns about a part's symmetry, exchanged fingers) are tried with every branch of the arm
+    /// and many angles of joint 7. The result is the quickest that a straight motion reaches, otherwise the cheapest
+    /// path found by [`PlanOptions::num_searches`] searches towards all of them. With an approach, the path ends where
+    /// the approach starts, at a configuration from which the whole approach is free.
     ///
     /// # Units and frames
     /// `start` in rad, `goals` as `base_from_tcp` in m.
     ///
     /// # Errors
-    /// [`PlanError`] names what blocks: a limit, a pair of bodies, an obstacle.
+    /// [`PlanError`] names the cause: a limit, a pair of bodies, an obstacle.
     pub fn plan(
         &self,
         model: &CollisionModel,
@@ -170,7 +172,7 @@ impl ArmGeometry {
         self.search(checker, start, goals, Vec::new(), options)
     }
 
-    /// The cheapest way to one of the goals, which come the quickest first.
+    /// The cheapest path to one of the goals, which are sorted, the quickest first.
     fn search(
         &self,
         mut checker: Checker<'_>,
@@ -195,12 +197,13 @@ impl ArmGeometry {
         let is_straight = first.waypoints.len() == 2;
         let mut best = first;
         shorten(&mut checker, &self.limits, &mut best.waypoints, options.num_shortcuts, &mut rng);
-        // A further search may take some times as long as the first: it is for a better way, not for any.
+        // A further search may take a few times as long as the first: it looks for a better path.
         growth.step_rad = growth.step_rad.min(FURTHER_STEP_RAD);
         growth.max_checks = growth.max_checks.min(MIN_FURTHER_CHECKS + FURTHER_CHECKS_RATIO * num_search_checks);
         for _ in 1..if is_straight { 1 } else { options.num_searches } {
             let best_secs = cost_secs(&best.waypoints, &self.limits);
-            // Goals come the quickest first: of those that take longer even straight nothing is to be had.
+            // Goals are sorted, the quickest first: those that take longer even on a straight line cannot improve the
+            // result.
             let num_quicker = goals.partition_point(|goal| motion_secs(start, &goal.q, &self.limits) < best_secs);
             if num_quicker == 0 {
                 break;
@@ -260,7 +263,7 @@ impl ArmGeometry {
             goals.iter().map(|goal| goal * Translation3::new(0.0, 0.0, -approach.length_m)).collect();
         let mut on_approach = Checker::new(approach.model, checker.margin_m());
         let (mut kept, mut paths) = (Vec::new(), Vec::new());
-        let mut best = (0.0, "nothing of it is free".to_owned());
+        let mut best = (0.0, "no part of it is free".to_owned());
         for goal in free_configurations(self, checker, start, &before)? {
             let line = checked_line(self, &mut on_approach, &goal.q, &goals[goal.pose_idx])
                 .map_err(|cause| PlanError::Kinematics { what: "the approach".to_owned(), cause })?;
@@ -280,13 +283,14 @@ impl ArmGeometry {
     }
 }
 
-/// Checks that every further search may take, and how many times those of the first.
+/// Maximum number of checks of every further search, also as a multiple of those of the first.
 const MIN_FURTHER_CHECKS: usize = 1000;
 const FURTHER_CHECKS_RATIO: usize = 2;
-/// The longest motion that a further search adds at once, rad: shorter ones than the first search's find narrower and quicker ways.
+/// The longest motion that a further search adds at once, rad: shorter motions than the first search's find narrower
+/// and quicker paths.
 const FURTHER_STEP_RAD: f64 = 2.0;
 
-/// Straight to the quickest goal that can be reached so; goals come the quickest first.
+/// Straight to the quickest goal that can be reached in this way; goals are sorted, the quickest first.
 fn straight(checker: &mut Checker<'_>, start: &JointVector, goals: &[GoalConfiguration]) -> Option<Found> {
     let goal_idx = goals.iter().position(|goal| checker.is_edge_free(start, &goal.q))?;
     Some(Found { waypoints: vec![*start, goals[goal_idx].q], goal_idx })
@@ -296,11 +300,11 @@ fn roots(goals: &[GoalConfiguration]) -> Vec<JointVector> {
     goals.iter().map(|goal| goal.q).collect()
 }
 
-/// Positions this far beyond a limit are rounding.
+/// Positions this far beyond a limit are rounding errors.
 const LIMIT_ROUNDING_RAD: f64 = 1e-9;
 
 fn not_found(checker: &Checker<'_>, stops: &Stops) -> PlanError {
-    /// Number of pairs that a message names.
+    /// Number of pairs named by a message.
     const MAX_REPORTED: usize = 3;
     let mut counts = BTreeMap::<String, usize>::new();
     for q in stops.configurations() {

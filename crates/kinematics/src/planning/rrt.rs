@@ -1,8 +1,8 @@
 //! RRT-Connect: a tree from the start and one from all goals grow towards random configurations and towards each other.
 //!
 //! # Source
-//! J. Kuffner, S. LaValle, "RRT-Connect: an efficient approach to single-query path planning", ICRA 2000. Here the goals' tree has several
-//! roots, the smaller tree is the one that grows, and motions are proven free as wholes ([`Checker`]).
+//! J. Kuffner, S. LaValle, "RRT-Connect: an efficient approach to single-query path planning", ICRA 2000. Here the
+//! goals' tree has several roots, the smaller tree grows, and motions are proven free as a whole ([`Checker`]).
 
 use rand::Rng;
 use rand_pcg::Pcg64Mcg;
@@ -11,33 +11,34 @@ use crate::collision::Checker;
 use crate::joints::JointVector;
 use crate::limits::JointLimits;
 
-/// What a search may cost, and how it grows.
+/// Limits and step size of a search.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Growth {
-    /// The longest motion that is added at once, rad.
+    /// The longest motion added at once, rad.
     pub(super) step_rad: f64,
-    /// Configurations that may be checked.
+    /// Maximum number of checked configurations.
     pub(super) max_checks: usize,
 }
 
-/// Where random configurations are drawn from.
+/// The region of the random configurations.
 ///
 /// # Source
-/// J. Gammell, S. Srinivasa, T. Barfoot, "Informed RRT*: optimal sampling-based path planning focused via direct sampling of an admissible
-/// ellipsoidal heuristic", IROS 2014. The slowest joint's time is the cost here, so that boxes stand for the ellipsoids.
+/// J. Gammell, S. Srinivasa, T. Barfoot, "Informed RRT*: optimal sampling-based path planning focused via direct
+/// sampling of an admissible ellipsoidal heuristic", IROS 2014. The slowest joint's time is the cost here, so that
+/// boxes replace the ellipsoids.
 #[derive(Debug, Clone)]
 pub(super) struct Samples(Vec<[JointVector; 2]>);
 
 impl Samples {
-    /// All that the joints reach.
+    /// The whole range of the joints.
     pub(super) fn everywhere(limits: &JointLimits) -> Self {
         Self(vec![[limits.position_min, limits.position_max]])
     }
 
-    /// Only configurations that can be on a way to one of the goals which takes less than `max_secs` at full speed.
+    /// Only configurations that can be on a path to one of the goals with a duration below `max_secs` at full speed.
     ///
-    /// On such a way a joint leaves the range between its start and its goal by at most half of what it could travel besides. Every goal must
-    /// be reachable straight within that time, were nothing in between.
+    /// On such a path a joint leaves the range between its start and its goal by at most half of its remaining travel.
+    /// Every goal must be reachable on a straight line within that time if there were no obstacles.
     pub(super) fn on_quicker_ways(
         limits: &JointLimits,
         start: &JointVector,
@@ -59,14 +60,14 @@ impl Samples {
     }
 }
 
-/// A way from the start to a goal.
+/// A path from the start to a goal.
 #[derive(Debug, Clone)]
 pub(super) struct Found {
     pub(super) waypoints: Vec<JointVector>,
     pub(super) goal_idx: usize,
 }
 
-/// Configurations at which motions were stopped, of which some are kept to say what stopped them.
+/// Configurations at which motions were stopped, some of which are kept to report the cause.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Stops(Vec<JointVector>);
 
@@ -113,7 +114,7 @@ impl Tree {
         nearest.0
     }
 
-    /// From a node to its root, and which root that is.
+    /// The path from a node to its root, and that root.
     fn way_to_root(&self, mut node: usize) -> (Vec<JointVector>, usize) {
         let mut way = vec![self.nodes[node]];
         while self.parents[node] != node {
@@ -131,7 +132,7 @@ enum Extension {
     Stopped,
 }
 
-/// Looks for a way from the start to any of the goals, all of them free; `None` once the checks are used up.
+/// Searches a path from the start to any of the goals, all of them free; `None` when the checks are used up.
 pub(super) fn rrt_connect(
     checker: &mut Checker<'_>,
     samples: &Samples,
@@ -169,7 +170,7 @@ pub(super) fn rrt_connect(
             let (mut waypoints, _) = from_start.way_to_root(in_start);
             let (rest, goal_idx) = from_goals.way_to_root(in_goals);
             waypoints.reverse();
-            // Both ways hold the place where they met.
+            // Both paths contain their meeting point.
             waypoints.extend_from_slice(&rest[1..]);
             return Some(Found { waypoints, goal_idx });
         }

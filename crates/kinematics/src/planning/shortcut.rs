@@ -1,4 +1,4 @@
-//! Shorter ways: parts of a way that a straight motion can replace.
+//! Shorter paths: replaces parts of a path by straight motions.
 
 use rand::Rng;
 use rand_pcg::Pcg64Mcg;
@@ -7,24 +7,24 @@ use crate::collision::Checker;
 use crate::joints::JointVector;
 use crate::limits::JointLimits;
 
-/// About what a stop at a waypoint costs: braking from and accelerating to a good part of the full speed, s.
+/// Approximate time cost of a stop at a waypoint: braking from and accelerating to a large share of the full speed, s.
 const STOP_SECS: f64 = 0.15;
-/// A replacement that gains less than this is not worth its checks, s.
+/// Minimum gain of a replacement, s; smaller gains are not worth their checks.
 const MIN_GAIN_SECS: f64 = 0.01;
 
-/// About how long a way takes with a stop at every waypoint, at full speed, s.
+/// Approximate duration of a path with a stop at every waypoint, at full speed, s.
 pub(super) fn cost_secs(waypoints: &[JointVector], limits: &JointLimits) -> f64 {
     let motion_secs: f64 = waypoints.windows(2).map(|pair| motion_secs(&pair[0], &pair[1], limits)).sum();
     motion_secs + STOP_SECS * waypoints.len().saturating_sub(2) as f64
 }
 
-/// How long the slowest joint takes at its full speed, s.
+/// Duration of the slowest joint's motion at its full speed, s.
 pub(super) fn motion_secs(from: &JointVector, to: &JointVector, limits: &JointLimits) -> f64 {
     (to - from).abs().component_div(&limits.velocity_max).max()
 }
 
-/// Replaces parts of a way by straight motions as long as `attempts` last, first from waypoint to waypoint, then between random places; and
-/// moves waypoints.
+/// Replaces parts of a path by straight motions, with at most `attempts` attempts: first from waypoint to waypoint,
+/// then between random points; and moves waypoints.
 pub(super) fn shorten(
     checker: &mut Checker<'_>,
     limits: &JointLimits,
@@ -56,11 +56,12 @@ pub(super) fn shorten(
     }
 }
 
-/// Moves a random waypoint to a random place nearby where that makes the way quicker: past an edge it is pulled tight.
+/// Moves a random waypoint to a random point nearby if that makes the path quicker, which tightens the path around an
+/// edge.
 fn move_waypoint(checker: &mut Checker<'_>, limits: &JointLimits, waypoints: &mut [JointVector], rng: &mut Pcg64Mcg) {
-    /// How far a joint is moved at most, as the time that this takes at full speed, s.
+    /// Largest movement of a joint, as its duration at full speed, s.
     const MAX_MOVE_SECS: f64 = 0.3;
-    /// Places that are compared by cost; only the best is checked for collisions.
+    /// Number of points compared by cost; only the best is checked for collisions.
     const NUM_PLACES: usize = 16;
     if waypoints.len() <= 2 {
         return;
@@ -85,7 +86,7 @@ fn move_waypoint(checker: &mut Checker<'_>, limits: &JointLimits, waypoints: &mu
     }
 }
 
-/// From each waypoint straight to the last one that can be reached so.
+/// From each waypoint straight to the last waypoint that can be reached in this way.
 fn skip_waypoints(checker: &mut Checker<'_>, waypoints: &mut Vec<JointVector>) {
     let mut kept = vec![waypoints[0]];
     let mut at = 0;
@@ -100,7 +101,7 @@ fn skip_waypoints(checker: &mut Checker<'_>, waypoints: &mut Vec<JointVector>) {
     *waypoints = kept;
 }
 
-/// The motion that is under way after a time, by the waypoint that it starts from, and where the arm is then.
+/// The motion at a time, given by its start waypoint, and the configuration then.
 fn place(waypoints: &[JointVector], limits: &JointLimits, mut secs: f64) -> (usize, JointVector) {
     for (index, pair) in waypoints.windows(2).enumerate() {
         let duration_secs = motion_secs(&pair[0], &pair[1], limits);

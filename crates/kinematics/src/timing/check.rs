@@ -1,4 +1,4 @@
-//! Whether a motion keeps to its limits, all the way.
+//! Whether a motion satisfies its limits everywhere.
 
 use nalgebra::Vector3;
 
@@ -9,23 +9,23 @@ use crate::dynamics::{GRAVITY_M_S2, TcpMotion};
 use crate::joints::{JointVector, NUM_JOINTS};
 use crate::rounded_path::RoundedPath;
 
-/// The largest shares of their limits that a motion takes.
+/// The largest shares of the limits used by a motion.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Worst {
     velocity: f64,
     acceleration: f64,
     jerk: f64,
-    /// By how much time must be stretched for the torques.
+    /// The factor by which time must be stretched for the torques.
     torque_stretch: f64,
 }
 
-/// Violations below this are left to the stretching.
+/// Smaller violations are removed by stretching.
 const TOLERANCE: f64 = 5e-4;
-/// Limits are not lowered below this share of what they are.
+/// Limits are not lowered below this share of their values.
 const MIN_SHARE: f64 = 0.2;
 
 impl Worst {
-    /// Looks at a motion at places that are at most `max_secs` apart, and lowers the limits where it breaks one.
+    /// Checks a motion at points that are at most `max_secs` apart, and lowers the limits where it violates one.
     pub(super) fn of(
         path: &RoundedPath,
         profile: &Profile,
@@ -42,7 +42,7 @@ impl Worst {
         let times = places_in_time(path, profile, max_secs);
         for (index, &time) in times.iter().enumerate() {
             let at = profile.at(time);
-            // The jerk jumps at times of the list: both that of what comes before and that of what follows count.
+            // The jerk jumps at times of the list: its values before and after both count.
             let jerk_after = times.get(index + 1).map_or(0.0, |next| profile.at(0.5 * (time + next)).jerk);
             let point = path.at(at.s);
             let qd = point.dq * at.velocity;
@@ -98,18 +98,19 @@ impl Worst {
         self.velocity.max(self.acceleration.sqrt()).max(self.jerk.cbrt()).max(self.torque_stretch)
     }
 
-    /// Whether the acceleration jumps from one side to the other too quickly.
+    /// Whether the change of the acceleration from one side to the other is too quick.
     pub(super) fn is_jump(&self) -> bool {
         self.jerk > JUMP_JERK
     }
 }
 
-/// Corners add less than this to the jerk of an acceleration that begins or ends, as a share of the limit; a jump from one side to the other has twice the limit.
+/// Corners add less than this to the jerk of a starting or ending acceleration, as a share of the limit; a change from
+/// one side to the other has twice the limit.
 const JUMP_JERK: f64 = 1.3;
 
 /// Times at most `max_secs` apart, among them those just before and after the third derivative of the path or the jerk of the profile jumps.
 fn places_in_time(path: &RoundedPath, profile: &Profile, max_secs: f64) -> Vec<f64> {
-    /// How near to a jump of the third derivative it is looked at, s.
+    /// Distance from a jump of the third derivative at which it is evaluated, s.
     const BESIDE_SECS: f64 = 1e-7;
     let mut times = profile.times(max_secs);
     for piece in path.pieces().iter().filter(|piece| !piece.is_straight()) {
@@ -136,7 +137,7 @@ fn tcp_shares(limits: &MotionLimits<'_>, tcp: &TcpMotion) -> [f64; 2] {
     ]
 }
 
-/// By differences over the time between two places.
+/// By differences over the time between two points.
 fn tcp_jerk_share(limits: &MotionLimits<'_>, before: &TcpMotion, now: &TcpMotion, secs: f64) -> f64 {
     if secs < MIN_DIFFERENCE_SECS {
         return 0.0;
@@ -146,12 +147,12 @@ fn tcp_jerk_share(limits: &MotionLimits<'_>, before: &TcpMotion, now: &TcpMotion
         .max(rate(&before.angular_acceleration, &now.angular_acceleration) / limits.cartesian.angular_jerk_rad_s3)
 }
 
-/// Places that are nearer to each other in time give differences of nothing but rounding.
+/// Points closer together in time give differences of rounding errors only.
 const MIN_DIFFERENCE_SECS: f64 = 1e-6;
 
-/// By how much time must be stretched for the torques at one place; 1 where they are within their limits.
+/// The factor by which time must be stretched for the torques at one point; 1 if they are within their limits.
 fn torque_stretch(limits: &MotionLimits<'_>, q: &JointVector, qd: &JointVector, torques: &JointVector) -> f64 {
-    /// The step in which the stretching is sought, and the most of it.
+    /// The step of the search for the stretching, and its maximum.
     const STEP: f64 = 1.002;
     const MAX_STRETCH: f64 = 10.0;
     let friction = limits.dynamics.damping().component_mul(qd);

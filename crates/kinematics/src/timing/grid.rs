@@ -1,4 +1,4 @@
-//! Limits along a path, as linear constraints on s̈ and ṡ² at places of it.
+//! Limits along a path, as linear constraints on s̈ and ṡ² at points of it.
 //!
 //! With `q̈ = q' s̈ + q'' ṡ²` accelerations are linear in (s̈, ṡ²), and so are torques without friction:
 //! `τ = M q' s̈ + (M q'' + C(q, q') q') ṡ² + g`. Speeds bound ṡ² alone.
@@ -10,17 +10,17 @@ use crate::joints::{JointVector, NUM_JOINTS};
 use crate::path::PathPoint;
 use crate::rounded_path::RoundedPath;
 
-/// The longest part of a piece, s at full speed, and the fewest parts.
+/// The longest part of a piece, s at full speed, and the minimum number of parts.
 const MAX_PART: f64 = 0.025;
 const MIN_CORNER_PARTS: usize = 32;
 const MIN_STRAIGHT_PARTS: usize = 6;
 /// Share of the jerk limits that the path's third derivative may take.
 const CURVATURE_JERK_SHARE: f64 = 0.9;
 
-/// Bounds ṡ where all joints turn back at once and nothing else does.
+/// Bounds ṡ where all joints reverse at once and no other limit applies.
 const MAX_SPEED: f64 = 100.0;
 
-/// `low ≤ slope · s̈ + curvature · ṡ² ≤ high` at one place.
+/// `low ≤ slope · s̈ + curvature · ṡ² ≤ high` at one point.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Row {
     pub(super) slope: f64,
@@ -34,25 +34,25 @@ pub(super) const NUM_ROWS: usize = 2 * NUM_JOINTS;
 
 #[derive(Debug, Clone)]
 pub(super) struct Place {
-    /// Where on the path.
+    /// Position on the path.
     pub(super) s: f64,
     pub(super) rows: [Row; NUM_ROWS],
-    /// The most that ṡ² may be, by the speeds of joints and tcp and by the path's third derivative.
+    /// Upper bound of ṡ² by the speeds of joints and tcp and by the path's third derivative.
     pub(super) max_squared: f64,
 }
 
-/// Places along a path, the first at its start, the last at its end.
+/// Points along a path, the first at its start, the last at its end.
 #[derive(Debug, Clone)]
 pub(super) struct Grid {
     pub(super) places: Vec<Place>,
 }
 
-/// Limits that are lowered on parts of the path, where a pass broke them.
+/// Limits lowered on parts of the path where a pass violated them.
 #[derive(Debug, Clone)]
 pub(super) struct Tightening {
-    /// Share of accelerations and torques that is left between a place and the next.
+    /// Remaining share of accelerations and torques between a point and the next.
     pub(super) shares: Vec<f64>,
-    /// The most that ṡ² may be at a place.
+    /// Upper bound of ṡ² at a point.
     pub(super) max_squared: Vec<f64>,
 }
 
@@ -61,7 +61,7 @@ impl Grid {
         Self::finer(path, limits, 1)
     }
 
-    /// As [`Grid::new`] with so many times the parts.
+    /// As [`Grid::new`] with this many times the parts.
     pub(super) fn finer(path: &RoundedPath, limits: &MotionLimits<'_>, times: usize) -> Result<Self, KinematicsError> {
         let mut places: Vec<Place> = Vec::new();
         for piece in path.pieces() {
@@ -87,7 +87,7 @@ impl Place {
         let PathPoint { q, dq, ddq, dddq } = point;
         let placed = dynamics.placed(q);
         let zero = JointVector::zeros();
-        // As accelerations from rest, q' gives M q' and the tcp's J q'.
+        // Treated as accelerations from rest, q' gives M q' and the tcp's J q'.
         let (torque_slope, tcp) = dynamics.of_motion(&placed, &zero, dq, 0.0);
         let (torque_curvature, _) = dynamics.of_motion(&placed, dq, ddq, 0.0);
         let (gravity, _) = dynamics.of_motion(&placed, &zero, &zero, GRAVITY_M_S2);
@@ -124,7 +124,7 @@ impl Place {
 }
 
 impl Tightening {
-    /// The limits as they are.
+    /// The unchanged limits.
     pub(super) fn none(grid: &Grid) -> Self {
         Self {
             shares: vec![1.0; grid.places.len() - 1],

@@ -3,7 +3,7 @@
 use crate::dynamics::ArmDynamics;
 use crate::limits::{CartesianLimits, JointLimits};
 
-/// What a motion along a rounded path keeps to.
+/// The limits of a motion along a rounded path.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct MotionLimits<'a> {
     pub(crate) joints: &'a JointLimits,

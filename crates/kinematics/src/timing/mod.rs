@@ -1,4 +1,4 @@
-//! The quickest way in time along a rounded path: `s(t)` from rest to rest within all limits.
+//! The quickest timing along a rounded path: `s(t)` from rest to rest within all limits.
 //!
 //! ```text
 //! path ──► grid of linear constraints on (s̈, ṡ²) ──► backward and forward pass ──► mean over a window ──► stretched until all holds
@@ -6,10 +6,11 @@
 //!               └──────────────── limits lowered where the mean breaks one ◄─────────────┘
 //! ```
 //!
-//! Without a limit of the jerk the time optimum along a path is known up to its grid (phase_plane.rs). s̈ jumps there. Its mean over a window of time
-//! that moves along (profile.rs) has jerks of at most the jump over the window's length, stays on the path, and takes longer by that length alone:
-//! 2 or 4 ms with Franka's limits. What the mean breaks, in corners above all, is repaired by lowering the limits there and passing again; what
-//! is left by stretching the time of the whole motion.
+//! Without a jerk limit the time optimum along a path is known up to its grid (phase_plane.rs). s̈ has jumps there. Its
+//! mean over a moving time window (profile.rs) has jerks of at most the jump divided by the window's length, stays on
+//! the path, and takes longer only by that length: 2 or 4 ms with Franka's limits. Limits that the mean violates,
+//! mainly in corners, are lowered there for another pass; remaining violations are removed by stretching the time of
+//! the whole motion.
 
 mod check;
 mod grid;
@@ -29,37 +30,37 @@ use crate::rounded_path::RoundedPath;
 #[derive(Debug, Clone)]
 pub(crate) struct Timing {
     pub(crate) profile: Profile,
-    /// Time of the motion over that of the profile.
+    /// Time of the motion divided by that of the profile.
     pub(crate) stretch: f64,
-    /// The time optimum without a limit of the jerk, s.
+    /// The time optimum without a jerk limit, s.
     pub(crate) jerkless_secs: f64,
 }
 
-/// Passes with lowered limits; most motions need three or four.
+/// Maximum number of passes with lowered limits; most motions need three or four.
 const MAX_PASSES: usize = 6;
-/// Limits that are broken by less than this share are left to the stretching.
+/// Limits violated by less than this share are left to the stretching.
 const TOLERANCE: f64 = 1e-3;
-/// Longest time between places that are checked, s.
+/// Longest time between checked points, s.
 const COARSE_SECS: f64 = 4e-3;
 const FINE_SECS: f64 = 1e-3;
-/// Room between the checked maximum and the limit, for what lies between places that are checked.
+/// Margin between the checked maximum and the limit, for values between checked points.
 const HEADROOM: f64 = 1.0005;
 
-/// Times a path.
+/// Computes the timing of a path.
 ///
 /// # Errors
-/// [`KinematicsError::Trajectory`] where the arm cannot hold its own weight and load on the path.
+/// [`KinematicsError::Trajectory`] if the arm cannot hold its own weight and load on the path.
 pub(crate) fn time(path: &RoundedPath, limits: &MotionLimits<'_>) -> Result<Timing, KinematicsError> {
     let grid = Grid::new(path, limits)?;
     let mut tightening = Tightening::none(&grid);
     let ramp_secs = limits.joints.acceleration_max.component_div(&limits.joints.jerk_max).max();
-    // From nothing to the full acceleration; twice as long where it jumps from one side to the other.
+    // From zero to the full acceleration; twice as long for a change from one side to the other.
     let mut window_secs = ramp_secs;
     let mut jerkless_secs = None;
     let mut best: Option<(f64, Profile)> = None;
     for _ in 0..MAX_PASSES {
         let phases = match phase_plane::fastest(&grid, &tightening) {
-            // A motion within lowered limits is for a better one, not for any.
+            // A motion within lowered limits is only used if it is better.
             Err(_) if best.is_some() => break,
             phases => phases?,
         };

@@ -1,7 +1,7 @@
-//! The time optimum along a path without a limit of the jerk.
+//! The time optimum along a path without a jerk limit.
 //!
-//! Backwards from rest at the end: at each place the largest ṡ² from which the end can be reached. Forwards from rest at the start: always the
-//! largest s̈ that stays below. Constraints hold at both ends of a part.
+//! Backwards from rest at the end: at each point the largest ṡ² from which the end can be reached. Forwards from rest
+//! at the start: always the largest s̈ that stays below it. Constraints hold at both ends of a part.
 //!
 //! # Source
 //! H. Pham, Q.-C. Pham, "A new approach to time-optimal path parameterization based on reachability analysis", IEEE Transactions on Robotics 2018.
@@ -14,11 +14,11 @@ use crate::error::KinematicsError;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Phase {
     pub(super) length: f64,
-    /// ṡ where it begins and where it ends.
+    /// ṡ at its start and its end.
     pub(super) speeds: [f64; 2],
 }
 
-/// Constraints between a place and the next: those of both ends, and what the next one allows.
+/// Constraints between a point and the next: those of both ends, and those that the next one allows.
 struct Part {
     rows: [Row; 2 * NUM_ROWS + 1],
     length: f64,
@@ -29,14 +29,14 @@ type Bound = (f64, f64);
 
 /// Smaller slopes bound ṡ² alone.
 const FLAT: f64 = 1e-9;
-/// Intervals of s̈ that are empty by less are single values.
+/// Empty intervals of s̈ smaller than this count as single values.
 const ROUNDING: f64 = 1e-10;
 const MAX_STEPS: usize = 60;
 
 /// The fastest phases from rest to rest.
 ///
 /// # Errors
-/// [`KinematicsError::Trajectory`] where the arm cannot leave a place.
+/// [`KinematicsError::Trajectory`] if the arm cannot leave a point.
 pub(super) fn fastest(grid: &Grid, tightening: &Tightening) -> Result<Vec<Phase>, KinematicsError> {
     let num_parts = grid.places.len() - 1;
     let mut parts: Vec<Part> = (0..num_parts).map(|index| Part::new(grid, index, tightening.shares[index])).collect();
@@ -80,12 +80,12 @@ impl Part {
         Self { rows, length }
     }
 
-    /// ṡ² at the end is at most this.
+    /// Upper bound of ṡ² at the end.
     fn end_below(&mut self, squared: f64) {
         self.rows[2 * NUM_ROWS].high = squared;
     }
 
-    /// The bounds on s̈ at a ṡ², low and high, and the most that rows allow that bound ṡ² alone.
+    /// The bounds on s̈ at a ṡ², low and high, and the maximum allowed by the rows that bound ṡ² alone.
     fn bounds(&self, squared: f64) -> ([Bound; 2], f64) {
         let (mut low, mut high) = ((f64::NEG_INFINITY, 0.0), (f64::INFINITY, 0.0));
         let mut most = f64::INFINITY;
@@ -110,7 +110,7 @@ impl Part {
         ([low, high], most)
     }
 
-    /// The largest ṡ² up to `most` for which some s̈ keeps to all rows.
+    /// The largest ṡ² up to `most` for which some s̈ satisfies all rows.
     fn largest_squared(&self, most: f64) -> f64 {
         let mut squared = most.min(self.bounds(0.0).1);
         for _ in 0..MAX_STEPS {
@@ -119,7 +119,7 @@ impl Part {
             if gap >= -ROUNDING {
                 return squared;
             }
-            // The gap is concave: its tangent meets zero no earlier than it does itself.
+            // The gap is concave: its tangent reaches zero no earlier than the gap itself.
             let rate = high.1 - low.1;
             if rate >= 0.0 {
                 return 0.0;

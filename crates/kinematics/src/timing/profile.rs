@@ -1,7 +1,7 @@
-//! `s(t)` whose second derivative is the mean of a piecewise constant one over a window of time.
+//! `s(t)` whose second derivative is the moving average of a piecewise constant one over a time window.
 //!
-//! With P the integral of the piecewise quadratic s₀ and w the window's length, the mean is `s(t) = (P(t) - P(t - w)) / w`, its derivatives
-//! likewise by s₀, ṡ₀ and s̈₀: exact, and continuous up to s̈.
+//! With P the integral of the piecewise quadratic s₀ and w the window's length, the average is `s(t) = (P(t) - P(t -
+//! w)) / w`, its derivatives likewise by s₀, ṡ₀ and s̈₀: exact, and continuous up to s̈.
 
 use super::phase_plane::Phase;
 
@@ -21,19 +21,19 @@ pub(crate) struct Profile {
     window_secs: f64,
 }
 
-/// Where a phase of constant s̈ begins.
+/// The start of a phase of constant s̈.
 #[derive(Debug, Clone, Copy)]
 struct Knot {
     time: f64,
     s: f64,
     velocity: f64,
     acceleration: f64,
-    /// Integral of s until here.
+    /// Integral of s up to here.
     integral: f64,
 }
 
 impl Knot {
-    /// The integral of s, s, ṡ and s̈ so long after the knot.
+    /// The integral of s, s, ṡ and s̈ at this time after the knot.
     fn after(&self, secs: f64) -> [f64; 4] {
         let Self { s, velocity, acceleration, integral, .. } = *self;
         [
@@ -65,7 +65,7 @@ impl Profile {
         self.knots[self.knots.len() - 1].time + self.window_secs
     }
 
-    /// Before the start and after the end it rests.
+    /// Before the start and after the end it is at rest.
     pub(crate) fn at(&self, time: f64) -> Progress {
         let [integral, s, velocity, acceleration] = self.before_mean(time);
         let [integral_before, s_before, velocity_before, acceleration_before] =
@@ -79,7 +79,7 @@ impl Profile {
         }
     }
 
-    /// Times between which the jerk is constant, cut so that none are further apart than `max_secs`.
+    /// Times between which the jerk is constant, divided so that none are further apart than `max_secs`.
     pub(super) fn times(&self, max_secs: f64) -> Vec<f64> {
         let mut jumps: Vec<f64> =
             self.knots.iter().flat_map(|knot| [knot.time, knot.time + self.window_secs]).collect();
@@ -93,9 +93,9 @@ impl Profile {
         times
     }
 
-    /// When `s` is reached.
+    /// The time at which `s` is reached.
     pub(super) fn time_at(&self, s: f64) -> f64 {
-        /// Halvings of a motion's time: to less than a nanosecond of a minute.
+        /// Number of bisections of a motion's time: an error of less than a nanosecond per minute.
         const NUM_HALVINGS: usize = 40;
         let (mut before, mut after) = (0.0, self.duration_secs());
         for _ in 0..NUM_HALVINGS {
@@ -109,7 +109,7 @@ impl Profile {
         before
     }
 
-    /// The phases that the mean at a time is taken of, by number.
+    /// The phases in the average at a time, by index.
     pub(super) fn phases_at(&self, time: f64) -> std::ops::RangeInclusive<usize> {
         let last = self.knots.len() - 2;
         self.index(time - self.window_secs).min(last)..=self.index(time).min(last)

@@ -10,7 +10,7 @@ use crate::rounded_path::length_secs;
 use crate::test_poses::random_configuration;
 use crate::trajectory::Trajectory;
 
-/// Through random configurations, corners a share of what there is room for.
+/// Through random configurations, with corners of a share of the available space.
 fn random_path(rng: &mut Pcg64Mcg, share: f64) -> RoundedPath {
     let num_waypoints = rng.random_range(2..=6);
     let reach = rng.random_range(0.05..1.0);
@@ -64,7 +64,7 @@ fn one_joint_alone_takes_the_time_of_the_textbook() {
     )
     .unwrap();
     let expected = 2.0 / 2.175 + 2.175 / 15.0 + 15.0 / 7500.0;
-    // The grid's last part before full speed, and the headroom.
+    // The grid's last part before full speed, and the margin.
     assert!((motion.duration_secs() / expected - 1.0).abs() < 2e-3, "{} of {expected}", motion.duration_secs());
 }
 
@@ -167,7 +167,8 @@ fn a_pass_keeps_its_rows_and_leaves_no_room() {
             }
             num_slack += usize::from(room > 0.01);
         }
-        // Some limit binds everywhere but for a part where the two passes meet and one before each place that bounds the speed.
+        // Some limit is reached everywhere except on the part where the two passes meet and on one before each point
+        // that bounds the speed.
         assert!(num_slack * 8 < phases.len(), "{num_slack} of {}", phases.len());
         let slowest_joint: f64 = length_secs(path.start(), path.end());
         assert!(secs > slowest_joint, "nothing is quicker than full speed all the way");

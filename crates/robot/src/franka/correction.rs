@@ -1,4 +1,4 @@
-//! A difference between the robot's reference and the trajectory, led back to zero along a quintic.
+//! Returns a difference between the robot's reference and the trajectory to zero along a quintic.
 
 use std::ops::Sub;
 
@@ -7,16 +7,17 @@ use sdg_kinematics::{JointVector, NUM_JOINTS};
 
 use crate::arm_state::PERIOD_SECS;
 
-/// The shortest correction, s: ten times as long as the losses that it must converge under; each longer one takes twice as long.
+/// The shortest correction, s: ten times as long as the command losses for which it must converge; each longer one
+/// takes twice as long.
 const SHORTEST_SECS: f64 = 0.2;
 const MAX_DOUBLINGS: i32 = 2;
-/// A correction takes long enough that it needs at most this share of the acceleration's and the jerk's limits, beside what the
-/// trajectory itself needs (0.4 and 0.2 of them at most).
+/// Largest share of the acceleration and jerk limits used by a correction, in addition to the trajectory (which uses at
+/// most 0.4 and 0.2 of them).
 const SHARE: f64 = 0.3;
-/// At so many times, evenly spread, a correction is compared with that.
+/// Number of evenly spaced times at which a correction is compared with these limits.
 const NUM_SAMPLES: u32 = 20;
 
-/// A reference, or the difference of two; derivatives are differences over a cycle, as the robot makes them.
+/// A reference, or the difference of two; derivatives are differences over a cycle, as the robot computes them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Deviation {
     /// rad.
@@ -35,7 +36,7 @@ impl Sub for Deviation {
     }
 }
 
-/// A deviation on its way to zero: `x(u) = (c0 + c1 u + c2 u²) (1 - u)³` with `u` from 0 to 1, at rest at its end.
+/// A deviation that decreases to zero: `x(u) = (c0 + c1 u + c2 u²) (1 - u)³` with `u` from 0 to 1, at rest at its end.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Correction {
     coefficients: [JointVector; 3],
@@ -44,7 +45,7 @@ pub(super) struct Correction {
 }
 
 impl Correction {
-    /// Begins at a deviation; as short as the limits allow.
+    /// Starts at a deviation; as short as the limits allow.
     pub(super) fn new(deviation: Deviation, limits: &Limits) -> Self {
         let lasting = |doublings| Self::lasting(&deviation, SHORTEST_SECS * 2_f64.powi(doublings));
         let longest = lasting(MAX_DOUBLINGS);
@@ -52,7 +53,7 @@ impl Correction {
     }
 
     fn lasting(deviation: &Deviation, duration_secs: f64) -> Self {
-        // A difference over the last cycle tells the velocity of half a cycle ago.
+        // A difference over the last cycle is the velocity of half a cycle ago.
         let velocity = deviation.dq + deviation.ddq * (0.5 * PERIOD_SECS);
         let (dx, ddx) = (velocity * duration_secs, deviation.ddq * (duration_secs * duration_secs));
         // The product's derivatives at 0 are those of the deviation.
@@ -74,12 +75,12 @@ impl Correction {
         (c0 + c1 * u + c2 * (u * u)) * (1.0 - u).powi(3)
     }
 
-    /// Whether acceleration and jerk are small beside the limits; what a deviation begins with cannot be helped.
+    /// Whether acceleration and jerk are small beside the limits; the initial values of a deviation cannot be changed.
     fn keeps_to(&self, deviation: &Deviation, limits: &Limits) -> bool {
         let step = 1.0 / f64::from(NUM_SAMPLES);
         let step_secs = step * self.duration_secs;
         let mut before = deviation.ddq;
-        // Second differences of samples stand for accelerations in their middle.
+        // Second differences of samples approximate accelerations at their centre.
         (1..NUM_SAMPLES).all(|sample| {
             let u = f64::from(sample) * step;
             let bend = self.at(u + step) - self.at(u) * 2.0 + self.at(u - step);
@@ -115,7 +116,7 @@ mod tests {
             let differences =
                 |values: &[f64]| values.windows(2).map(|pair| (pair[1] - pair[0]) / PERIOD_SECS).collect::<Vec<f64>>();
             let accelerations = differences(&differences(&positions));
-            // As it went on before: no more than a jerk's worth of a cycle.
+            // A continuation of the previous motion: a difference of at most one cycle's jerk.
             assert!((accelerations[0] - ddq).abs() < 1.5, "{} {ddq}", accelerations[0]);
             let hardest = accelerations.iter().fold(0.0_f64, |max, value| max.max(value.abs()));
             assert!(hardest <= ddq.abs().max(0.3 * 7.5) + 1.0, "{hardest} for {q} {dq} {ddq}");

@@ -1,11 +1,12 @@
-//! The commands of a motion, for a robot that may have lost some of them.
+//! The commands of a motion, for a robot that may lose some of them.
 //!
 //! ```text
-//! robot's time since the last state ─ Playback ─ where the trajectory is at that time ──────────┐
-//! state: q_d, dq_d, ddq_d ─ not what was sent last? ─ the difference, led back to zero smoothly ┴ sum ─ rate limit ─ command
+//! robot's time since the last state ─ Playback ─ the trajectory's position at that time ─┐
+//! state: q_d, dq_d, ddq_d ─ difference from the last command, reduced to zero smoothly ──┴ sum ─ rate limit ─ command
 //! ```
-//! A command that comes too late is lost, and the robot goes on without it at constant acceleration. The trajectory goes on by the
-//! robot's time, and the next command must lead from where the robot went back to where the trajectory is by then.
+//! A command that comes too late is lost, and the robot continues without it at constant acceleration. The trajectory
+//! continues by the robot's time, and the next command must lead from the robot's position back to the trajectory's
+//! position at that time.
 
 use sdg_fci::Limits;
 use sdg_fci::client::limit_joint_positions;
@@ -16,20 +17,21 @@ use super::correction::{Correction, Deviation};
 use crate::arm_state::PERIOD_SECS;
 use crate::playback::Playback;
 
-/// A reference that differs from the last command by less is that command, rad: version 10 has single precision.
+/// A reference within this of the last command equals that command, rad: version 10 of the protocol has single
+/// precision.
 const SAME_RAD_V5: f64 = 1e-10;
 const SAME_RAD_V10: f64 = 5e-7;
 /// A reference slower than this is at rest, rad/s and rad/s².
 const STANDING_RAD_S: f64 = 1e-4;
 const STANDING_RAD_S2: f64 = 0.05;
-/// So near to the motion's end it has arrived, rad: at the tcp, a hundredth of a millimetre.
+/// Within this distance of the motion's end it has arrived, rad: at the tcp, a hundredth of a millimetre.
 const ARRIVED_RAD: f64 = 1e-5;
-/// A robot that goes on for 19 cycles without commands is less than 0.01 rad beside its trajectory. A reference that is further off
-/// is a mistake of the state that tells it, and no robot can be led back from there.
+/// A robot that continues for 19 cycles without commands is less than 0.01 rad from its trajectory. A reference further
+/// away is an error of the reported state, and no robot can be led back from there.
 const MAX_DEVIATION_RAD: f64 = 0.1;
 /// A robot that was silent for longer has left the motion.
 const MAX_ELAPSED_MS: u64 = 1000;
-/// So many cycles after its end a motion is ended, wherever the robot says that its reference is.
+/// Number of cycles after its end at which a motion is finished, for any reported reference.
 const MAX_CYCLES_AFTER_END: u32 = 2000;
 
 /// A motion's next command.
@@ -37,7 +39,7 @@ const MAX_CYCLES_AFTER_END: u32 = 2000;
 pub(super) enum Next {
     /// Joint positions, rad.
     Position(JointVector),
-    /// The last ones: the robot's reference stands there.
+    /// The last positions: the robot's reference is at rest there.
     Last(JointVector),
 }
 
@@ -56,7 +58,7 @@ pub(super) struct Follower<'a> {
 }
 
 impl<'a> Follower<'a> {
-    /// Begins at the trajectory's start, with the limits of the robot that speaks this version.
+    /// Starts at the trajectory's start, with the limits of the robot for this protocol version.
     pub(super) fn new(playback: Playback<'a>, version: Version) -> Self {
         let start = *playback.start();
         let same_rad = match version {
@@ -75,21 +77,21 @@ impl<'a> Follower<'a> {
         }
     }
 
-    /// Begins a controlled stop on the path.
+    /// Starts a controlled stop on the path.
     pub(super) fn stop(&mut self) {
         self.playback.stop();
     }
 
-    /// How often the robot was elsewhere than it was commanded to be.
+    /// Number of times at which the robot was not at its commanded position.
     #[cfg(test)]
     pub(super) fn num_corrections(&self) -> u32 {
         self.num_corrections
     }
 
-    /// The answer to a state that is so many milliseconds younger than the last one (0 at first).
+    /// The answer to a state that is this many milliseconds younger than the last one (0 for the first).
     pub(super) fn next(&mut self, state: &RobotState, elapsed_ms: u64) -> Next {
         let mut is_over = false;
-        // The trajectory was asked for the time of the cycle after the last state.
+        // The trajectory was evaluated at the time of the cycle after the last state.
         for _ in 1..elapsed_ms.min(MAX_ELAPSED_MS) {
             is_over |= self.advance();
         }
@@ -111,14 +113,14 @@ impl<'a> Follower<'a> {
             self.correction = None;
         }
         let wanted = self.trajectory[0] + offset.unwrap_or_else(JointVector::zeros);
-        // From a reference that cannot be, nothing can be limited; the motion goes on as it was.
+        // From an impossible reference no limits can be applied; the motion continues unchanged.
         let limited = match is_credible {
             true => JointVector::from(limit_joint_positions(self.limits, state, &wanted.into())),
             false => wanted,
         };
-        // Rounding is no limit.
+        // Rounding does not count as limiting.
         let command = if (limited - wanted).amax() < 1e-12 { wanted } else { limited };
-        // What was held back is seen as a difference in the next cycle.
+        // The withheld part appears as a difference in the next cycle.
         self.sent = (command == wanted).then_some(command);
         self.cycles_after_end = if is_over { self.cycles_after_end + 1 } else { 0 };
         let is_standing = reference.dq.amax() < STANDING_RAD_S && reference.ddq.amax() < STANDING_RAD_S2;
@@ -129,14 +131,14 @@ impl<'a> Follower<'a> {
         Next::Position(command)
     }
 
-    /// Whether the robot can be where a state tells.
+    /// Whether the reported state is possible for the robot.
     fn is_credible(&self, reference: &Deviation) -> bool {
         let [newest, ..] = self.trajectory;
         let is_near = (reference.q - newest).iter().all(|apart| apart.abs() <= MAX_DEVIATION_RAD);
         is_near && reference.dq.iter().chain(&reference.ddq).all(|value| value.is_finite())
     }
 
-    /// One cycle on along the trajectory; whether it has ended.
+    /// Advances one cycle along the trajectory; returns whether it has ended.
     fn advance(&mut self) -> bool {
         let [newest, second, _] = self.trajectory;
         let next = self.playback.next_reference();
@@ -144,7 +146,7 @@ impl<'a> Follower<'a> {
         next.is_none()
     }
 
-    /// The trajectory as the robot sees it: derivatives are differences over a cycle.
+    /// The trajectory in the robot's terms: derivatives are differences over a cycle.
     fn on_trajectory(&self) -> Deviation {
         let [q, before, earlier] = self.trajectory;
         let (dq, dq_before) = ((q - before) / PERIOD_SECS, (before - earlier) / PERIOD_SECS);

@@ -1,4 +1,4 @@
-//! The hand, whose calls block, beside the arm's loop.
+//! The hand, whose calls block, in parallel with the arm's loop.
 
 use std::thread::JoinHandle;
 
@@ -8,7 +8,7 @@ use crate::arm_state::{GRASP_TOLERANCE_M, HandCommand, HandState, MIN_HELD_WIDTH
 use crate::error::{Result, RobotError};
 use crate::robot_address::RobotAddress;
 
-/// A hand that stands still, or moves in a thread.
+/// A hand at rest, or one that moves in a thread.
 #[derive(Debug)]
 pub(super) struct HandWorker {
     hand: Option<Hand>,
@@ -21,7 +21,7 @@ impl HandWorker {
         Self { stop: hand.stop_handle(), hand: Some(hand), running: None }
     }
 
-    /// Begins a motion; one that runs is waited for.
+    /// Starts a motion, after waiting for a running one.
     pub(super) fn start(&mut self, command: HandCommand) -> Result<()> {
         self.finish()?;
         let mut hand = self.hand.take().ok_or_else(gone)?;
@@ -36,14 +36,14 @@ impl HandWorker {
         self.running.as_ref().is_some_and(|running| !running.is_finished())
     }
 
-    /// Stops the fingers where they move; what they hold stays held.
+    /// Stops the fingers where they are; a held part stays held.
     pub(super) fn stop_motion(&self) {
         if self.is_moving() {
             self.stop();
         }
     }
 
-    /// Waits for the motion that runs.
+    /// Waits for the running motion.
     pub(super) fn finish(&mut self) -> Result<()> {
         let Some(running) = self.running.take() else { return Ok(()) };
         let (hand, done) = running.join().map_err(|_| gone())?;
@@ -53,7 +53,7 @@ impl HandWorker {
 
     /// Stops the fingers; a call that waits for them returns.
     pub(super) fn stop(&self) {
-        // A hand that is gone does not move either.
+        // A hand that cannot be reached does not move either.
         let _ = self.stop.stop();
     }
 
@@ -82,12 +82,12 @@ fn execute(hand: &mut Hand, command: HandCommand) -> Result<()> {
     match command {
         HandCommand::Move { opening_m, speed_m_s } => match hand.move_to(opening_m, speed_m_s).map_err(failed)? {
             true => Ok(()),
-            false => Err(RobotError::Hand(format!("it did not come to {:.0} mm", opening_m * 1e3))),
+            false => Err(RobotError::Hand(format!("it did not reach {:.0} mm", opening_m * 1e3))),
         },
         HandCommand::Grasp { width_m, speed_m_s, force_n } => {
             let [thinner_m, wider_m] = GRASP_TOLERANCE_M;
             let thinner_m = thinner_m.min(width_m - MIN_HELD_WIDTH_M).max(0.0);
-            // Fingers that closed on nothing are no failure of the hand: its width says so.
+            // Fingers that closed on nothing are not a failure of the hand: its width shows it.
             hand.grasp(width_m, speed_m_s, force_n, thinner_m, wider_m).map(drop).map_err(failed)
         }
     }

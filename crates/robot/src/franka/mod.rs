@@ -5,7 +5,7 @@
 //!                    ▲           ▲ where the robot's reference is, after commands that were lost
 //!                    └ Watch sees every state, and may stop the motion on its path
 //! ```
-//! Tried against the simulated Panda of `sdg-fci`'s server, never on hardware.
+//! Tested against the simulated Panda of `sdg-fci`'s server, never on hardware.
 
 mod correction;
 mod follower;
@@ -34,15 +34,15 @@ use follower::{Follower, Next};
 use hand_worker::HandWorker;
 pub use real_time::{Scheduling, check_real_time};
 
-/// Bounds every wait for the robot. A real one stops by itself after 20 ms; a server in lockstep waits a second for a packet that was
-/// lost, and then goes on.
+/// Limits every wait for the robot. A real one stops by itself after 20 ms; a server in lockstep waits a second for a
+/// lost packet and then continues.
 const TIMEOUT: Duration = Duration::from_secs(3);
 /// External torques (N·m) and forces (N, N·m) at which the arm stops in free motion.
 const FREE_TORQUE_NM: [f64; 7] = [20.0, 20.0, 18.0, 18.0, 16.0, 14.0, 12.0];
 const FREE_FORCE: [f64; 6] = [20.0, 20.0, 20.0, 25.0, 25.0, 25.0];
-/// With the part, and where the table may push back, twice as much.
+/// Twice as much with the part, and where the table may exert forces.
 const CONTACT_FACTOR: f64 = 2.0;
-/// Radius of the ball whose inertia a load is given, m.
+/// Radius of the ball that determines a load's inertia, m.
 const LOAD_RADIUS_M: f64 = 0.03;
 
 /// A Franka arm, connected.
@@ -60,8 +60,8 @@ impl FrankaArm {
     /// Connects to arm and hand.
     ///
     /// # Errors
-    /// [`RobotError::Unreachable`] where one of them does not answer, [`RobotError::Device`] for another version of the protocol, [`RobotError::Configuration`] where the kernel refuses the real-time
-    /// scheduling that was asked for.
+    /// [`RobotError::Unreachable`] if one of them does not answer, [`RobotError::Device`] for another version of the
+    /// protocol, [`RobotError::Configuration`] if the kernel refuses the requested real-time scheduling.
     pub fn connect(address: &RobotAddress, scheduling: Scheduling) -> Result<Self> {
         if scheduling == Scheduling::RealTime {
             check_real_time()?;
@@ -75,7 +75,8 @@ impl FrankaArm {
         Ok(Self { geometry, robot, hand, address: address.clone(), scheduling, sensitivity: None })
     }
 
-    /// Refuses a robot of another model than the workcell's file says: the limits that motions are checked with would be another's.
+    /// Refuses a robot of another model than the workcell's file names: the limits for checking motions would belong to
+    /// another robot.
     ///
     /// # Errors
     /// [`RobotError::Configuration`].
@@ -91,7 +92,7 @@ impl FrankaArm {
         })
     }
 
-    /// Finds the fingers' range: once after the hand was switched on.
+    /// Finds the fingers' range; needed once after the hand was switched on.
     ///
     /// # Errors
     /// [`RobotError::Hand`].
@@ -113,7 +114,7 @@ impl FrankaArm {
         }
     }
 
-    /// Runs a control loop, in a thread of its own where it is scheduled in real time.
+    /// Runs a control loop, in its own thread if it is scheduled in real time.
     fn in_control<T: Send>(&mut self, control: impl FnOnce(&mut Self) -> Result<T> + Send) -> Result<T> {
         let ended = match self.scheduling {
             Scheduling::Ordinary => control(self),
@@ -126,7 +127,7 @@ impl FrankaArm {
             }),
         };
         if ended.is_err() {
-            // The fingers may have been opening on the way.
+            // The fingers may have been opening during the motion.
             self.hand.stop_motion();
         }
         ended
@@ -153,7 +154,7 @@ impl FrankaArm {
         }
     }
 
-    /// The loop of coming down.
+    /// The loop of a touch-down.
     fn come_down(&mut self, touch_down: &TouchDown, watch: &mut Watch) -> Result<Touched> {
         let arm = &self.geometry;
         let mut descent: Option<Descent> = None;
@@ -164,7 +165,7 @@ impl FrankaArm {
                 .get_or_insert_with(|| Descent::new(*touch_down, arm, q, JointVector::from(state.torque_desired)));
             if let Some(reason) = watch.observe(&arm_state(state)) {
                 stopped = Some(reason.clone());
-                // At this speed the robot's own control holds the arm where it is.
+                // At this speed the robot's own control holds the arm in place.
                 return ControlFlow::Break((*descent.last_torque()).into());
             }
             match descent.next(arm, &q, &dq, state.external_wrench_in_base[2]) {
@@ -180,7 +181,7 @@ impl FrankaArm {
         }
     }
 
-    /// The next state, seen by `watch`.
+    /// The next state, after `watch` has seen it.
     fn observe(&mut self, watch: &mut Watch) -> Result<ArmState> {
         let state = self.state()?;
         if let Some(reason) = watch.observe(&state) {

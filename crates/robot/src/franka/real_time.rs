@@ -2,19 +2,19 @@
 
 use crate::error::{Result, RobotError};
 
-/// How the loop that drives the arm is scheduled.
+/// Scheduling of the loop that drives the arm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scheduling {
-    /// As a thread with `SCHED_FIFO`, before everything else on this computer.
+    /// As a thread with `SCHED_FIFO`, with priority over everything else on this computer.
     RealTime,
     /// As any other thread: for simulated arms.
     Ordinary,
 }
 
-/// Whether the kernel lets this process run threads with `SCHED_FIFO`; tried in a thread that ends at once.
+/// Whether the kernel allows this process to run threads with `SCHED_FIFO`; tried in a short thread.
 ///
 /// # Errors
-/// [`RobotError::Configuration`] with what to do.
+/// [`RobotError::Configuration`] with the remedy.
 pub fn check_real_time() -> Result<()> {
     std::thread::spawn(enter).join().unwrap_or_else(|_| Err(refused("a thread that panicked")))
 }
@@ -26,7 +26,7 @@ pub(super) fn enter() -> Result<()> {
         RealtimeThreadSchedulePolicy, ThreadPriority, ThreadPriorityValue, ThreadSchedulePolicy,
         set_thread_priority_and_policy, thread_native_id,
     };
-    // Above interrupts' threads (50) nothing needs to be: the packets come through them.
+    // No higher priority than that of interrupt threads (50) is needed: the packets come through them.
     const PRIORITY_SHARE: u8 = 40;
     let priority = ThreadPriorityValue::try_from(PRIORITY_SHARE).map_err(refused)?;
     let fifo = ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo);
@@ -57,7 +57,7 @@ mod tests {
                 assert!(line.contains("SCHED_FIFO") && line.contains("rtprio"), "{line}");
             }
         }
-        // This thread is scheduled as before.
+        // The scheduling of this thread is unchanged.
         #[cfg(unix)]
         assert!(matches!(
             thread_priority::thread_schedule_policy().unwrap(),

@@ -4,10 +4,10 @@
 //! Sighting, Sighting ─ triangulate ─ MeasuredHeight ─┐
 //! --mark-height-mm ─ ToldHeight ─────────────────────┴─ settle ─ the more certain of both; refused where they contradict each other
 //! ```
-//! **Frames.** All heights are z of the robot's base, of the plane of the marks. A picture shows a part in a plane that was assumed; where the plane
-//! is another, place, size and opening of the part grow or shrink about the camera's foot.
+//! **Frames.** All heights are z of the robot's base, of the plane of the marks. A picture shows a part in an assumed
+//! plane; for another plane, position, size and opening of the part scale about the point vertically below the camera.
 //!
-//! Left out: pictures, and where the camera goes (`sequence/measure.rs`).
+//! Pictures and camera motions are elsewhere (`sequence/measure.rs`).
 
 mod settle;
 mod sighting;
@@ -17,28 +17,29 @@ pub use settle::{HeightSource, SettledHeight, ToldHeight, settle};
 pub use sighting::Sighting;
 pub use triangulation::{HeightError, MIN_BASELINE_M, MeasuredHeight, RELIEF_M, triangulate, triangulate_nearest};
 
-/// How the height of a part is measured on the way down to it.
+/// How the height of a part is measured during the approach.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeightMeasurement {
     /// Height of the camera above the table for both pictures, m.
     pub camera_height_m: f64,
-    /// How far the camera moves sideways between them, m.
+    /// Sideways distance of the camera between them, m.
     pub baseline_m: f64,
-    /// Height of the marks over what the part lies on, m.
+    /// Height of the marks over the surface under the part, m.
     pub mark_height_m: f64,
-    /// Height of the grasp over what the part lies on, m.
+    /// Height of the grasp over the surface under the part, m.
     pub grasp_height_m: f64,
-    /// How far a part may be seen above or below its marks, one standard deviation, m.
+    /// Distance at which a part may be seen above or below its marks, one standard deviation, m.
     pub relief_m: f64,
-    /// The height of the marks as it was told; z of the base.
+    /// The given height of the marks; z of the base.
     pub told: Option<ToldHeight>,
 }
 
 impl HeightMeasurement {
-    /// At most so high above the table the camera takes both pictures, m.
+    /// Largest height of the camera above the table for both pictures, m.
     pub const MAX_CAMERA_HEIGHT_M: f64 = 0.30;
 
-    /// Two pictures from 0.3 m, 0.12 m apart, of a part whose marks and grasp are so high over what it lies on, m.
+    /// Two pictures from 0.3 m, 0.12 m apart, of a part with these heights of marks and grasp over the surface under
+    /// it, m.
     pub fn new(mark_height_m: f64, grasp_height_m: f64) -> Self {
         Self {
             camera_height_m: Self::MAX_CAMERA_HEIGHT_M,
@@ -50,29 +51,29 @@ impl HeightMeasurement {
         }
     }
 
-    /// The height of the marks by the part's own height and by the surface beside it, where both agree.
+    /// The height of the marks from the part itself and from the surface beside it, if both agree.
     pub fn combined(&self, by_part: &MeasuredHeight, surface: &MeasuredHeight) -> MeasuredHeight {
         let on_surface = MeasuredHeight { height_m: surface.height_m + self.mark_height_m, ..*surface };
         on_surface.mean(by_part).unwrap_or(*by_part)
     }
 
-    /// How far the grasp lies below the marks, m.
+    /// Distance of the grasp below the marks, m.
     pub fn marks_over_grasp_m(&self) -> f64 {
         self.mark_height_m - self.grasp_height_m
     }
 }
 
-/// What is known of the height once both pictures were taken, or could not be.
+/// The knowledge of the height after both pictures were taken, or could not be.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct HeightReport {
     /// The height that the grasp uses.
     pub settled: Option<SettledHeight>,
-    /// What was measured: the lines of sight to the part, and the surface beside it where it was seen.
+    /// The measured height: from the lines of sight to the part, and from the surface beside it if it was seen.
     pub measured: Option<MeasuredHeight>,
-    /// The same by the lines of sight alone.
+    /// The same from the lines of sight alone.
     pub by_part: Option<MeasuredHeight>,
-    /// Why nothing was triangulated.
+    /// The reason why nothing was triangulated.
     pub why_not: Option<String>,
-    /// What the pictures showed, in their order.
+    /// The contents of the pictures, in their order.
     pub sightings: Vec<Sighting>,
 }

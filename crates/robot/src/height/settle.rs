@@ -1,11 +1,11 @@
-//! Told and measured: the more certain of both, unless they contradict each other.
+//! Combines the given and the measured height: the more certain of both, unless they contradict each other.
 
 use super::triangulation::MeasuredHeight;
 
-/// Told and measured heights may differ by so many standard deviations of their difference.
+/// Largest difference of given and measured height, in standard deviations of their difference.
 const MAX_SIGMAS: f64 = 3.0;
 
-/// A height of the marks that was told; z of the base.
+/// A given height of the marks; z of the base.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ToldHeight {
     /// Height, m.
@@ -14,12 +14,12 @@ pub struct ToldHeight {
     pub sigma_m: f64,
 }
 
-/// Where a height is from.
+/// Source of a height.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum HeightSource {
     /// From two pictures.
     Measured,
-    /// Told.
+    /// Given by the user.
     Told,
 }
 
@@ -40,14 +40,15 @@ pub struct SettledHeight {
     pub height_m: f64,
     /// Its standard deviation, m.
     pub sigma_m: f64,
-    /// Where it is from.
+    /// Its source.
     pub source: HeightSource,
 }
 
-/// The more certain of both heights; the measured one where both are as certain.
+/// The more certain of both heights; the measured one if both are equally certain.
 ///
 /// # Errors
-/// Why there is none, in one sentence: neither is there (`why_not` measured), or they differ by more than three standard deviations.
+/// The reason why there is none, in one sentence: both are missing (`why_not` measured), or they differ by more than
+/// three standard deviations.
 pub fn settle(
     told: Option<ToldHeight>,
     measured: Option<MeasuredHeight>,
@@ -62,7 +63,7 @@ pub fn settle(
         (None, Some(measured)) => return Ok(by_measurement(measured)),
         (None, None) => {
             let why = why_not.unwrap_or("no picture was taken for it");
-            return Err(format!("the height of the part was not measured, and none was told: {why}"));
+            return Err(format!("the height of the part was not measured, and none was given: {why}"));
         }
     };
     let [apart_mm, told_mm, measured_mm] =
@@ -71,7 +72,7 @@ pub fn settle(
     if apart_mm > max_mm {
         let [told_sigma_mm, measured_sigma_mm] = [told.sigma_m, measured.sigma_m].map(|sigma| sigma * 1e3);
         return Err(format!(
-            "expected marks at the told height of {told_mm:.1} ± {told_sigma_mm:.1} mm, measured {measured_mm:.1} ± \
+            "expected marks at the given height of {told_mm:.1} ± {told_sigma_mm:.1} mm, measured {measured_mm:.1} ± \
              {measured_sigma_mm:.1} mm: at most {max_mm:.1} mm apart are allowed, found {apart_mm:.1} mm"
         ));
     }
@@ -104,12 +105,12 @@ mod tests {
         // 3 √(0.6² + 0.8²) = 3 mm.
         assert!(settle(told(16.0, 0.6), measured(18.99, 0.8), None).is_ok());
         let why = settle(told(16.0, 0.6), measured(19.01, 0.8), None).unwrap_err();
-        assert!(why.contains("told height of 16.0 ± 0.6 mm, measured 19.0 ± 0.8 mm: at most 3.0 mm apart"), "{why}");
+        assert!(why.contains("given height of 16.0 ± 0.6 mm, measured 19.0 ± 0.8 mm: at most 3.0 mm apart"), "{why}");
     }
 
     #[test]
     fn without_any_height_the_reason_is_told() {
         let why = settle(None, None, Some("the second picture does not show the part")).unwrap_err();
-        assert!(why.ends_with("none was told: the second picture does not show the part"), "{why}");
+        assert!(why.ends_with("none was given: the second picture does not show the part"), "{why}");
     }
 }

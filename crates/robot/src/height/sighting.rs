@@ -1,19 +1,19 @@
-//! Where a picture of one place shows a part.
+//! The position of a part in a picture from one place.
 
 use nalgebra::{Point2, Point3, Vector2};
 
 use crate::grasp_target::GraspTarget;
 
-/// A part in a picture, as if its marks lay in a plane that was assumed.
+/// A part in a picture, as if its marks lay in an assumed plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sighting {
     /// The camera's centre, base frame, m.
     pub camera_m: Point3<f64>,
-    /// The part's middle in the plane, base frame, m; its z is the plane's.
+    /// The part's centre in the plane, base frame, m; its z is the plane's.
     pub middle_m: Point3<f64>,
-    /// Standard deviation of the middle along x and along y, m.
+    /// Standard deviation of the centre along x and along y, m.
     pub place_sigma_m: f64,
-    /// The part's size in the plane over its own; `None` where that is not known.
+    /// The part's size in the plane over its own; `None` if that is not known.
     pub size: Option<f64>,
     /// Standard deviation of the size.
     pub size_sigma: f64,
@@ -22,7 +22,7 @@ pub struct Sighting {
 }
 
 impl Sighting {
-    /// How far the plane lies below the camera, m.
+    /// Distance of the plane below the camera, m.
     pub fn distance_m(&self) -> f64 {
         self.camera_m.z - self.middle_m.z
     }
@@ -32,12 +32,12 @@ impl Sighting {
         self.size.map(|size| self.camera_m.z - self.distance_m() / size)
     }
 
-    /// Metres that the line of sight goes sideways for a metre downwards.
+    /// Sideways metres of the line of sight per metre downwards.
     pub(super) fn slope(&self) -> Vector2<f64> {
         (self.middle_m - self.camera_m).xy() / self.distance_m()
     }
 
-    /// Where the line of sight is at a height, m.
+    /// The position of the line of sight at a height, m.
     pub fn middle_at(&self, height_m: f64) -> Point2<f64> {
         self.camera_m.xy() + self.slope() * (self.camera_m.z - height_m)
     }

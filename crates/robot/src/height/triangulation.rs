@@ -1,27 +1,30 @@
-//! Two lines of sight to one part give its height.
+//! Height of a part from two lines of sight.
 //!
 //! ```text
 //! height = where the lines of sight come nearest     sigma² = (places' sigmas / difference of the slopes)² + relief²
 //! ```
-//! A slope is how far a line of sight goes sideways for a metre downwards: two of 0.12 m apart at 0.27 m differ by 0.44. The relief is what no picture
-//! tells: walls, feet and rims are edges, too, so a part is seen a little above or below its marks, the same way each time.
+//! A slope is the sideways distance of a line of sight per metre downwards: two cameras 0.12 m apart at 0.27 m differ
+//! by 0.44. The relief is unknown from any picture: walls, feet and rims are edges, too, so that a part is seen
+//! slightly above or below its marks, in the same way each time.
 //!
-//! Sizes in both pictures say which of several parts is the same, and nothing more: they err by more (docs/robot-evidence.md).
+//! The sizes in both pictures only decide which of several parts is the same one: their errors are larger
+//! (docs/robot-evidence.md).
 
 use super::sighting::Sighting;
 
-/// The camera has to move so far sideways at least, m.
+/// Minimum sideways distance of the camera, m.
 pub const MIN_BASELINE_M: f64 = 0.080;
-/// Lines of sight whose slopes differ by less are as good as parallel: 80 mm at 0.8 m.
+/// Lines of sight whose slopes differ by less are treated as parallel: 80 mm at 0.8 m.
 const MIN_SLOPE_DIFFERENCE: f64 = 0.1;
-/// Lines of sight to one part pass each other within so many standard deviations, and within so much, m: hands and eyes are not calibrated better.
+/// Largest distance of two lines of sight to one part, in standard deviations and in m: hand-eye calibrations are not
+/// more accurate.
 const MAX_MISS_SIGMAS: f64 = 4.0;
 const MIN_MISS_ALLOWED_M: f64 = 0.004;
-/// A part lies at least so far below the cameras, m.
+/// Minimum distance of a part below the cameras, m.
 const MIN_DISTANCE_M: f64 = 0.05;
 
-/// How far a part may be seen above or below its marks, one standard deviation, m: fitted on the twelve shipped parts, which by their lines of sight
-/// lie 3.2 mm below to 3.9 mm above their marks (`heights raw 4 101`).
+/// Distance at which a part may be seen above or below its marks, one standard deviation, m: fitted on the twelve
+/// shipped parts, which by their lines of sight lie 3.2 mm below to 3.9 mm above their marks (`heights raw 4 101`).
 pub const RELIEF_M: f64 = 2.3e-3;
 
 /// The height of a part's marks, z of the base.
@@ -33,11 +36,11 @@ pub struct MeasuredHeight {
     pub sigma_m: f64,
 }
 
-/// Measurements that differ by more standard deviations are of different things.
+/// Measurements that differ by more standard deviations belong to different objects.
 const MAX_APART_SIGMAS: f64 = 4.0;
 
 impl MeasuredHeight {
-    /// The mean of two independent measurements, each weighted by its variance; `None` where they contradict each other.
+    /// The mean of two independent measurements, each weighted by its variance; `None` if they contradict each other.
     pub fn mean(&self, other: &Self) -> Option<Self> {
         let apart_m = (self.height_m - other.height_m).abs();
         let [own, others] = [self.sigma_m, other.sigma_m].map(|sigma_m| sigma_m.powi(-2));
@@ -48,7 +51,7 @@ impl MeasuredHeight {
     }
 }
 
-/// Why two pictures give no height.
+/// The reason why two pictures give no height.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
@@ -63,7 +66,7 @@ pub enum HeightError {
     /// Both lines of sight have nearly the same direction.
     #[error("expected lines of sight whose slopes differ by {MIN_SLOPE_DIFFERENCE} or more, found {difference:.3}")]
     Parallel { difference: f64 },
-    /// They cross above a camera, or right below it.
+    /// They cross above a camera, or directly below it.
     #[error(
         "expected a part at least {:.0} mm below the camera, which is {:.0} mm high, found lines of sight that cross at {:.0} mm",
         MIN_DISTANCE_M * 1e3,
@@ -74,12 +77,12 @@ pub enum HeightError {
     /// They do not cross: two parts.
     #[error("expected lines of sight that pass each other within {:.1} mm, found {:.1} mm: two parts", .max_m * 1e3, .miss_m * 1e3)]
     OtherPart { miss_m: f64, max_m: f64 },
-    /// A number that is none.
+    /// A number that is not finite or not positive.
     #[error("expected finite places and sizes, and sigmas above 0")]
     NotFinite,
 }
 
-/// Height of the marks of a part that two pictures show, with a relief of so much, m.
+/// Height of the marks of a part from two pictures, with this relief, m.
 ///
 /// # Errors
 /// [`HeightError`]: pictures from one place, lines of sight that are parallel, cross above a camera or pass each other.
@@ -123,10 +126,11 @@ pub fn triangulate(one: &Sighting, other: &Sighting, relief_m: f64) -> Result<Me
     Ok(MeasuredHeight { height_m: crossing_m, sigma_m: (apart_sigma_m / difference).hypot(relief_m) })
 }
 
-/// The same where each picture shows several parts: of all pairs the one that is most likely one part. Their order says nothing.
+/// The same if each picture shows several parts: uses the pair that is most likely one part. Their order has no
+/// meaning.
 ///
 /// # Errors
-/// That of the best pair where none gives a height.
+/// That of the best pair if none gives a height.
 pub fn triangulate_nearest(
     ones: &[Sighting],
     others: &[Sighting],
@@ -155,10 +159,11 @@ pub fn triangulate_nearest(
     }
 }
 
-/// Standard deviation that is added to each height by size, m: what it does not know of walls.
+/// Standard deviation added to each height from a size, m: for the unknown walls.
 const SIZE_LEEWAY_M: f64 = 0.004;
 
-/// By how many variances a pair contradicts itself: in the miss of the lines of sight, and where sizes say another height than their crossing.
+/// The contradiction of a pair, in variances: the distance of the lines of sight, and the difference between the height
+/// from sizes and the height of their crossing.
 fn misfit(one: &Sighting, other: &Sighting, height: &MeasuredHeight) -> f64 {
     let [one, other] = [one, other].map(|sighting| sighting.at_height(height.height_m));
     let miss_m = (one.middle_m - other.middle_m).norm();

@@ -2,7 +2,7 @@ use super::*;
 use crate::place::{Place, PlaceKind};
 use nalgebra::Point2;
 
-/// As the fingers let go unless told otherwise.
+/// The fingers as they release a part, unless stated otherwise.
 const MARGIN_M: f64 = 0.020;
 
 fn tray(pitch_mm: [f64; 2], yaw_rad: f64) -> Place {
@@ -25,7 +25,7 @@ fn bar() -> PartShape {
 }
 
 fn check(pitch_mm: [f64; 2], part: &PartShape, symmetry: RotationalSymmetry) -> Result<()> {
-    // In the middle, and turned: the tray's own axes count.
+    // At the centre, and turned: the tray's own axes count.
     tray(pitch_mm, 0.7).goal(6).unwrap().check_room(part, symmetry, MARGIN_M)
 }
 
@@ -34,9 +34,9 @@ fn across_the_marked_line_fingers_need_room_for_themselves() {
     // Half of 20 mm, 10 mm opened, 15 mm of finger, 2 mm, and half of the next: 47 mm.
     check([100.0, 47.0], &bar(), RotationalSymmetry::None).unwrap();
     let found = check([100.0, 46.0], &bar(), RotationalSymmetry::None).unwrap_err().to_string();
-    let expected = "\"tray, cell 6\": expected a pitch of 100 x 47 mm, found 100 x 46 mm: the part is 20 mm wide between the fingers; \
-                    15 mm thick and open to 40 mm to let it go, they come within 1.0 mm of a part in a neighbouring cell and at least 2 mm \
-                    are asked for";
+    let expected = "\"tray, cell 6\": expected a pitch of 100 x 47 mm, found 100 x 46 mm: the part is 20 mm wide \
+                    between the fingers; 15 mm thick and open to 40 mm to let it go, they come within 1.0 mm of a \
+                    part in a neighbouring cell and at least 2 mm are required";
     assert_eq!(found, expected);
 }
 
@@ -45,7 +45,7 @@ fn parts_themselves_need_room() {
     check([94.0, 60.0], &bar(), RotationalSymmetry::None).unwrap();
     let found = check([93.0, 60.0], &bar(), RotationalSymmetry::None).unwrap_err().to_string();
     assert!(found.contains("expected a pitch of 94 x 60 mm, found 93 x 60 mm"), "{found}");
-    assert!(found.contains("parts in neighbouring cells are 3.0 mm apart, at least 4 mm are asked for"), "{found}");
+    assert!(found.contains("parts in neighbouring cells are 3.0 mm apart, at least 4 mm are required"), "{found}");
     // Too narrow along both.
     let found = check([80.0, 15.0], &bar(), RotationalSymmetry::None).unwrap_err().to_string();
     assert!(found.contains("expected a pitch of 94 x 47 mm, found 80 x 15 mm"), "{found}");
@@ -54,7 +54,7 @@ fn parts_themselves_need_room() {
 
 #[test]
 fn a_round_part_is_let_go_where_there_is_room() {
-    // Rows of 60 mm are too narrow for fingers between them, columns of 100 mm are not.
+    // Rows of 60 mm are too narrow for fingers between them, columns of 100 mm are wide enough.
     let narrow = [100.0, 60.0];
     let found = check(narrow, &disc(0.052), RotationalSymmetry::None).unwrap_err().to_string();
     assert!(found.contains("expected a pitch of 100 x 79 mm"), "{found}");
@@ -65,7 +65,7 @@ fn a_round_part_is_let_go_where_there_is_room() {
     // Fingers along the rows, not across them.
     let kept = goal.with_room_for_fingers(&disc(0.052), 0.072, turns, |&turn_rad| goal.base_from_part(0.0, turn_rad));
     assert_eq!(kept, [0.25 * TAU, 0.75 * TAU]);
-    // 60 mm both ways: along the diagonals only.
+    // 60 mm along both axes: only the diagonals have room.
     check([60.0, 60.0], &disc(0.052), RotationalSymmetry::Full).unwrap();
     assert!(check([60.0, 60.0], &disc(0.052), RotationalSymmetry::Fold(4)).is_err());
 }
@@ -89,7 +89,7 @@ fn a_tall_part_meets_the_thicker_root_of_the_fingers() {
 fn alone_there_is_always_room() {
     let single = Place { kind: PlaceKind::Pose, ..tray([1.0, 1.0], 0.0) };
     single.goal(1).unwrap().check_room(&disc(0.07), RotationalSymmetry::None, MARGIN_M).unwrap();
-    // A row: nothing is beside it across.
+    // A row: it has no neighbours across.
     let kind = PlaceKind::Tray { cells: [3, 1], pitch_m: [0.1, 0.01] };
     Place { kind, ..single }.goal(2).unwrap().check_room(&bar(), RotationalSymmetry::None, MARGIN_M).unwrap();
 }

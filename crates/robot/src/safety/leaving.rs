@@ -1,4 +1,4 @@
-//! Up from what was felt lower than the limits allow, and nowhere else.
+//! Limits for moving up, and only up, from a contact below the limits.
 
 use nalgebra::Vector3;
 use sdg_kinematics::{JointVector, Trajectory};
@@ -7,36 +7,38 @@ use super::limits::{CheckedMotion, SafetyLimits};
 use super::violation::Violation;
 use crate::arm_state::PERIOD_SECS;
 
-/// A straight way in joint space is bent, and the reference may be lower than what was measured, m: so much is not counted as going lower.
+/// A straight path in joint space is curved, and the reference may be lower than the measured position, m: differences
+/// up to this do not count as moving lower.
 const LEAVING_M: f64 = 0.5e-3;
-/// The reference of an arm that stands on something may be so much lower than the tcp was measured, m.
+/// Largest distance of the reference below the measured tcp for an arm that rests on something, m.
 const BELOW_MEASURED_M: f64 = 1e-3;
-/// So far beside the way down a soft tcp may stand, m: joint friction and what it presses on push it.
+/// Largest sideways distance of a compliant tcp from the descent, m: joint friction and contact forces push it.
 const STANDS_BESIDE_M: f64 = 5e-3;
-/// So far beside where it stood the hand may be until it is as high as the limits ask for, m.
+/// Largest sideways distance of the hand from its contact position until it is as high as the limits require, m.
 const BESIDE_M: f64 = 1e-3;
 
-/// Where a hand stands that came straight down by contact, and so may be lower than the limits allow.
+/// The position of a hand that came straight down by contact, and so may be lower than the limits allow.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct FeltBelow {
-    /// x and y of the tcp on the way down, base frame, m.
+    /// x and y of the tcp on the descent, base frame, m.
     at_m: [f64; 2],
     /// The lowest z of the tcp there, m.
     lowest_m: f64,
-    /// How much lower than the limits the way down was allowed to be, m.
+    /// Distance below the limits that was allowed for the descent, m.
     below_limits_m: f64,
 }
 
-/// The limits of a motion from a configuration: as they are, or lower for a hand that leaves what it felt.
+/// The limits of a motion from a configuration: unchanged, or lower for a hand that leaves a contact.
 #[derive(Debug)]
 pub(crate) struct LimitsFrom<'l> {
     limits: &'l SafetyLimits,
-    /// The limits lowered to where the hand stands.
+    /// The limits lowered to the hand's position.
     leaving: Option<SafetyLimits>,
 }
 
 impl FeltBelow {
-    /// After a way straight down from a tcp at `from` (base frame, m) that ended at z `lowest_m`; the way was checked against limits so much lower.
+    /// After a straight descent from a tcp at `from` (base frame, m) that ended at z `lowest_m`; the path was checked
+    /// against limits lowered by this distance.
     pub(crate) fn new(from: &Vector3<f64>, lowest_m: f64, below_limits_m: f64) -> Self {
         Self { at_m: [from.x, from.y], lowest_m: lowest_m - BELOW_MEASURED_M, below_limits_m }
     }
@@ -48,7 +50,7 @@ impl FeltBelow {
 }
 
 impl SafetyLimits {
-    /// The limits with table and workspace so much lower.
+    /// The limits with table and workspace lowered by this distance.
     pub(crate) fn lowered(&self, table_m: f64, workspace_m: f64) -> Self {
         let mut limits = self.clone();
         limits.table_height_m -= table_m;
@@ -58,8 +60,8 @@ impl SafetyLimits {
         limits
     }
 
-    /// The limits of a motion from a configuration. A hand that stands where it came down by contact, lower than the limits allow, may go
-    /// straight up from there.
+    /// The limits of a motion from a configuration. A hand at its contact position, lower than the limits allow, may
+    /// move straight up from there.
     pub(crate) fn starting_at(&self, start: &JointVector, felt: Option<&FeltBelow>) -> LimitsFrom<'_> {
         let leaving = felt.and_then(|felt| {
             let tcp = self.geometry.forward(start).translation.vector;
@@ -67,14 +69,14 @@ impl SafetyLimits {
             let floor_m = self.workspace.map_or(0.0, |workspace| workspace.min_m.z - tcp.z);
             let deepest_m = table_m.max(floor_m);
             let is_below = deepest_m > 0.0 && deepest_m <= felt.below_limits_m + LEAVING_M;
-            // Each is lowered by what it needs itself.
+            // Each is lowered only as far as necessary.
             let lower_m = |needed_m: f64| if needed_m > 0.0 { needed_m + LEAVING_M } else { 0.0 };
             (is_below && felt.is_here(&tcp)).then(|| self.lowered(lower_m(table_m), lower_m(floor_m)))
         });
         LimitsFrom { limits: self, leaving }
     }
 
-    /// How much nearer to the table than allowed the arm is, m.
+    /// Distance by which the arm is closer to the table than allowed, m.
     fn below_table_m(&self, q: &JointVector) -> f64 {
         let lowest_m = self.geometry.clearance(q, self.table_height_m).lowest_m - self.fingertip_beyond_tcp_m;
         self.min_table_clearance_m - lowest_m
@@ -87,10 +89,10 @@ impl SafetyLimits {
 }
 
 impl LimitsFrom<'_> {
-    /// As [`SafetyLimits::check`]; as long as the hand is lower than the limits allow, it must go straight up.
+    /// As [`SafetyLimits::check`]; while the hand is lower than the limits allow, it must move straight up.
     ///
     /// # Errors
-    /// The first limit that the motion breaks.
+    /// The first limit that the motion violates.
     pub(crate) fn check(&self, trajectory: Trajectory) -> Result<CheckedMotion, Violation> {
         let Some(leaving) = &self.leaving else { return self.limits.check(trajectory) };
         self.check_leaving(&trajectory)?;

@@ -1,4 +1,4 @@
-//! What a motion may do, and the motion that was found to keep to it.
+//! The limits of a motion, and a motion that was checked against them.
 
 use nalgebra::{Isometry3, Vector3, Vector6};
 use sdg_fci::Limits;
@@ -8,7 +8,7 @@ use crate::arm_state::PERIOD_SECS;
 use crate::safety::self_collision::self_collision;
 use crate::safety::violation::Violation;
 
-/// Where the hand may be, in the robot's base frame, m.
+/// The workspace of the hand, in the robot's base frame, m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WorkspaceBox {
     /// Smallest x, y and z.
@@ -17,24 +17,25 @@ pub struct WorkspaceBox {
     pub max_m: Vector3<f64>,
 }
 
-/// What every motion keeps to.
+/// The limits of every motion.
 #[derive(Debug, Clone)]
 pub struct SafetyLimits {
     /// Limits of the joints.
     pub joints: JointLimits,
     /// Limits of the tcp.
     pub cartesian: CartesianLimits,
-    /// Where tcp and flange may be; anywhere where `None`.
+    /// The workspace of tcp and flange; `None` for no bound.
     pub workspace: Option<WorkspaceBox>,
     /// Height of the table in the base frame, m.
     pub table_height_m: f64,
-    /// How far the finger tips reach beyond the tcp, m.
+    /// Distance of the finger tips beyond the tcp, m.
     pub fingertip_beyond_tcp_m: f64,
-    /// The least height of hand, wrist and elbow above the table, m. [`sdg_kinematics::ArmGeometry::clearance`] says what counts as theirs.
+    /// Minimum height of hand, wrist and elbow above the table, m. [`sdg_kinematics::ArmGeometry::clearance`] defines
+    /// these parts.
     pub min_table_clearance_m: f64,
-    /// The least distance between two of the arm's own bodies, m.
+    /// Minimum distance between two of the arm's own bodies, m.
     pub min_self_distance_m: f64,
-    /// What the robot itself holds its client to, for the velocities that fall near the ends of an FR3's joints.
+    /// The robot's own limits for its client, for the velocities that decrease near the ends of an FR3's joints.
     pub robot: Option<&'static Limits>,
     /// The arm.
     pub geometry: ArmGeometry,
@@ -63,30 +64,30 @@ impl SafetyLimits {
         }
     }
 
-    /// The FR3's limits over a table at the base's height. The tcp is not allowed to be faster than a Panda's.
+    /// The FR3's limits over a table at the base's height. The tcp has the speed limit of a Panda's.
     pub fn fr3() -> Self {
         Self { robot: Some(&Limits::FR3), ..Self::of(ArmGeometry::fr3()) }
     }
 }
 
-/// A motion that keeps to [`SafetyLimits`]; made by [`SafetyLimits::check`] alone.
+/// A motion that satisfies [`SafetyLimits`]; made only by [`SafetyLimits::check`].
 #[derive(Debug, Clone)]
 pub struct CheckedMotion {
     trajectory: Trajectory,
 }
 
 impl CheckedMotion {
-    /// How long it takes, s.
+    /// Its duration, s.
     pub fn duration_secs(&self) -> f64 {
         self.trajectory.duration_secs()
     }
 
-    /// Where it starts, rad.
+    /// Its start, rad.
     pub fn start(&self) -> &JointVector {
         self.trajectory.start()
     }
 
-    /// Where it ends, rad.
+    /// Its end, rad.
     pub fn end(&self) -> &JointVector {
         self.trajectory.end()
     }
@@ -97,14 +98,14 @@ impl CheckedMotion {
     }
 }
 
-/// Limits are met exactly by motions that were planned for them: rounding, and differences over a cycle, are no violation.
+/// Planned motions reach their limits exactly: rounding, and differences over a cycle, are not violations.
 const ROUNDING: f64 = 1e-3;
 
 impl SafetyLimits {
-    /// Looks at a whole motion.
+    /// Checks a whole motion.
     ///
     /// # Errors
-    /// The first limit that it breaks.
+    /// The first limit that it violates.
     pub fn check(&self, trajectory: Trajectory) -> Result<CheckedMotion, Violation> {
         let num_cycles = (trajectory.duration_secs() / PERIOD_SECS).ceil() as usize;
         let mut before = Derivatives::default();
@@ -221,7 +222,7 @@ impl SafetyLimits {
     }
 }
 
-/// What the next cycle is compared with.
+/// The values that the next cycle is compared with.
 #[derive(Debug, Default)]
 struct Derivatives {
     ddq: Option<JointVector>,
@@ -231,7 +232,7 @@ struct Derivatives {
 }
 
 impl Derivatives {
-    /// The joints' part of this one with the tcp's part of another.
+    /// The joints' limits of this one with the tcp's limits of another.
     fn cartesian_of(self, other: &Self) -> Self {
         Self { twist: other.twist, acceleration: other.acceleration, ..self }
     }

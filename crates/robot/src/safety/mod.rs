@@ -1,12 +1,12 @@
-//! Limits that every motion is checked against before it begins.
+//! The limits against which every motion is checked before it starts.
 //!
 //! ```text
 //! Trajectory ── SafetyLimits::check ──► CheckedMotion ── Arm::follow
 //!                     └─ Violation: which limit, when, by how much; nothing moves
 //! ```
-//! The whole motion is looked at before it begins, at every millisecond: joint limits, the tcp's limits, the workspace, the table,
-//! the arm against itself. These limits are no safety function in the sense of a standard: they know nothing of people, of what
-//! stands in the cell, or of a fault below them. An emergency stop remains required.
+//! The whole motion is checked before it starts, at every millisecond: joint limits, the tcp's limits, the workspace,
+//! the table, the arm against itself. These limits are no safety function in the sense of a standard: they do not cover
+//! people, obstacles in the cell, or faults of lower layers. An emergency stop remains required.
 
 mod leaving;
 mod limits;

@@ -1,7 +1,7 @@
-//! Whether the arm comes near itself.
+//! Whether the arm comes close to itself.
 //!
-//! Each capsule holds a whole shape of its link with some room, so that links whose capsules are apart are apart. They are fewer
-//! and wider than those of [`sdg_kinematics::collision`].
+//! Each capsule contains the whole shape of its link with some margin, so that links with separate capsules are
+//! separate. They are fewer and wider than those of [`sdg_kinematics::collision`].
 
 use std::fmt;
 
@@ -15,14 +15,14 @@ const NUM_BODIES: usize = 9;
 const NAMES: [&str; NUM_BODIES] =
     ["base", "link 1", "link 2", "link 3", "link 4", "link 5", "link 6", "link 7", "hand"];
 
-/// Two bodies that come too near to each other.
+/// Two bodies that are too close to each other.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SelfCollision {
     /// The bodies' names.
     pub bodies: [&'static str; 2],
     /// Distance of their capsules, m; negative where these overlap.
     pub distance_m: f64,
-    /// The smallest distance that is allowed, m.
+    /// The smallest allowed distance, m.
     pub min_m: f64,
 }
 
@@ -30,11 +30,11 @@ impl fmt::Display for SelfCollision {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [one, other] = self.bodies;
         let (found_mm, min_mm) = (self.distance_m * 1e3, self.min_m * 1e3);
-        write!(f, "{one} and {other} of the arm are {found_mm:.0} mm apart, at least {min_mm:.0} mm are asked for")
+        write!(f, "{one} and {other} of the arm are {found_mm:.0} mm apart, at least {min_mm:.0} mm are required")
     }
 }
 
-/// The two bodies that are nearest to each other, where they are nearer than `min_m`, by the wide capsules of an arm.
+/// The closest two bodies, if their distance is below `min_m`, by the wide capsules of an arm.
 pub(super) fn self_collision(arm: &ArmGeometry, frames: &Frames, min_m: f64) -> Option<SelfCollision> {
     let placed: [Vec<Capsule>; NUM_BODIES] = std::array::from_fn(|body| {
         let (capsules, base_from_body) = match body {
@@ -79,8 +79,8 @@ mod tests {
         println!("{found}");
     }
 
-    /// Few configurations of the whole joint range are refused, and no pair always: the capsules are not so large that they forbid
-    /// what the arm can do.
+    /// Few configurations of the whole joint range are refused, and no pair always: the capsules are small enough to
+    /// allow all normal motions.
     #[test]
     fn no_pair_is_always_refused() {
         let panda = ArmGeometry::panda();

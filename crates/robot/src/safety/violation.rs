@@ -1,14 +1,14 @@
-//! Which limit a motion breaks.
+//! The limit that a motion violates.
 
 use crate::safety::self_collision::SelfCollision;
 
-/// The first limit that a motion breaks; times in seconds from the motion's start.
+/// The first limit that a motion violates; times in seconds from the motion's start.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum Violation {
-    /// The motion does not begin where the arm is.
-    #[error("it starts {apart_rad:.3} rad from where joint {joint} is, at most {max_rad:.3} are allowed")]
+    /// The motion does not start at the arm's position.
+    #[error("it starts {apart_rad:.3} rad from the position of joint {joint}, at most {max_rad:.3} are allowed")]
     StartsElsewhere {
         /// Joint number, 1 to 7.
         joint: usize,
@@ -41,7 +41,7 @@ pub enum Violation {
     #[error("at {time_secs:.3} s the {quantity} of the tcp is {found:.3} {unit}, at most {max:.3} are allowed")]
     Cartesian {
         time_secs: f64,
-        /// Velocity, acceleration or jerk, or the same of its turn.
+        /// Velocity, acceleration or jerk, linear or angular.
         quantity: &'static str,
         found: f64,
         max: f64,
@@ -61,10 +61,8 @@ pub enum Violation {
         min_m: f64,
         max_m: f64,
     },
-    /// Hand, wrist or elbow come too near to the table.
-    #[error(
-        "at {time_secs:.3} s the {part} is {found_mm:.0} mm above the table, at least {min_mm:.0} mm are asked for"
-    )]
+    /// Hand, wrist or elbow come too close to the table.
+    #[error("at {time_secs:.3} s the {part} is {found_mm:.0} mm above the table, at least {min_mm:.0} mm are required")]
     Table {
         time_secs: f64,
         /// Finger tips, hand, wrist or elbow.
@@ -73,13 +71,13 @@ pub enum Violation {
         found_mm: f64,
         min_mm: f64,
     },
-    /// A hand that came down by contact, lower than the limits allow, does not go straight up.
+    /// A hand that came down by contact, lower than the limits allow, does not move straight up.
     #[error(
-        "at {time_secs:.3} s the hand, lower than the limits allow after it came down by contact, is {beside_mm:.1} mm beside the way \
-         straight up and {down_mm:.1} mm lower than before"
+        "at {time_secs:.3} s the hand, lower than the limits allow after it came down by contact, is {beside_mm:.1} \
+         mm beside the vertical path and {down_mm:.1} mm lower than before"
     )]
     Leaving { time_secs: f64, beside_mm: f64, down_mm: f64 },
-    /// The arm comes too near to itself.
+    /// The arm comes too close to itself.
     #[error("at {time_secs:.3} s {collision}")]
     SelfCollision { time_secs: f64, collision: SelfCollision },
 }

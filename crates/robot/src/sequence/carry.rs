@@ -1,4 +1,5 @@
-//! Taking the held part over its place, turned so that its fingers have room and that the soft way down can be followed.
+//! Carries the held part over its place, at a turn at which its fingers have room and the compliant descent is
+//! possible.
 
 use nalgebra::Isometry3;
 use sdg_geometry::RotationalSymmetry;
@@ -13,28 +14,29 @@ use crate::place::PlaceGoal;
 use crate::room::same_turns_rad;
 use crate::surroundings::{Destination, Way};
 
-/// Heights above a place that a straight way down to it begins at, m.
+/// Heights above a place at which a straight descent to it starts, m.
 const HEIGHTS_M: [f64; 3] = [0.20, 0.15, 0.10];
-/// A soft way down begins so far above where the place is to be felt, m.
+/// A compliant descent starts this far above the expected contact, m.
 pub(super) const SOFT_WAY_M: f64 = 0.015;
-/// It ends so far below, m.
+/// It ends this far below, m.
 pub(super) const BELOW_M: f64 = 0.010;
 
-/// Where the part is to lie, and the tcp before the soft way down.
+/// The goal of the part, and the tcp before the compliant descent.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Aim {
     pub(super) base_from_part: Isometry3<f64>,
     pub(super) base_from_tcp: Isometry3<f64>,
 }
 
-/// How the held part comes above its place.
+/// The path of the held part to above its place.
 enum Carried {
     Around(Way),
     Straight(Approach),
 }
 
 impl<A: Arm> Sequence<'_, '_, A> {
-    /// Takes the part over its place, as far as a soft way down from there, turned so that the fingers have room when they open so far, m.
+    /// Carries the part over its place, down to the start of a compliant descent, at a turn at which the fingers have
+    /// room at this opening, m.
     pub(super) fn carry(
         &mut self,
         goal: &PlaceGoal,
@@ -44,7 +46,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
     ) -> Steps<Aim> {
         let held =
             self.known.held.clone().ok_or_else(|| Stop::Failed(GraspStep::Carry, "nothing is held".to_owned()))?;
-        // Where the hand cannot open it need not come down.
+        // If the hand cannot open there, it need not come down.
         self.known.opening_m = opening_m;
         let mut aims: Vec<Aim> = same_turns_rad(symmetry)
             .into_iter()
@@ -78,7 +80,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
                     Carried::Around(way) => way.approach.as_ref().map(|path| *path.end()),
                     Carried::Straight(approach) => Some(*approach.path.end()),
                 };
-                // A joint may end what is felt for; in another turn of the part it may not.
+                // A joint limit may end the descent before the contact; at another turn of the part it may not.
                 if let Err(because) = end.map_or(Ok(()), |end| self.goes_on_down(&end)) {
                     why.get_or_insert(because);
                     continue;
@@ -89,10 +91,10 @@ impl<A: Arm> Sequence<'_, '_, A> {
         }
         let [x, y] = goal.at_m;
         let why = why.unwrap_or_default();
-        Err(Stop::Failed(GraspStep::Carry, format!("no way to \"{}\" at ({x:.2}, {y:.2}) m: {why}", goal.name)))
+        Err(Stop::Failed(GraspStep::Carry, format!("no path to \"{}\" at ({x:.2}, {y:.2}) m: {why}", goal.name)))
     }
 
-    /// How to come above one of the aims, and which; else why there is no way.
+    /// The path to above one of the aims, and which; else the reason why there is none.
     fn way_above(&mut self, aims: &[Aim], height_m: f64) -> Steps<Result<(usize, Carried), String>> {
         let poses: Vec<Isometry3<f64>> = aims.iter().map(|aim| aim.base_from_tcp).collect();
         if !self.is_surrounded() {
@@ -106,7 +108,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         }
     }
 
-    /// Above the pose that the arm reaches best, from which a straight way leads down to it.
+    /// Above the pose that the arm reaches best, with a straight path down to it.
     fn straight_down(&mut self, poses: &[Isometry3<f64>], height_m: f64) -> Steps<Result<(usize, Approach), String>> {
         let seed = self.robot.commanded()?;
         let mut best: Option<(usize, Approach)> = None;
@@ -126,7 +128,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         Ok(best.ok_or(why))
     }
 
-    /// Whether the arm can come down from a configuration as far as a place may be felt; why not.
+    /// Whether the arm can descend from a configuration to the lowest possible contact; else the reason.
     fn goes_on_down(&self, from: &JointVector) -> Result<(), String> {
         let arm = self.robot.geometry();
         let lowest = above(&arm.forward(from), -(SOFT_WAY_M + BELOW_M));
@@ -137,7 +139,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
     fn go_above_place(&mut self, carried: Carried) -> Steps<()> {
         let path: JointPath = match carried {
             Carried::Around(way) => self.travel(way, GraspStep::Carry)?.ok_or_else(|| {
-                Stop::Failed(GraspStep::Carry, "the way around the obstacles has no approach".to_owned())
+                Stop::Failed(GraspStep::Carry, "the path around the obstacles has no approach".to_owned())
             })?,
             Carried::Straight(approach) => {
                 self.move_freely(&approach.pregrasp.q, GraspStep::Carry)?;

@@ -1,4 +1,4 @@
-//! Where the sequence looks from and how it grasps.
+//! The look-out poses of the sequence and the settings of its grasp.
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use sdg_kinematics::collision::Obstacle;
@@ -13,16 +13,16 @@ use crate::pace::Pace;
 use crate::part_shape::PartShape;
 use crate::touch::TouchDown;
 
-/// Middle of the first look on the table unless another is set, base frame, m.
+/// Default centre of the first look on the table, base frame, m.
 pub const LOOK_AT_M: [f64; 2] = [0.48, 0.0];
-/// Height of a wrist camera above the table at every look unless another is set, m: that of the shipped demonstrations, so that
-/// a part has the same size in all pictures.
+/// Default height of a wrist camera above the table at every look, m: that of the shipped demonstrations, so that a
+/// part has the same size in all pictures.
 pub const LOOK_HEIGHT_M: f64 = 0.58;
 
-/// Where the arm goes to look out for the part.
+/// A pose of the arm for finding the part.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum LookOut {
-    /// The camera on the hand looks straight down.
+    /// The camera on the hand looks vertically down.
     CameraAt {
         /// x and y of the camera in the base frame, m.
         at_m: [f64; 2],
@@ -31,43 +31,45 @@ pub enum LookOut {
         /// Turn about the vertical, rad; see [`camera_looking_down`].
         yaw_rad: f64,
     },
-    /// The arm is in a configuration, rad: with a camera beside the robot, out of its view.
+    /// The arm is in a configuration, rad: for a camera beside the robot, outside its view.
     Joints(JointVector),
 }
 
-/// Where the sequence goes, how it grasps, and how fast.
+/// The poses of the sequence, its grasp, and its speeds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GraspConfig {
-    /// Where the arm looks out from, one after the other, until the part is found. The first must be within reach.
+    /// The poses at which the arm looks, one after the other, until the part is found. The first must be reachable.
     pub look_outs: Vec<LookOut>,
-    /// Height of the wrist camera above the table at the second look, m: best that of the demonstration's photo.
+    /// Height of the wrist camera above the table at the second look, m; best equal to that of the demonstration's
+    /// photo.
     pub hover_height_m: f64,
     /// Force of each finger when closed, N.
     pub grasp_force_n: f64,
-    /// How far the hand opens beyond the part's width, both sides together, m.
+    /// Opening of the hand beyond the part's width, both sides together, m.
     pub opening_margin_m: f64,
-    /// How far the part is lifted, m.
+    /// Height of the lift, m.
     pub lift_m: f64,
-    /// The least lift that will do where the arm cannot reach further, m.
+    /// The smallest sufficient lift if the arm cannot reach higher, m.
     pub min_lift_m: f64,
-    /// How long the lifted part is held, s.
+    /// Duration of holding the lifted part, s.
     pub hold_secs: f64,
-    /// How old a picture may be when a motion begins that rests on it, s.
+    /// Maximum age of a picture at the start of a motion that depends on it, s.
     pub max_detection_age_secs: f64,
-    /// What the hand carries once it holds the part.
+    /// The load of the hand while it holds the part.
     pub load: Option<Load>,
-    /// How the hand comes down on the last centimetres before it closes, on an arm that yields: where the table's height is not known
-    /// to a millimetre. In joint positions where `None`.
+    /// The compliant descent of the last centimetres before the hand closes, on a compliant arm, for a table height
+    /// that is not known to a millimetre. `None` for motion in joint positions.
     pub soft_approach: Option<TouchDown>,
-    /// How the part's height is measured with a camera on the hand; where `None`, or with a camera beside the robot, it is as perception says.
+    /// How a camera on the hand measures the part's height; with `None`, or with a camera beside the robot, the height
+    /// comes from perception.
     pub height: Option<HeightMeasurement>,
-    /// What stands in the cell besides the table: free motions are planned around it.
+    /// Obstacles in the cell besides the table: free motions are planned around them.
     pub obstacles: Vec<Obstacle>,
-    /// The part reaches so far to all sides of its grasp, m: it is kept off the obstacles, too.
+    /// Radius of the part around its grasp, m: it is also kept away from the obstacles.
     pub part_radius_m: f64,
-    /// What is known of its shape: whether it has room among others is judged by that, or else by its width between the fingers alone.
+    /// Its known shape, by which its room among others is judged; otherwise only its width between the fingers is used.
     pub part: Option<PartShape>,
-    /// Parts that lie in the cell and are not to be touched, as far as they are known before a picture is taken.
+    /// Parts lying in the cell that must not be touched, as far as they are known before a picture is taken.
     pub lying: Vec<LyingPart>,
     /// Speed of the motions.
     pub pace: Pace,
@@ -106,7 +108,8 @@ impl LookOut {
     /// The arm's configuration there, rad.
     ///
     /// # Errors
-    /// [`RobotError::Configuration`] for a place out of reach, or a camera that is to be moved and does not stand on the hand.
+    /// [`RobotError::Configuration`] for an unreachable place, or for a camera that is to be moved but is not on the
+    /// hand.
     pub fn configuration(&self, arm: &ArmGeometry, camera: &CameraPose, table_height_m: f64) -> Result<JointVector> {
         let (at_m, height_m, yaw_rad) = match (*self, camera) {
             (Self::Joints(q), _) => return Ok(q),
@@ -131,8 +134,8 @@ impl LookOut {
     }
 }
 
-/// A camera pose straight down from `height_m`, over (x, y), base frame: with yaw 0 the picture's up is the base's x and its
-/// right is -y; a positive yaw turns it counter-clockwise as seen from above.
+/// A camera pose straight down from `height_m`, over (x, y), base frame: with yaw 0 the picture's up direction is the
+/// base's x and its right direction is -y; a positive yaw turns it counter-clockwise as seen from above.
 pub fn camera_looking_down(x: f64, y: f64, height_m: f64, yaw_rad: f64) -> Isometry3<f64> {
     // Columns: the optical frame's x (right), y (down), z (forward) in the base frame.
     let at_yaw_zero = Matrix3::from_columns(&[-Vector3::y(), -Vector3::x(), -Vector3::z()]);

@@ -1,4 +1,4 @@
-//! Closing, lifting and holding; whether the part is held is read from the hand's width and force.
+//! Closing, lifting and holding; the hand's width and force show whether the part is held.
 
 use nalgebra::Isometry3;
 use sdg_kinematics::collision::Checker;
@@ -16,11 +16,11 @@ use crate::perception::GraspStep;
 
 /// Speed at which the opening changes when the hand closes, m/s.
 const CLOSING_SPEED_M_S: f64 = 0.1;
-/// Steps in which a lift is made shorter where the arm cannot reach so far, m.
+/// Steps by which a lift is shortened if the arm cannot reach so far, m.
 const LIFT_STEP_M: f64 = 0.05;
-/// Distance kept from what stands in the cell on straight motions, m.
+/// Distance from the obstacles of the cell on straight motions, m.
 const LINE_MARGIN_M: f64 = 0.003;
-/// Fingers that moved by more since they closed no longer hold what they held, m.
+/// Fingers that moved by more since they closed have lost the part, m.
 const MAX_WIDTH_CHANGE_M: f64 = 0.005;
 
 impl<A: Arm> Sequence<'_, '_, A> {
@@ -44,7 +44,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         Ok(())
     }
 
-    /// Lifts the part, as high as the arm reaches.
+    /// Lifts the part, as high as the arm can reach.
     pub(super) fn lift(&mut self) -> Steps<()> {
         let start = self.robot.commanded()?;
         let base_from_tcp = self.robot.geometry().forward(&start);
@@ -64,7 +64,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         self.judge(GraspStep::Lift, &hand)
     }
 
-    /// A straight motion that nothing is in the way of; else why there is none.
+    /// A straight motion without obstacles; else the reason why there is none.
     pub(super) fn free_line(
         &self,
         start: &JointVector,
@@ -81,7 +81,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         let CheckedLine { share, path, blocked_by } = line;
         Ok(path.ok_or_else(|| {
             let why = blocked_by.unwrap_or_default();
-            format!("{:.0} % of the straight way can be followed: {why}", share * 100.0)
+            format!("{:.0} % of the straight path can be followed: {why}", share * 100.0)
         }))
     }
 
@@ -93,11 +93,11 @@ impl<A: Arm> Sequence<'_, '_, A> {
         self.judge(GraspStep::Hold, &hand)
     }
 
-    /// Whether the part is held: the observer's word, which may rest on more, then the hand's.
+    /// Whether the part is held: by the observer, who may know more, then by the hand.
     pub(super) fn judge(&mut self, step: GraspStep, hand: &HandState) -> Steps<()> {
         let by_hand = held(&self.known.closed.unwrap_or(*hand), hand);
         if by_hand.is_err() && self.known.held.take().is_some() && self.cell.config.load.is_some() {
-            // The controller must not carry what is lost.
+            // The controller must not compensate a lost load.
             self.robot.set_load(Load::NONE)?;
         }
         self.report.hand_verdicts.push((step, by_hand.clone().err()));
@@ -106,7 +106,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
     }
 }
 
-/// Whether the hand holds what it closed on; why not, where it does not.
+/// Whether the hand still holds the part on which it closed; else the reason.
 fn held(closed: &HandState, now: &HandState) -> Result<(), String> {
     let [closed_mm, now_mm] = [closed.opening_m * 1e3, now.opening_m * 1e3];
     if closed.opening_m < MIN_HELD_WIDTH_M {
@@ -117,7 +117,7 @@ fn held(closed: &HandState, now: &HandState) -> Result<(), String> {
     }
     if !now.is_grasping {
         let force = now.force_n.map_or_else(String::new, |force_n| format!(" with {force_n:.0} N"));
-        return Err(format!("the fingers are at {now_mm:.1} mm and do not press on the part as told{force}"));
+        return Err(format!("the fingers are at {now_mm:.1} mm and do not press on the part as commanded{force}"));
     }
     Ok(())
 }

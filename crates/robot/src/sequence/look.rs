@@ -1,4 +1,4 @@
-//! Looking: from afar, and from above what was found.
+//! Looks: from a distance, and from above a detection.
 
 use nalgebra::{Isometry3, Vector3};
 use sdg_kinematics::{IkOptions, IkSolution, KinematicsError, with_fingers_exchanged};
@@ -11,17 +11,16 @@ use crate::lying_part::LyingPart;
 use crate::perception::GraspStep;
 use crate::surroundings::Destination;
 
-/// Where the camera looks from above the part: small shifts, so that it stays in the middle of the picture, m.
+/// Camera positions above the part: small shifts that keep it near the centre of the picture, m.
 pub(super) const HOVER_SHIFTS_M: [[f64; 2]; 3] = [[0.0, 0.0], [-0.03, 0.03], [0.03, -0.03]];
-/// Score on which perception decides.
+/// Score threshold of perception.
 pub const SURE: f64 = 0.5;
-/// What lies where the first look found the part is it at a lower score already, where it lies within so many metres and
-/// radians of that.
+/// A detection within this many metres and radians of the first look's part is accepted at a lower score.
 pub const CONFIRMED: f64 = 0.2;
 const CONFIRMED_WITHIN: (f64, f64) = (0.015, 0.26);
 
 impl<A: Arm> Sequence<'_, '_, A> {
-    /// Looks from one place after the other until the part is found.
+    /// Looks from one pose after the other until the part is found.
     pub(super) fn look_around(&mut self) -> Steps<GraspTarget> {
         let config = self.cell.config;
         let table_height_m = self.robot.limits().table_height_m;
@@ -33,7 +32,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
             };
             match arrived {
                 Err(stop) if looks == 0 || self.robot.latched().is_some() => return Err(stop),
-                // A place that cannot be reached is not looked from.
+                // An unreachable pose is skipped.
                 Err(_) => continue,
                 Ok(()) => self.robot.wait(SETTLE_SECS)?,
             }
@@ -46,7 +45,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         Err(Stop::Failed(GraspStep::Detect, format!("the part was not found in {looks} looks")))
     }
 
-    /// Looks again from above what the first look found: nearer to the middle of the picture, errors are smaller.
+    /// Looks again from above the first look's detection: errors are smaller near the centre of the picture.
     pub(super) fn look_from_above(&mut self, first: &GraspTarget) -> Steps<GraspTarget> {
         let mut looks = 0;
         for shift_m in HOVER_SHIFTS_M {
@@ -63,7 +62,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         Err(Stop::Failed(GraspStep::Detect, format!("the part was not found in {looks} looks from above it")))
     }
 
-    /// Takes a picture and asks perception; a target that no hand can take is a failure.
+    /// Takes a picture and evaluates it; a target that no hand can take is a failure.
     fn find(&mut self, is_accepted: impl Fn(&GraspTarget) -> bool) -> Steps<Option<GraspTarget>> {
         let target = self.finder.find(self.robot.arm())?.filter(is_accepted);
         self.note_others();
@@ -86,7 +85,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         Ok(Some(found))
     }
 
-    /// Keeps where other parts lie by the last picture.
+    /// Stores the positions of other parts from the last picture.
     pub(super) fn note_others(&mut self) {
         let table_height_m = self.robot.limits().table_height_m;
         for other in self.finder.others() {
@@ -96,7 +95,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         }
     }
 
-    /// Refuses to begin a motion that rests on an old picture.
+    /// Refuses to start a motion that depends on an old picture.
     pub(super) fn check_age(&mut self) -> Steps<()> {
         let Some(taken) = self.known.picture_time.take() else { return Ok(()) };
         let (age_secs, max_secs) = (taken.elapsed().as_secs_f64(), self.cell.config.max_detection_age_secs);
@@ -106,17 +105,18 @@ impl<A: Arm> Sequence<'_, '_, A> {
         Err(Stop::Failed(
             GraspStep::Detect,
             format!(
-                "the detection is {age_secs:.1} s old when the arm is to move, at most {max_secs:.1} s are allowed"
+                "the detection is {age_secs:.1} s old when the arm should move, at most {max_secs:.1} s are allowed"
             ),
         ))
     }
 
-    /// Puts the camera over a grasp or shifted from there, the hand turned as for one of the grasps, which are at one place, or by half a turn more.
+    /// Moves the camera over a grasp or a point beside it, the hand turned as for one of the grasps, which are at one
+    /// place, or by half a turn more.
     pub(super) fn hover(&mut self, grasps: &[Isometry3<f64>], shift_m: [f64; 2], step: GraspStep) -> Steps<()> {
         self.look_down(grasps, shift_m, self.cell.config.hover_height_m, step)
     }
 
-    /// The same from another height above the table.
+    /// The same at another height above the table.
     pub(super) fn look_down(
         &mut self,
         grasps: &[Isometry3<f64>],
@@ -131,7 +131,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         let both_ways = grasps.iter().flat_map(|grasp| [*grasp, with_fingers_exchanged(grasp)]);
         let poses: Vec<Isometry3<f64>> = both_ways
             .map(|base_from_grasp| {
-                // The picture's up is the hand's x.
+                // The picture's up direction is the hand's x.
                 let up = base_from_grasp.rotation * Vector3::x();
                 let base_from_camera = camera_looking_down(x, y, height_m, up.y.atan2(up.x));
                 self.cell.camera.base_from_tcp(self.robot.geometry(), &base_from_camera)
@@ -167,7 +167,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
     }
 }
 
-/// Whether a second look sees what the first one saw.
+/// Whether a second look sees the part of the first one.
 fn confirms(first: &GraspTarget, second: &GraspTarget) -> bool {
     let apart = first.base_from_tcp.inverse() * second.base_from_tcp;
     second.score >= CONFIRMED

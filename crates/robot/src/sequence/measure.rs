@@ -1,4 +1,4 @@
-//! Two pictures on the way down, from places beside each other: the height of the part.
+//! Two pictures from adjacent positions during the approach: the height of the part.
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use sdg_geometry::Angle;
@@ -12,21 +12,22 @@ use crate::height::{
 };
 use crate::perception::GraspStep;
 
-/// The camera is at least so far from the part, m: nearer, pictures show too little of it.
+/// Minimum distance of the camera from the part, m: closer pictures show too little of it.
 const MIN_DISTANCE_M: f64 = 0.18;
 
-/// Share of the way sideways of a picture in place of one that showed nothing: with the one on the other side it is far enough apart.
+/// Share of the sideways distance for a picture that replaces one without the part: it is then far enough from the one
+/// on the other side.
 const NEARER: f64 = 0.5;
 
 impl<A: Arm> Sequence<'_, '_, A> {
-    /// Measures how high the part lies, where that is asked for; the grasp at that height.
+    /// Measures the part's height, if that is configured; returns the grasp at that height.
     pub(super) fn measure_height(&mut self, seen: &GraspTarget) -> Steps<GraspTarget> {
         let Some(measurement) = self.cell.config.height else { return Ok(*seen) };
         let mut report = HeightReport::default();
         let measured = self.look_from_two_places(seen, &measurement, &mut report);
         let measured = match measured {
             Ok(measured) => Ok(measured),
-            // The arm stands still and may go on.
+            // The arm stands still and may continue.
             Err(Stop::Failed(_, why)) if self.robot.latched().is_none() => Err(why),
             Err(stop) => return Err(stop),
         };
@@ -43,7 +44,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         self.known.surface_m = Some(settled.height_m - measurement.mark_height_m);
         let target = match (settled.source, &sightings[..]) {
             (HeightSource::Measured, [..]) => between(&sightings, settled.height_m),
-            // What one picture showed is nearer to the part than the look before it.
+            // One picture's result is closer to the part than the look before it.
             (HeightSource::Told, [nearer]) => Some(nearer.at_height(settled.height_m).target),
             (HeightSource::Told, []) => None,
             (HeightSource::Told, several) => between(several, settled.height_m),
@@ -55,8 +56,8 @@ impl<A: Arm> Sequence<'_, '_, A> {
         Ok(target)
     }
 
-    /// Takes pictures across the marked line, then along it, until two of them give a height by what lies beside the part: along wooden grain only one of
-    /// both directions does. Else the part's own height is the best there is.
+    /// Takes pictures across the marked line, then along it, until two of them give a height from the surface beside
+    /// the part: on wooden grain only one of both directions does. Otherwise the part's own height is used.
     fn look_from_two_places(
         &mut self,
         seen: &GraspTarget,
@@ -76,7 +77,8 @@ impl<A: Arm> Sequence<'_, '_, A> {
         let half_m = 0.5 * measurement.baseline_m;
         let (mut pictures, mut why): (Vec<Vec<Sighting>>, Option<String>) = (Vec::new(), None);
         let mut by_part: Option<(MeasuredHeight, [Sighting; 2])> = None;
-        // Where one of the first two shows nothing, the next is nearer to the part: long parts fill the picture, and gloss moves.
+        // If one of the first two shows nothing, the next is closer to the part: long parts fill the picture, and
+        // reflections move.
         let nearer_m = NEARER * half_m;
         let mut shown_at_m = None;
         for [across_m, along_m] in
@@ -115,7 +117,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
                             return Ok((measurement.combined(&height, &surface), pair));
                         }
                     }
-                    // Pictures at a right angle to each other may be too near.
+                    // Pictures at a right angle to each other may be too close.
                     Some(Err(error @ HeightError::SamePlace { .. })) => why = why.or(Some(error.to_string())),
                     Some(Err(error)) => why = Some(error.to_string()),
                     None => {}
@@ -133,14 +135,15 @@ impl<A: Arm> Sequence<'_, '_, A> {
         Err(fails(why.unwrap_or_else(|| format!("no two pictures from places {min_mm:.0} mm apart show the part"))))
     }
 
-    /// Puts the camera beside a part (m along and across its marked line), looking down, the hand turned to it.
+    /// Moves the camera to a position beside a part (m along and across its marked line), looking down, with the hand
+    /// turned to it.
     fn go_beside(&mut self, seen: &GraspTarget, [along_m, across_m]: [f64; 2], height_m: f64) -> Steps<()> {
         let beside = seen.base_from_tcp.rotation * Vector3::new(along_m, across_m, 0.0);
         self.look_down(&[seen.base_from_tcp], [beside.x, beside.y], height_m, GraspStep::Hover)
     }
 }
 
-/// The grasp between those of several pictures of one part, with its marks at a height; `None` without pictures.
+/// The mean of the grasps of several pictures of one part, with its marks at a height; `None` without pictures.
 fn between(sightings: &[Sighting], height_m: f64) -> Option<GraspTarget> {
     let targets: Vec<GraspTarget> = sightings.iter().map(|sighting| sighting.at_height(height_m).target).collect();
     let first = *targets.first()?;

@@ -4,12 +4,14 @@
 //! look ─> find ─> hover, turned ─> find ─> above ─> straight down ─> close ─> lift ─> hold
 //!          └ detect                 └ detect └────── approach ──┘       └───────┴───────┴ the hand's width and force decide
 //! ```
-//! Where the height of parts is not told, a camera on the hand takes two pictures on the way down, beside each other (measure.rs).
+//! If the height of parts is not given, a camera on the hand takes two pictures from adjacent positions during the
+//! approach (measure.rs).
 //!
-//! After an empty detection the arm looks from the next place: another place shows a tall part from another side, and shadows of the arm
-//! elsewhere. A camera beside the robot looks once, with the arm out of its view.
+//! After an empty detection the arm looks from the next pose: a tall part is then seen from another side, and the arm's
+//! shadows fall elsewhere. A camera beside the robot looks once, with the arm outside its view.
 //!
-//! Placing goes on from there: carry ─> come down until the place is felt ─> open, up ─> look where the part lies.
+//! Placing continues from there: carry ─> come down until contact with the place ─> open, up ─> look where the part
+//! lies.
 
 mod carry;
 mod config;
@@ -42,49 +44,50 @@ pub use placing::{PlacingConfig, PlacingOutcome, PlacingReport, grasp_and_place}
 
 use held_part::HeldPart;
 
-/// Least height of the arm over the table on its free motions, m.
+/// Minimum height of the arm over the table during free motions, m.
 pub const FREE_CLEARANCE_M: f64 = 0.05;
-/// How long the arm stands still before a picture, s.
+/// Time that the arm stands still before a picture, s.
 const SETTLE_SECS: f64 = 0.25;
 
-/// How a grasp ended.
+/// The outcome of a grasp.
 #[derive(Debug, Clone, PartialEq)]
 pub enum GraspOutcome {
     /// The part was lifted, and held to the end.
     Held,
     /// A step failed.
     Failed {
-        /// The step that failed.
+        /// The failed step.
         step: GraspStep,
-        /// Why, in one sentence.
+        /// The reason, in one sentence.
         why: String,
     },
 }
 
-/// How a grasp ended, with the targets of each look and the measurements of the hand.
+/// The outcome of a grasp, with the targets of each look and the measurements of the hand.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GraspReport {
-    /// How it ended.
+    /// The outcome.
     pub outcome: GraspOutcome,
-    /// What was found at each look, where it was sure enough.
+    /// The detections of each look above the threshold.
     pub targets: Vec<Option<GraspTarget>>,
-    /// How many looks there were from afar, and how many from above what they found.
+    /// Number of looks from a distance, and number from above the detections.
     pub looks: [usize; 2],
-    /// The hand's state when it had closed.
+    /// The hand's state after it closed.
     pub closed: Option<HandState>,
-    /// The verdict of the hand's width and force after closing, lifting and holding: `None` where the part is held, otherwise why not.
+    /// The verdict of the hand's width and force after closing, lifting and holding: `None` if the part is held,
+    /// otherwise the reason.
     pub hand_verdicts: Vec<(GraspStep, Option<String>)>,
-    /// What was touched on soft ways down, in their order.
+    /// The contacts of compliant descents, in order.
     pub touched: Vec<Touched>,
-    /// How high the part lies, where that was to be measured.
+    /// The part's height, if it was to be measured.
     pub height: Option<HeightReport>,
 }
 
 /// Grasps the part once.
 ///
 /// # Errors
-/// What ended the sequence other than a grasp that failed: perception that could not work, and everything after which nothing
-/// moves until a person says so, but for a part that held the arm up, which is a failed grasp.
+/// Errors that end the sequence other than a failed grasp: perception that could not work, and every error after which
+/// nothing moves until a person allows it. A part that stopped the arm is an exception: it is a failed grasp.
 pub fn grasp<A: Arm>(
     robot: &mut Robot<'_, A>,
     finder: &mut dyn PartFinder<A>,
@@ -97,10 +100,10 @@ pub fn grasp<A: Arm>(
     Ok(sequence.grasp_report(outcome))
 }
 
-/// As [`grasp`], with an arm that yields: it comes down as [`GraspConfig::soft_approach`] says.
+/// As [`grasp`], with a compliant arm: it comes down as [`GraspConfig::soft_approach`] says.
 ///
 /// # Errors
-/// As [`grasp`].
+/// As for [`grasp`].
 pub fn grasp_softly<A: CompliantArm>(
     robot: &mut Robot<'_, A>,
     finder: &mut dyn PartFinder<A>,
@@ -113,10 +116,10 @@ pub fn grasp_softly<A: CompliantArm>(
     Ok(sequence.grasp_report(outcome))
 }
 
-/// Comes down until something is felt.
+/// Comes down until a contact.
 type Touch<A> = fn(&mut Robot<'_, A>, &TouchDown) -> Result<Touched>;
 
-/// Why the sequence ended early.
+/// The reason why the sequence ended early.
 enum Stop {
     Failed(GraspStep, String),
     Error(RobotError),
@@ -130,7 +133,7 @@ impl From<RobotError> for Stop {
 
 type Steps<T> = std::result::Result<T, Stop>;
 
-/// What is wrong with one grasp is a failure of its step; what is wrong with the robot ends everything.
+/// Planning and safety errors fail the step; others abort.
 fn fails_at<T>(step: GraspStep, result: Result<T>) -> Steps<T> {
     result.map_err(|error| match error {
         RobotError::Planning(error) => Stop::Failed(step, error.to_string()),
@@ -147,37 +150,37 @@ struct Sequence<'s, 'r, A: Arm> {
     observer: &'s mut dyn StepObserver<A>,
     cell: Cell<'s, A>,
     known: Known,
-    /// What is reported in the end, but for the outcome.
+    /// The final report except the outcome.
     report: GraspReport,
 }
 
-/// What stays as it is during a sequence.
+/// The constant data of a sequence.
 struct Cell<'s, A: Arm> {
     camera: CameraPose,
     config: &'s GraspConfig,
-    /// Of an arm that yields.
+    /// For a compliant arm.
     touch: Option<Touch<A>>,
 }
 
-/// What is known at a moment of the attempt.
+/// The state of the attempt.
 struct Known {
-    /// When the picture was taken that the next motion rests on.
+    /// The time of the picture on which the next motion depends.
     picture_time: Option<Instant>,
-    /// The hand when it had closed.
+    /// The hand after it closed.
     closed: Option<HandState>,
     held: Option<HeldPart>,
-    /// z of what the part lies on as measured, m.
+    /// z of the surface under the part as measured, m.
     surface_m: Option<f64>,
-    /// Parts that lie and are not to be touched.
+    /// Lying parts that must not be touched.
     lying: LyingParts,
-    /// How far the hand is open, or is to be on the next straight way, m.
+    /// The present opening of the hand, or that of the next straight path, m.
     opening_m: f64,
-    /// How far the hand opens beyond the part, both sides together, m.
+    /// Opening of the hand beyond the part, both sides together, m.
     opening_margin_m: f64,
 }
 
 impl GraspReport {
-    /// Of an attempt of which nothing was done yet.
+    /// The state of an attempt before its first step.
     fn begun() -> Self {
         Self {
             outcome: GraspOutcome::Failed { step: GraspStep::Detect, why: "nothing was done".to_owned() },
@@ -219,7 +222,7 @@ impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
         Self { robot, finder, observer, cell, known, report: GraspReport::begun() }
     }
 
-    /// Comes down softly until something is felt, where the arm yields; `None` where it does not.
+    /// Comes down compliantly until a contact; `None` if the arm is not compliant.
     fn touch_down(&mut self, touch_down: &TouchDown, step: GraspStep) -> Steps<Option<Touched>> {
         let Some(touch) = self.cell.touch else { return Ok(None) };
         let touched = fails_at(step, touch(self.robot, touch_down))?;
@@ -227,7 +230,7 @@ impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
         Ok(Some(touched))
     }
 
-    /// Grasps what `is_wanted` does not refuse once it was found; how that ended.
+    /// Grasps the part unless `is_wanted` refuses it after detection; returns the outcome.
     fn grasp(&mut self, is_wanted: impl FnOnce(&mut Self, &GraspTarget) -> Steps<()>) -> Result<GraspOutcome> {
         match self.run(is_wanted) {
             Ok(()) => Ok(GraspOutcome::Held),
@@ -253,7 +256,7 @@ impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
         self.take(&target)
     }
 
-    /// From above a part that was found to the part in the air.
+    /// From above a found part to the lifted part.
     fn take(&mut self, target: &GraspTarget) -> Steps<()> {
         self.known.lying.take(&target.base_from_tcp);
         let approach = self.go_above(target)?;
@@ -263,12 +266,12 @@ impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
         self.hold()
     }
 
-    /// z of what the part lies on, m: as measured, or else the table's as told.
+    /// z of the surface under the part, m: as measured, or else the table's given height.
     fn surface_height_m(&self) -> f64 {
         self.known.surface_m.unwrap_or(self.robot.limits().table_height_m)
     }
 
-    /// Tells the observer that a step is done; its word is a failure of the step.
+    /// Tells the observer that a step is done; a reason from it fails the step.
     fn passed(&mut self, step: GraspStep) -> Steps<()> {
         match self.observer.after(self.robot.arm(), step)? {
             None => Ok(()),
@@ -282,7 +285,7 @@ impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
 }
 
 impl<'s, 'r, A: CompliantArm> Sequence<'s, 'r, A> {
-    /// As [`Sequence::new`], with an arm that yields.
+    /// As [`Sequence::new`], with a compliant arm.
     fn yielding(
         robot: &'s mut Robot<'r, A>,
         finder: &'s mut dyn PartFinder<A>,

@@ -1,12 +1,12 @@
-//! Putting the held part down: by contact, not by height, and checked by a look.
+//! Puts the held part down, by contact instead of height, and checks it with a look.
 //!
 //! ```text
-//! held ─> carry ─> straight down, softly at the end, until the place is felt ─> open, up ─> look ─> within the tolerance
-//!           ▲                                                                                └ beside it: take it again,
-//!           └────────────────── aim with where the part was in the hand ◄───────────────────────┘ so many times
+//! held ─> carry ─> straight down, compliant at the end, until contact ─> open, up ─> look ─> within the tolerance
+//!           ▲                                                                        └ outside: take it again,
+//!           └── aim with the part's pose in the hand ◄───────────────────────────────┘ a limited number of times
 //! ```
-//! Fingers do not hold a part along the line that they close across: some parts slide there when they are closed on. The look shows by how
-//! much, and the next time the hand aims so that it makes no difference.
+//! Fingers do not hold a part along the line across which they close: some parts slide there when the fingers close.
+//! The look measures this offset, and the next placement compensates it.
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use sdg_geometry::{Angle, RotationalSymmetry};
@@ -29,37 +29,37 @@ use crate::robot::Robot;
 use crate::room::{release_opening_m, same_turns_rad};
 use crate::touch::{TouchDown, Touched};
 
-/// Speed at which the opening changes when the part is let go, m/s.
+/// Speed at which the opening changes when the part is released, m/s.
 const RELEASING_SPEED_M_S: f64 = 0.05;
-/// How long the arm stands still after the fingers have opened, s.
+/// Time that the arm stands still after the fingers have opened, s.
 const RELEASED_SECS: f64 = 0.2;
-/// Steps in which the way up is made shorter where the arm cannot reach so far, m.
+/// Steps by which the ascent is shortened if the arm cannot reach so far, m.
 const RETREAT_STEP_M: f64 = 0.05;
 
-/// How a held part is put down.
+/// Settings for putting a held part down.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlacingConfig {
-    /// How the hand comes down at the end.
+    /// The compliant descent at the end.
     pub touch_down: TouchDown,
-    /// Turns of the part that count as the same.
+    /// Turns of the part that are equivalent.
     pub symmetry: RotationalSymmetry,
-    /// How far the hand opens beyond the part to let it go, both sides together, m.
+    /// Opening of the hand beyond the part for releasing it, both sides together, m.
     pub release_margin_m: f64,
-    /// How far it then goes up, m.
+    /// Height of the ascent after that, m.
     pub retreat_m: f64,
-    /// How far beside its place the part may lie, m.
+    /// Largest offset of the part from its place, m.
     pub tolerance_m: f64,
-    /// How far it may be turned, rad.
+    /// Largest turn, rad.
     pub tolerance_rad: f64,
-    /// A part that lies farther beside its place, m, or is turned by more, rad, is taken again: less than what is allowed, for looks are
-    /// not exact.
+    /// A part with a larger offset, m, or turn, rad, is grasped again: below the tolerances, because looks are not
+    /// exact.
     pub aim: (f64, f64),
-    /// How often.
+    /// Maximum number of such repetitions.
     pub max_corrections: usize,
 }
 
 impl Default for PlacingConfig {
-    /// Within 3 mm and 3°, taken again beyond 2 mm or 2°, twice.
+    /// Within 3 mm and 3°, grasped again beyond 2 mm or 2°, twice.
     fn default() -> Self {
         Self {
             touch_down: TouchDown::default(),
@@ -74,38 +74,40 @@ impl Default for PlacingConfig {
     }
 }
 
-/// How placing ended.
+/// The outcome of placing.
 #[derive(Debug, Clone, PartialEq)]
 pub enum PlacingOutcome {
-    /// The part lies where it was to lie.
+    /// The part lies at its place.
     Placed,
-    /// A step failed, of the grasp or of placing.
+    /// A step of the grasp or of placing failed.
     Failed {
-        /// The step that failed.
+        /// The failed step.
         step: GraspStep,
-        /// Why, in one sentence.
+        /// The reason, in one sentence.
         why: String,
     },
 }
 
-/// How placing ended, with what was measured on the way.
+/// The outcome of placing, with the measurements.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlacingReport {
     /// The first grasp.
     pub grasp: GraspReport,
-    /// How it ended.
+    /// The outcome.
     pub outcome: PlacingOutcome,
-    /// What was felt each time the part was put down, and on soft approaches after the first.
+    /// The contacts each time the part was put down, and of compliant approaches after the first.
     pub touched: Vec<Touched>,
-    /// How far the part lay beside its place by each look; for a bin from its middle. None where the part was not seen in a bin.
+    /// The part's offset from its place by each look; for a bin from its centre. None if the part was not seen in a
+    /// bin.
     pub errors: Vec<PlaceOffset>,
 }
 
-/// Grasps the part once and puts it down. A cell of a tray must have room for the part and for the fingers that let it go among the parts in the
-/// cells around it, whether there are any or not: by [`GraspConfig::part`] before anything moves, else once the part was found.
+/// Grasps the part once and puts it down. A cell of a tray must have room for the part and for the fingers that release
+/// it, with parts assumed in all neighbouring cells. This is judged by [`GraspConfig::part`] before anything moves,
+/// otherwise after the part was found.
 ///
 /// # Errors
-/// As [`super::grasp`]; [`crate::RobotError::Configuration`] where there is no room by [`GraspConfig::part`].
+/// As [`super::grasp`]; [`crate::RobotError::Configuration`] if there is no room by [`GraspConfig::part`].
 pub fn grasp_and_place<A: CompliantArm>(
     robot: &mut Robot<'_, A>,
     finder: &mut dyn PartFinder<A>,
@@ -135,14 +137,14 @@ pub fn grasp_and_place<A: CompliantArm>(
 }
 
 impl PlacingOutcome {
-    /// Whether the part lies where it was to lie.
+    /// Whether the part lies at its place.
     pub fn is_placed(&self) -> bool {
         *self == Self::Placed
     }
 }
 
 impl<A: Arm> Sequence<'_, '_, A> {
-    /// Refuses a part that has no room in its place by what is known now, and keeps off what may lie around.
+    /// Refuses a part that has no room in its place by present knowledge, and avoids parts that may lie around it.
     fn prepare(&mut self, target: &GraspTarget, goal: &PlaceGoal, placing: &PlacingConfig) -> Steps<()> {
         let table_height_m = self.surface_height_m();
         let Some(part) = shape_of(target, table_height_m, self.cell.config) else { return Ok(()) };
@@ -157,10 +159,10 @@ impl<A: Arm> Sequence<'_, '_, A> {
             && let Some(other) = self.known.lying.all().iter().find(|other| other.overlaps(&placed))
         {
             let p = other.base_from_part.translation;
-            let why = format!("in \"{}\" lies a part already, at ({:.3}, {:.3}) m", goal.name, p.x, p.y);
+            let why = format!("\"{}\" already contains a part, at ({:.3}, {:.3}) m", goal.name, p.x, p.y);
             return Err(Stop::Failed(GraspStep::Detect, why));
         }
-        // What is taken from where a cell is shows that nothing else lies there.
+        // After a part was taken from a cell's place, nothing else lies there.
         for neighbour in goal.neighbours_in_base(height_m).map(there).filter(|part| !part.overlaps(&taken)) {
             self.known.lying.suppose(neighbour);
         }
@@ -180,7 +182,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
             lies.into_iter().for_each(|part| self.known.lying.put(part));
             let found = match (self.look_at(goal, &aim.base_from_part, placing)?, goal.bin_m) {
                 (Some(found), _) => found,
-                // In a bin a part lies anyhow, under others, too.
+                // In a bin a part may lie in any pose, also under others.
                 (None, Some(_)) => return Ok(()),
                 (None, None) => return Err(fails("the part is not seen where it was put down".to_owned())),
             };
@@ -210,27 +212,28 @@ impl<A: Arm> Sequence<'_, '_, A> {
             num_corrections += 1;
             self.known.lying.take(&aim.base_from_part);
             slid = slip(&aim.base_from_part, &found.base_from_tcp, &base_from_tcp, &part_from_tcp, &error);
-            // The hand is turned as it let the part go, where its fingers had room.
+            // The hand keeps the turn at which it released the part, where its fingers had room.
             let mut target =
                 GraspTarget { base_from_tcp: as_aimed(&aim.base_from_part, &found.base_from_tcp, &error), ..found };
             target.base_from_tcp.translation.z = match self.cell.config.height {
-                // The place is told, and what lies in it was measured before it was taken.
+                // The place's height is given, and its contents were measured before they were taken.
                 Some(_) => aim.base_from_part.translation.z,
-                // Perception takes the part to lie on the table.
+                // Perception assumes that the part lies on the table.
                 None => found.base_from_tcp.translation.z + goal.surface_m - self.robot.limits().table_height_m,
             };
             self.known.surface_m = self.cell.config.height.map(|_| goal.surface_m);
-            // It was looked at from above, and others lie beside it: the hand opens no wider than to let go.
+            // The part was seen from above, with other parts next to it: the hand opens no wider than for releasing.
             self.known.opening_margin_m = placing.release_margin_m;
             self.take(&target)?;
         }
     }
 
-    /// Comes down softly until the place is felt.
+    /// Comes down compliantly until contact with the place.
     fn put_down(&mut self, aim: &Aim, placing: &PlacingConfig) -> Steps<()> {
         let touch_down = TouchDown { max_way_m: SOFT_WAY_M + BELOW_M, ..placing.touch_down };
         let Some(touched) = self.touch_down(&touch_down, GraspStep::PutDown)? else {
-            let why = "the arm does not yield, and a place is felt; the part is still held".to_owned();
+            let why =
+                "this arm is not compliant, so it cannot put a part down by contact; the part is still held".to_owned();
             return Err(Stop::Failed(GraspStep::PutDown, why));
         };
         let hand = self.robot.hand()?;
@@ -243,7 +246,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         Err(Stop::Failed(GraspStep::PutDown, why))
     }
 
-    /// Opens the hand and goes up; where the tcp was in the part's frame by the detection.
+    /// Opens the hand and moves up; returns the tcp's pose in the part's frame by the detection.
     fn release(&mut self, placing: &PlacingConfig) -> Steps<Isometry3<f64>> {
         let opening_m = self.release_opening_m(placing);
         self.robot.start_hand(HandCommand::Move { opening_m, speed_m_s: RELEASING_SPEED_M_S })?;
@@ -262,7 +265,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         Ok(part_from_tcp)
     }
 
-    /// How far the hand opens to let go what it closed on, m.
+    /// Opening of the hand that releases the held part, m.
     fn release_opening_m(&self, placing: &PlacingConfig) -> f64 {
         release_opening_m(self.known.closed.map_or(0.0, |hand| hand.opening_m), placing.release_margin_m)
     }
@@ -279,7 +282,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         }
     }
 
-    /// Looks where the part lies.
+    /// Measures where the part lies with a look.
     fn look_at(
         &mut self,
         goal: &PlaceGoal,
@@ -328,9 +331,10 @@ impl<A: Arm> Sequence<'_, '_, A> {
     }
 }
 
-/// In so many turns of a part that looks the same in all it is looked at, at most: a hand that was turned for its fingers may reach too far to look so.
+/// Maximum number of symmetric view orientations: a hand that was turned for its fingers may not reach the one of its
+/// own turn.
 const MAX_LOOK_TURNS: usize = 4;
-/// What is farther from its place is another part, m.
+/// A part farther from its place is another part, m.
 const MAX_SEEN_BESIDE_M: f64 = 0.03;
 
 fn fails(why: String) -> Stop {
@@ -346,26 +350,27 @@ fn yaw(base_from_tcp: &Isometry3<f64>) -> Angle {
     Angle::from_direction(along.x, along.y)
 }
 
-/// How far a part lies beside its place.
+/// Offset of a part from its place.
 fn beside(place: &Isometry3<f64>, found: &Isometry3<f64>, symmetry: RotationalSymmetry) -> PlaceOffset {
     let apart = place.inverse() * Point3::from(found.translation.vector);
     PlaceOffset { beside_m: [apart.x, apart.y], angle_rad: symmetry.visible(yaw(found) - yaw(place)).radians() }
 }
 
-/// Whether a part is inside of a bin, seen from above.
+/// Whether a part is inside a bin, as seen from above.
 fn inside(goal: &PlaceGoal, found: &Isometry3<f64>, [along_m, across_m]: [f64; 2]) -> bool {
     let place = goal.base_from_part(0.0, 0.0);
     let apart = place.inverse() * Point3::from(found.translation.vector);
     apart.x.abs() <= 0.5 * along_m && apart.y.abs() <= 0.5 * across_m
 }
 
-/// The pose that was found, without the turns that cannot be seen: as near as it can be to the one that was aimed at.
+/// The found pose turned by the part's symmetry as close as possible to the intended one.
 fn as_aimed(place: &Isometry3<f64>, found: &Isometry3<f64>, error: &PlaceOffset) -> Isometry3<f64> {
     let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), error.angle_rad);
     Isometry3::from_parts(found.translation, turn * place.rotation)
 }
 
-/// How the part slid in its own frame when the hand closed: where the tcp was in it when it was let go, against where it was by the detection.
+/// The slip of the part in its own frame when the hand closed: the tcp's pose in it at release, relative to its pose by
+/// the detection.
 fn slip(
     place: &Isometry3<f64>,
     found: &Isometry3<f64>,

@@ -1,4 +1,4 @@
-//! From above the part straight down to it.
+//! The descent from above the part to it.
 
 use nalgebra::{Isometry3, Translation3};
 use sdg_kinematics::{Approach, GraspSymmetry, IkOptions, JointPath, JointVector, LineOptions, with_fingers_exchanged};
@@ -12,29 +12,29 @@ use crate::perception::GraspStep;
 use crate::surroundings::{Destination, Way};
 use crate::touch::TouchDown;
 
-/// Least distance of the finger tips to the table when closing, m.
+/// Minimum distance of the finger tips to the table when closing, m.
 const FINGERTIP_CLEARANCE_M: f64 = 0.002;
-/// Speed at which the opening changes on the way to the part, m/s.
+/// Speed at which the opening changes during the descent, m/s.
 const OPENING_SPEED_M_S: f64 = 0.2;
-/// How long the arm stands still before the hand closes, s.
+/// Time that the arm stands still before the hand closes, s.
 const SETTLE_SECS: f64 = 0.1;
-/// Heights from which a straight way down is looked for, m.
+/// Heights from which a straight descent is searched, m.
 const HEIGHTS_M: [f64; 3] = [0.25, 0.15, 0.10];
-/// The hand opens so far beyond a part, both sides together, where others are in the way of more, m.
+/// Opening of the hand beyond a part, both sides together, if other parts leave no room for more, m.
 const NARROW_MARGIN_M: f64 = 0.020;
-/// A soft way down begins so far above its end, m.
+/// A compliant descent starts this far above its end, m.
 const SOFT_WAY_M: f64 = 0.020;
-/// What is felt higher above the grasp is not the table, m.
+/// A contact higher above the grasp is not the table, m.
 const MAX_EARLY_M: f64 = 0.010;
 
-/// How the hand comes above a grasp, with the straight way down from there.
+/// A path to above a grasp, with the straight descent from there.
 enum Reach {
     Around(Way),
     Straight(Approach),
 }
 
 impl<A: Arm> Sequence<'_, '_, A> {
-    /// Puts the open hand above the grasp, as high as a straight way down exists from.
+    /// Moves the open hand above the grasp, to the greatest height with a straight descent.
     pub(super) fn go_above(&mut self, target: &GraspTarget) -> Steps<JointPath> {
         self.check_age()?;
         let limits = self.robot.limits();
@@ -71,11 +71,11 @@ impl<A: Arm> Sequence<'_, '_, A> {
         let why = first_error.unwrap_or_default();
         Err(Stop::Failed(
             GraspStep::Approach,
-            format!("no straight way down to ({:.2}, {:.2}, {:.3}) m: {why}", p.x, p.y, p.z),
+            format!("no straight path down to ({:.2}, {:.2}, {:.3}) m: {why}", p.x, p.y, p.z),
         ))
     }
 
-    /// How to come above a grasp; else why there is no way.
+    /// The path to above a grasp; else the reason why there is none.
     fn reach(&mut self, base_from_grasp: &Isometry3<f64>) -> Steps<Result<Reach, String>> {
         let seed = self.robot.commanded()?;
         let here = self.robot.geometry().forward(&seed).translation.z;
@@ -83,7 +83,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         for height in [&[here - base_from_grasp.translation.z], &HEIGHTS_M[..]].concat() {
             let height = height.max(0.05);
             if self.is_surrounded() {
-                // Whichever finger is on which side, whichever way of the arm: the cheapest.
+                // Both turns of the hand and all paths of the arm are tried: the cheapest is used.
                 let grasps = [*base_from_grasp, with_fingers_exchanged(base_from_grasp)];
                 match self.way_to(&Destination::Approached(&grasps, height)) {
                     Ok(way) => return Ok(Ok(Reach::Around(way))),
@@ -128,7 +128,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         Ok(self.robot.wait(SETTLE_SECS)?)
     }
 
-    /// As an approach goes, and softly on the last of it.
+    /// With the speed of an approach, and compliantly at its end.
     fn descend_softly(&mut self, path: &JointPath, touch_down: &TouchDown) -> Steps<()> {
         let base_from_grasp = self.robot.geometry().forward(path.end());
         self.go_down_to(path.start(), &above(&base_from_grasp, SOFT_WAY_M), GraspStep::Approach)?;
@@ -144,7 +144,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         Ok(())
     }
 
-    /// Straight to a pose below, as an approach goes.
+    /// Straight to a pose below, with the speed of an approach.
     pub(super) fn go_down_to(
         &mut self,
         start: &JointVector,
@@ -160,7 +160,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
 }
 
 fn no_approach() -> Stop {
-    Stop::Failed(GraspStep::Approach, "the way around the obstacles has no approach".to_owned())
+    Stop::Failed(GraspStep::Approach, "the path around the obstacles has no approach".to_owned())
 }
 
 /// A pose higher up.

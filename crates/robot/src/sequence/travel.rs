@@ -1,4 +1,4 @@
-//! Free motions: straight in joint space over an empty table, or around what stands in the cell.
+//! Free motions: straight in joint space over an empty table, or around the obstacles of the cell.
 
 use sdg_kinematics::{JointLimits, JointPath, JointVector};
 
@@ -13,17 +13,17 @@ use crate::perception::GraspStep;
 use crate::surroundings::{Destination, Surroundings, Way};
 
 impl<A: Arm> Sequence<'_, '_, A> {
-    /// Whether anything stands or lies in the cell that motions have to be planned around.
+    /// Whether the cell contains obstacles or parts around which motions must be planned.
     pub(super) fn is_surrounded(&self) -> bool {
         !(self.cell.config.obstacles.is_empty() && self.known.lying.all().is_empty())
     }
 
-    /// What stands and lies around the arm, and what it holds.
+    /// The obstacles and parts around the arm, and the held part.
     pub(super) fn surroundings(&self) -> Surroundings<'_> {
         around(self.cell.config, &self.known.lying, self.known.held.as_ref(), self.known.opening_m)
     }
 
-    /// A way around what stands and lies in the cell.
+    /// A path around the obstacles and parts of the cell.
     pub(super) fn way_to(&mut self, to: &Destination<'_>) -> Result<Way> {
         let limits = self.free_limits();
         let surroundings = around(self.cell.config, &self.known.lying, self.known.held.as_ref(), self.known.opening_m);
@@ -38,7 +38,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         }
     }
 
-    /// Goes along a way; its approach, where it has one, is left to go.
+    /// Follows a path; its approach, if it has one, remains.
     pub(super) fn travel(&mut self, way: Way, step: GraspStep) -> Steps<Option<JointPath>> {
         self.robot.set_contact_sensitivity(ContactSensitivity::Free)?;
         for motion in way.motions {
@@ -47,7 +47,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         Ok(way.approach)
     }
 
-    /// Goes to a configuration, keeping off the table and what stands in the cell.
+    /// Moves to a configuration, avoiding the table and the obstacles of the cell.
     pub(super) fn move_freely(&mut self, q: &JointVector, step: GraspStep) -> Steps<()> {
         if self.is_surrounded() {
             let planned = self.way_to(&Destination::Configuration(q));
@@ -59,14 +59,14 @@ impl<A: Arm> Sequence<'_, '_, A> {
         let motion = fails_at(step, planned)?;
         let (arm, table_height_m) = (self.robot.geometry(), self.robot.limits().table_height_m);
         let clearance = motion.clearance(arm, table_height_m);
-        // What is held hangs lower than the fingers.
+        // The held part hangs lower than the fingers.
         let held_m = self.known.held.as_ref().map_or(0.0, |held| held.hang_m);
-        // The end is wanted, whatever its height; on the way the arm must not come lower.
+        // The end is intended at any height; before it the arm must not be lower.
         let allowed = (FREE_CLEARANCE_M + held_m).min(arm.clearance(q, table_height_m).lowest_m - 1e-3);
         if clearance.lowest_m < allowed {
             return Err(Stop::Failed(
                 step,
-                format!("the way there passes {:.0} mm over the table", clearance.lowest_m * 1e3),
+                format!("the path there passes {:.0} mm over the table", clearance.lowest_m * 1e3),
             ));
         }
         self.robot.set_contact_sensitivity(ContactSensitivity::Free)?;
@@ -74,7 +74,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
     }
 }
 
-/// What stands and lies around an arm, and what it holds.
+/// The obstacles and parts around an arm, and the held part.
 fn around<'s>(
     config: &'s GraspConfig,
     lying: &'s LyingParts,

@@ -1,11 +1,11 @@
-//! What is wrong with a workcell's file.
+//! Errors of a workcell's file.
 
-/// What is wrong, and in which line.
+/// An error and its line.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("line {line}: {what}")]
 pub struct WorkcellError {
     /// Counted from 1.
     pub line: usize,
-    /// What was expected, and what was found.
+    /// The expected and the found value.
     pub what: String,
 }

@@ -15,24 +15,24 @@ use crate::robot_address::RobotAddress;
 use crate::safety::WorkspaceBox;
 use crate::sequence::LookOut;
 
-/// What files of this layout begin with.
+/// The first line of files of this layout.
 const FORMAT: i64 = 1;
-/// A table is not farther from the base's height, mm.
+/// Largest distance of a table from the base's height, mm.
 const MAX_TABLE_MM: f64 = 1000.0;
-/// No finger is longer than this beyond the tcp, mm.
+/// Largest length of a finger beyond the tcp, mm.
 const MAX_FINGERTIP_MM: f64 = 100.0;
-/// Shorter finger tips than these, but for none, are lengths in metres.
+/// Shorter finger tips than this, except 0, are probably lengths in metres.
 const MIN_FINGERTIP_MM: f64 = 0.1;
-/// What the hand holds for long, N.
+/// Force that the hand can hold permanently, N.
 const MAX_FORCE_N: f64 = 70.0;
-/// How far a part reaches from its grasp unless told, and at most, mm.
+/// Default and largest extent of a part from its grasp, mm.
 const PART_RADIUS_MM: f64 = 60.0;
 const MAX_PART_MM: f64 = 500.0;
-/// What a Panda may carry, kg.
+/// Payload of a Panda, kg.
 const MAX_LOAD_KG: f64 = 3.0;
 /// Heights of a camera above the table, mm.
 const CAMERA_HEIGHTS_MM: [f64; 2] = [150.0, 1200.0];
-/// Franka's own finger tips reach this far beyond its tcp, mm.
+/// Franka's own finger tips extend this far beyond its tcp, mm.
 const FINGERTIP_MM: f64 = 9.0;
 
 #[derive(Deserialize)]
@@ -117,7 +117,7 @@ fn read(text: &str) -> Result<Workcell, WorkcellError> {
     let source = Source(text);
     let file: File = toml::from_str(text).map_err(|error| {
         let at = error.span().map_or(0, |span| span.start);
-        // The parser's message goes on with the place in the text, which the line says.
+        // The parser's message continues with the place in the text, which the line number replaces.
         source.error(at, error.message().split_whitespace().collect::<Vec<_>>().join(" "))
     })?;
     if *file.format.get_ref() != FORMAT {

@@ -1,20 +1,20 @@
-//! A workcell's file: the robot, what it carries, the camera, the table, and where the arm may go.
+//! A workcell's file: the robot, its load, the camera, the table, and the workspace.
 //!
 //! ```toml
 //! format = 1
 //!
 //! [robot]
 //! model = "panda"                   # or "fr3"
-//! address = "172.16.0.2"            # may be left out; --robot says it too
+//! address = "172.16.0.2"            # may be left out; --robot sets it too
 //!
 //! [tool]                            # may be left out
 //! fingertip_beyond_tcp_mm = 9.0     # how far the finger tips reach beyond the tcp
 //! grasp_force_n = 40.0
-//! part_mass_kg = 0.2                # told to the controller while the part is held
+//! part_mass_kg = 0.2                # given to the controller while the part is held
 //! part_radius_mm = 60               # the part reaches so far from its grasp: it is kept off the obstacles, too
 //!
 //! [camera]
-//! file = "camera.yaml"              # beside this file; --camera says it too
+//! file = "camera.yaml"              # beside this file; --camera sets it too
 //! mounting = "hand"                 # or "base"
 //!
 //! [table]
@@ -35,14 +35,14 @@
 //! [[obstacle]]                      # any number; motions are planned around them
 //! name = "fixture"
 //! box_mm = [200, 100, 300]          # or cylinder_mm = [diameter, length], along z; capsule_mm = [diameter, length over all];
-//! at_mm = [500, 300, 150]           # or plane_normal = [x, y, z], out of what is solid; its middle, in the base frame
+//! at_mm = [500, 300, 150]           # or plane_normal = [x, y, z], out of the solid; middle in the base frame
 //! rpy_deg = [0, 0, 30]              # roll, pitch, yaw; may be left out
 //!
 //! [[place]]                         # one pose for a part: sdg grasp --place shelf
 //! name = "shelf"
 //! at_mm = [450, 300]                # x, y of the part's grasp, base frame
 //! yaw_deg = 90                      # direction of its marked line; may be left out
-//! height_mm = 0                     # of what it stands on, above the table; may be left out
+//! height_mm = 0                     # of its base, above the table; may be left out
 //!
 //! [[tray]]                          # a grid of cells: sdg grasp --place tray:7; yaw_deg and height_mm as above
 //! name = "tray"
@@ -56,7 +56,7 @@
 //! at_mm = [450, -300]               # its middle
 //! size_mm = [200, 150]              # of its inside, along its x and its y
 //! ```
-//! Every error names the line. This crate holds no file: text in, a [`Workcell`] out.
+//! Every error names the line. This crate reads no files: text in, a [`Workcell`] out.
 
 mod error;
 mod file;
@@ -108,36 +108,36 @@ impl RobotModel {
 pub struct Workcell {
     /// The robot's model.
     pub robot: RobotModel,
-    /// Where it is on the network.
+    /// Its network address.
     pub address: Option<String>,
-    /// How far the finger tips reach beyond the tcp, m.
+    /// Distance of the finger tips beyond the tcp, m.
     pub fingertip_beyond_tcp_m: f64,
     /// Force of each finger, N.
     pub grasp_force_n: f64,
     /// Mass of the part, kg.
     pub part_mass_kg: Option<f64>,
-    /// How far the part reaches to all sides of its grasp, m.
+    /// Extent of the part to all sides of its grasp, m.
     pub part_radius_m: f64,
-    /// The camera's file, as it is written.
+    /// The camera's file, as written in the workcell's file.
     pub camera_file: Option<String>,
     /// How the camera is mounted.
     pub mount: Mount,
     /// The table's z in the base frame, m.
     pub table_height_m: f64,
-    /// Where the table is along x and y of the base frame, m, where that is told.
+    /// Range of the table along x and y of the base frame, m, if given.
     pub table_m: Option<[[f64; 2]; 2]>,
-    /// Box that tcp and flange stay in, in the base frame.
+    /// Box that limits tcp and flange, in the base frame.
     pub workspace: WorkspaceBox,
-    /// Where the arm looks out from.
+    /// The look-out poses of the arm.
     pub look_outs: Vec<LookOut>,
-    /// What stands in the cell besides the table.
+    /// Obstacles in the cell besides the table.
     pub obstacles: Vec<Obstacle>,
-    /// Where parts are put down.
+    /// Places for putting parts down.
     pub places: Vec<Place>,
 }
 
 impl Workcell {
-    /// What every motion in this workcell keeps to.
+    /// The limits of every motion in this workcell.
     pub fn safety_limits(&self) -> SafetyLimits {
         let of_robot = match self.robot {
             RobotModel::Panda => SafetyLimits::default(),
@@ -151,7 +151,7 @@ impl Workcell {
         }
     }
 
-    /// The sequence in this workcell, at the pace of rehearsals; the part hangs at the tcp.
+    /// The sequence in this workcell, at the pace of rehearsals; the part's mass is at the tcp.
     pub fn grasp_config(&self) -> GraspConfig {
         let load = self.part_mass_kg.map(|mass_kg| crate::arm_state::Load {
             mass_kg,
@@ -170,7 +170,7 @@ impl Workcell {
     /// The arm with its fingers at an opening (m), the table and the obstacles.
     ///
     /// # Errors
-    /// An opening that the hand does not have; obstacles were checked when the file was read.
+    /// An opening outside the hand's range; obstacles were checked when the file was read.
     pub fn collision_model(&self, opening_m: f64) -> Result<CollisionModel, CollisionError> {
         surroundings::collision_model(&self.robot.geometry(), self.table_height_m, &self.obstacles, opening_m)
     }
@@ -178,7 +178,7 @@ impl Workcell {
     /// The place of this name, or the cell of a tray: `NAME` or `NAME:CELL`.
     ///
     /// # Errors
-    /// [`RobotError::Configuration`] with the places that there are, or the cells.
+    /// [`RobotError::Configuration`] with the existing places or cells.
     pub fn place(&self, text: &str) -> RobotResult<PlaceGoal> {
         let wrong = |expected: String| RobotError::Configuration {
             what: "place".to_owned(),
@@ -205,7 +205,7 @@ impl Workcell {
         }
     }
 
-    /// Joint angles of the first look-out pose that is given as such.
+    /// Joint angles of the first look-out pose that is given by joint angles.
     pub fn home(&self) -> Option<JointVector> {
         self.look_outs.iter().find_map(|look_out| match look_out {
             LookOut::Joints(q) => Some(*q),

@@ -33,7 +33,7 @@ pub(super) fn obstacles(
         let obstacle = obstacle(source, section)?;
         if obstacle.name == TABLE || obstacles.iter().any(|other| other.name == obstacle.name) {
             let name = &section.get_ref().name;
-            return Err(source.expected(name, "name", "a name of its own", format!("a second \"{}\"", obstacle.name)));
+            return Err(source.expected(name, "name", "a unique name", format!("a second \"{}\"", obstacle.name)));
         }
         obstacles.push(obstacle);
     }
@@ -82,13 +82,13 @@ fn obstacle(source: &Source<'_>, section: &Spanned<ObstacleSection>) -> Result<O
                 .filter(|direction| direction.iter().all(|x| x.is_finite()));
             let Some(direction) = direction else {
                 let found = format!("{:?}", normal.get_ref().0);
-                return Err(source.expected(normal, "plane_normal", "a direction, out of what is solid", found));
+                return Err(source.expected(normal, "plane_normal", "a direction that points out of the solid", found));
             };
             if let Some(rpy) = rpy_deg {
                 return Err(source.error(rpy.span().start, "rpy_deg: expected with box, cylinder and capsule only"));
             }
             let onto = UnitQuaternion::rotation_between_axis(&Vector3::z_axis(), &direction);
-            // Straight down there are many turns; any will do.
+            // Vertically down, many turns are possible; any will do.
             let half_turn = || UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
             (Shape::Plane, onto.unwrap_or_else(half_turn))
         }

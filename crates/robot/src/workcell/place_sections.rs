@@ -10,9 +10,9 @@ use crate::safety::WorkspaceBox;
 
 /// Cells of a tray along each side.
 const MAX_CELLS: i64 = 100;
-/// From one cell to the next, and sizes of bins, mm.
+/// Pitch of cells, and sizes of bins, mm.
 const PITCHES_MM: [f64; 2] = [5.0, 1000.0];
-/// Height of what parts are put on, above the table, mm.
+/// Height of the surface under the parts above the table, mm.
 const SURFACES_MM: [f64; 2] = [0.0, 500.0];
 
 #[derive(Deserialize)]
@@ -46,7 +46,7 @@ pub(super) struct BinSection {
     height_mm: Option<Spanned<f64>>,
 }
 
-/// What places must lie on and in.
+/// The areas in which places must lie.
 pub(super) struct Room<'w> {
     pub(super) table_height_m: f64,
     pub(super) table_m: Option<[[f64; 2]; 2]>,
@@ -66,7 +66,7 @@ pub(super) fn places(
             return Err(source.expected(name, "name", "a name without \":\"", format!("\"{}\"", place.name)));
         }
         if read.iter().any(|other| other.name == place.name) {
-            return Err(source.expected(name, "name", "a name of its own", format!("a second \"{}\"", place.name)));
+            return Err(source.expected(name, "name", "a unique name", format!("a second \"{}\"", place.name)));
         }
         room.check(&place).map_err(|why| source.error(at, why))?;
         read.push(place);
@@ -138,7 +138,7 @@ fn lengths_m(source: &Source<'_>, found: &Spanned<Numbers<2>>, name: &str) -> Re
 }
 
 impl Room<'_> {
-    /// Why a place cannot be where it is: cells or corners beside the table or out of the workspace.
+    /// The reason why a place is invalid: cells or corners beside the table or outside the workspace.
     fn check(&self, place: &Place) -> Result<(), String> {
         let name = &place.name;
         if let Some([x, y]) = self.table_m {
@@ -158,7 +158,7 @@ impl Room<'_> {
             let Ok(goal) = place.goal(cell) else { continue };
             let p = [goal.at_m[0], goal.at_m[1], goal.surface_m];
             for (k, axis) in ['x', 'y', 'z'].into_iter().enumerate() {
-                // The tcp is above what the part stands on.
+                // The tcp is above the surface under the part.
                 let min_m = if axis == 'z' { f64::NEG_INFINITY } else { self.workspace.min_m[k] };
                 let max_m = self.workspace.max_m[k];
                 if !(min_m..=max_m).contains(&p[k]) {

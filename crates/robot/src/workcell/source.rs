@@ -1,16 +1,16 @@
-//! The text of a workcell's file, to turn places in it into lines, and what is read of it again and again.
+//! The text of a workcell's file, for converting positions in it to lines, and readers for repeated kinds of values.
 
 use serde::Deserialize;
 use toml::Spanned;
 
 use super::error::WorkcellError;
 
-/// Where an arm can be at all, mm.
+/// Largest reach of an arm, mm.
 pub(super) const MAX_REACH_MM: f64 = 1500.0;
-/// No workspace or table is narrower, mm.
+/// Minimum width of a workspace or table, mm.
 const MIN_RANGE_MM: f64 = 10.0;
 
-/// So many numbers and no more; serde's own arrays pass over what follows.
+/// Exactly this many numbers; serde's own arrays ignore further ones.
 #[derive(Debug, Clone, Copy, Deserialize)]
 #[serde(try_from = "Vec<f64>")]
 pub(super) struct Numbers<const N: usize>(pub(super) [f64; N]);
@@ -24,7 +24,7 @@ impl<const N: usize> TryFrom<Vec<f64>> for Numbers<N> {
     }
 }
 
-/// The text, to turn places in it into lines.
+/// The text, for converting positions in it to lines.
 pub(super) struct Source<'t>(pub(super) &'t str);
 
 impl Source<'_> {

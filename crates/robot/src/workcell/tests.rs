@@ -44,7 +44,7 @@ fn a_whole_file_is_read() {
     assert_eq!(cell.grasp_config().load.unwrap().mass_kg, 0.2);
 }
 
-/// Each line of the file spoilt once: the error names that line, what was expected and what was found.
+/// Each line of the file made invalid once: the error names that line, the expected and the found value.
 #[test]
 fn errors_name_the_line() {
     for (line, from, to, expected) in [
@@ -142,7 +142,7 @@ fn places_that_cannot_be_name_the_line() {
         (34, "[450, 300]", "[450, 300, 0]", "expected 2 numbers, found 3"),
         (35, "yaw_deg = 90", "yaw_deg = inf", "yaw_deg: expected a number from -360 to 360, found inf"),
         (36, "height_mm = 20", "height_mm = -5", "height_mm: expected a number from 0 to 500, found -5"),
-        (39, "\"tray\"", "\"shelf\"", "name: expected a name of its own, found a second \"shelf\""),
+        (39, "\"tray\"", "\"shelf\"", "name: expected a unique name, found a second \"shelf\""),
         (39, "\"tray\"", "\"a:b\"", "expected a name without \":\""),
         (40, "[350, -400]", "[350, -480]", "\"tray\" reaches over the table's edge: its corner is at (320, -505) mm"),
         (40, "columns = 5", "columns = 20", "\"tray\" reaches over the table's edge: its corner is at (1520, -425)"),
@@ -218,7 +218,7 @@ fn obstacles_that_make_no_sense_name_the_line() {
         (32, "box_mm = [200, 100, 300]", "box_mm = [200, 0, 300]", "box_mm: expected lengths from 1 to 5000 mm"),
         (33, "at_mm = [500, 300, 150]", "at_mm = [500, nan, 150]", "at_mm: expected numbers within 3000 mm"),
         (34, "[0, 0, 90]", "[0, 0, 900]", "rpy_deg: expected angles from -360 to 360"),
-        (37, "\"post\"", "\"fixture\"", "name: expected a name of its own, found a second \"fixture\""),
+        (37, "\"post\"", "\"fixture\"", "name: expected a unique name, found a second \"fixture\""),
         (37, "\"post\"", "\"table\"", "found a second \"table\""),
         (36, "cylinder_mm = [40, 600]", "", "expected one of box_mm, cylinder_mm"),
         (36, "cylinder_mm", "capsule_mm = [1, 2]\ncylinder_mm", "expected one of box_mm, cylinder_mm"),

@@ -1,9 +1,10 @@
-//! Actions, as a client: a goal, its acceptance, feedback, result, and its cancellation.
+//! Action client: a goal, its acceptance, feedback, result, and its cancellation.
 //!
-//! The first request of a writer may be lost: a Cyclone reader that has just matched the writer asks it once a second for its state, until the
-//! writer has sent something. If RustDDS gets that question while it sends its first sample, it answers first, with a heartbeat that counts
-//! the sample, and the reader takes the sample for an old one. Later requests are not affected. So a cancellation and a question for a
-//! result are sent again where no answer comes. A goal is sent again only after the server has said that it does not know it.
+//! The first request of a writer may be lost: a Cyclone reader that has just matched the writer asks it once per second
+//! for its state, until the writer has sent something. If RustDDS receives that request while it sends its first
+//! sample, it answers first, with a heartbeat that already counts the sample, and the reader treats the sample as an
+//! old one. Later requests are not affected. Therefore a cancellation and a result request are repeated if no answer
+//! arrives. A goal is repeated only after the server has reported that it does not know it.
 
 use std::pin::pin;
 use std::time::{Duration, Instant};
@@ -28,22 +29,22 @@ pub struct ActionType {
     pub name: &'static str,
 }
 
-/// How a goal ended.
+/// The end of a goal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GoalEnd {
     /// It was reached.
     Succeeded,
     /// It was cancelled.
     Cancelled,
-    /// The server gave it up.
+    /// The server aborted it.
     Aborted,
-    /// The server knows no such goal, as after it was restarted.
+    /// The server does not know the goal, for example after a restart.
     Unknown,
 }
 
-/// A question for a result is sent again after this, once.
+/// A result request is repeated after this time, once.
 const ASK_AGAIN: Duration = Duration::from_secs(1);
-/// How often a cancellation is sent.
+/// Number of times that a cancellation is sent.
 const MAX_CANCELLATIONS: u32 = 3;
 
 /// Sends goals to an action's server, one at a time.
@@ -57,12 +58,12 @@ where
     inner: ros2_client::dds::ActionClient<Wire<G>, Wire<AfterStatus<R>>, Wire<F>>,
 }
 
-/// A goal that the server took.
+/// An accepted goal.
 #[derive(Debug, Clone, Copy)]
 pub struct Goal {
     id: GoalId,
     result: ros2_client::RmwRequestId,
-    /// When the question for the result is sent again.
+    /// The time at which the result request is repeated.
     ask_again: Option<Instant>,
 }
 
@@ -88,11 +89,11 @@ where
         &self.inner
     }
 
-    /// Sends a goal and asks for its result; `None` where the server refuses it. What is not answered is cancelled, and sent again where the
-    /// server does not know it.
+    /// Sends a goal and requests its result; `None` if the server refuses it. An unanswered goal is cancelled, and sent
+    /// again if the server does not know it.
     ///
     /// # Errors
-    /// No answer in time, and what the network reports.
+    /// No answer in time, and errors reported by the network.
     pub fn send(&self, goal: G, timeout: Duration) -> Result<Option<Goal>, RosError> {
         match self.send_once(goal.clone(), timeout / 2)? {
             Sent::Accepted(goal) => Ok(Some(goal)),
@@ -126,10 +127,10 @@ where
         network(&self.name, format!("no answer to {what} within {:.1} s", timeout.as_secs_f64()))
     }
 
-    /// How a goal ended, with its result; `None` where it has not ended in time.
+    /// The end of a goal, with its result; `None` if it has not ended in time.
     ///
     /// # Errors
-    /// [`RosError::Malformed`], and what the network reports.
+    /// [`RosError::Malformed`], and errors reported by the network.
     pub fn result(&self, goal: &mut Goal, timeout: Duration) -> Result<Option<(GoalEnd, R)>, RosError> {
         if goal.ask_again.is_some_and(|time| time <= Instant::now()) {
             goal.ask_again = None;
@@ -150,10 +151,10 @@ where
         Ok(Some((end, result)))
     }
 
-    /// The next feedback of a goal; `None` where none comes in time.
+    /// The next feedback of a goal; `None` if none arrives in time.
     ///
     /// # Errors
-    /// [`RosError::Malformed`], and what the network reports.
+    /// [`RosError::Malformed`], and errors reported by the network.
     pub fn feedback(&self, goal: &Goal, timeout: Duration) -> Result<Option<F>, RosError> {
         let next = async {
             let mut stream = pin!(self.inner.feedback_stream(goal.id));
@@ -164,10 +165,10 @@ where
         feedback.map(Some).map_err(|source| RosError::Malformed { topic: self.name.clone(), source })
     }
 
-    /// The last status that the server told of a goal, 1 to 6 as in `action_msgs/msg/GoalStatus`; `None` where it told none.
+    /// The last reported status of a goal, 1 to 6 as in `action_msgs/msg/GoalStatus`; `None` if none was reported.
     ///
     /// # Errors
-    /// What the network reports.
+    /// Errors reported by the network.
     pub fn status(&self, goal: &Goal) -> Result<Option<i8>, RosError> {
         let mut status = None;
         while let Some(all) = self.inner.receive_status().map_err(|error| network(&self.name, error))? {
@@ -177,10 +178,10 @@ where
         Ok(status)
     }
 
-    /// Asks the server to give a goal up; whether it will.
+    /// Asks the server to cancel a goal; returns whether it accepts.
     ///
     /// # Errors
-    /// No answer in time, and what the network reports.
+    /// No answer in time, and errors reported by the network.
     pub fn cancel(&self, goal: &Goal, timeout: Duration) -> Result<bool, RosError> {
         let response = self.ask_to_cancel(goal.id, timeout)?;
         Ok(response.goals_canceling.iter().any(|info| info.goal_id == goal.id))
@@ -198,7 +199,7 @@ where
     }
 }
 
-/// What became of a goal that was sent.
+/// The outcome of a sent goal.
 enum Sent {
     Accepted(Goal),
     Refused,

@@ -1,4 +1,4 @@
-//! Actions, as a server that has one goal at a time: a simulated arm's controllers.
+//! Action server with one goal at a time: a simulated arm's controllers.
 
 use ros2_client::RmwRequestId;
 use ros2_client::action::{GetResultResponse, GoalId, GoalStatusEnum, SendGoalResponse};
@@ -14,15 +14,15 @@ use crate::cdr::Cdr;
 use crate::error::RosError;
 use crate::messages::AfterStatus;
 
-/// Results of ended goals that clients may still ask for.
+/// Number of results of ended goals that clients may still request.
 const MAX_ENDED: usize = 16;
 
-/// What a client asked.
+/// A client's request.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Asked<G> {
-    /// A goal, which was accepted; one before it was given up.
+    /// An accepted goal; the one before was aborted.
     Goal(G),
-    /// The goal is to be given up.
+    /// The goal is to be cancelled.
     Cancel,
 }
 
@@ -53,10 +53,10 @@ where
         Self { name, inner, running: None, ended: Vec::new(), waiting: Vec::new() }
     }
 
-    /// What was asked since the last call, without waiting; `accepts` says of a goal that is well formed whether it is taken.
+    /// The requests since the last call, without waiting; `accepts` decides about a well-formed goal.
     ///
     /// # Errors
-    /// What the network reports.
+    /// Errors reported by the network.
     pub fn asked(&mut self, accepts: impl Fn(&G) -> bool) -> Result<Option<Asked<G>>, RosError> {
         self.answer_results()?;
         let failed = |error: ros2_client::ReadError| network(&self.name, error);
@@ -85,10 +85,10 @@ where
         Ok(Some(Asked::Goal(goal)))
     }
 
-    /// Tells how the running goal is getting on.
+    /// Publishes the progress of the running goal.
     ///
     /// # Errors
-    /// What the network reports.
+    /// Errors reported by the network.
     pub fn feedback(&self, feedback: F) -> Result<(), RosError> {
         let Some(goal) = self.running else { return Ok(()) };
         self.inner.send_feedback(goal, Wire(Ok(feedback))).map_err(|error| network(&self.name, error.forget_data()))
@@ -97,7 +97,7 @@ where
     /// Ends the running goal.
     ///
     /// # Errors
-    /// What the network reports.
+    /// Errors reported by the network.
     pub fn end(&mut self, end: GoalEnd, result: R) -> Result<(), RosError> {
         let Some(goal) = self.running.take() else { return Ok(()) };
         if self.ended.len() >= MAX_ENDED {
@@ -108,7 +108,7 @@ where
         self.answer_results()
     }
 
-    /// Answers who asked for the result of a goal that has ended.
+    /// Answers the clients that requested the result of an ended goal.
     fn answer_results(&mut self) -> Result<(), RosError> {
         while let Some((request, message)) =
             self.inner.receive_result_request().map_err(|error| network(&self.name, error))?

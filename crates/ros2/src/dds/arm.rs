@@ -5,8 +5,8 @@
 //! Watch ◄─ ArmState ─ joint_states                 cancelled where Watch asks to stop
 //! HandCommand ─ GripperCommand ─► gripper_action_controller
 //! ```
-//! The arm behind it must have the geometry that it is told. Contact thresholds and loads are the
-//! driver's own. Nothing recovers the arm from here.
+//! The real arm must have the given geometry. Contact thresholds and loads are the driver's own.
+//! This crate never recovers the arm.
 
 use std::time::{Duration, Instant};
 
@@ -27,19 +27,19 @@ use crate::messages::{
 
 type Result<T> = sdg_robot::Result<T>;
 
-/// Time between a trajectory's points, s: the controller's splines between them are then those of the motion.
+/// Time between a trajectory's points, s: the controller's splines between them then match the motion.
 const POINT_SECS: f64 = 0.01;
-/// Bounds the answers of the actions' servers.
+/// Timeout of the action servers' answers.
 const ANSWER: Duration = Duration::from_secs(5);
-/// A motion that takes so much longer than planned has failed, s.
+/// Delay after the planned end at which a motion has failed, s.
 const MAX_DELAY_SECS: f64 = 5.0;
-/// A hand that takes longer has failed.
+/// Timeout of a hand motion.
 const MAX_HAND: Duration = Duration::from_secs(15);
-/// No joint states for so long: the driver is gone.
+/// Time without joint states after which the driver counts as disconnected.
 const MAX_STATE_AGE: Duration = Duration::from_millis(500);
-/// Gaps between two states of a moving arm, s: drivers publish 20 to 1000 of them a second, and networks delay them.
+/// Largest gap between two states of a moving arm, s: drivers publish 20 to 1000 per second, and networks delay them.
 const MAX_SILENCE_SECS: f64 = 0.5;
-/// While a hand or an arm moves its states are looked at so often.
+/// Interval of checking the states while a hand or an arm moves.
 const LOOK_EVERY: Duration = Duration::from_millis(5);
 
 /// An arm behind ROS 2.
@@ -48,7 +48,7 @@ pub struct TrajectoryArm {
     motions: ActionClient<FollowJointTrajectoryGoal, FollowJointTrajectoryResult, FollowJointTrajectoryFeedback>,
     gripper: ActionClient<GripperCommandGoal, GripperCommandResult, GripperCommandFeedback>,
     config: ArmConfig,
-    /// Where the last motion was to end: the controller holds it, whatever is measured.
+    /// The end of the last motion: the controller holds it, even if the measured position differs.
     commanded: Option<Joints>,
     hand: Option<(HandCommand, Goal)>,
     is_grasping: bool,
@@ -59,7 +59,7 @@ impl TrajectoryArm {
     /// Waits for the arm's topic and actions.
     ///
     /// # Errors
-    /// [`RobotError::Unreachable`] for what does not answer.
+    /// [`RobotError::Unreachable`] for a topic or action that does not answer.
     pub fn connect(node: &mut Node, config: ArmConfig, timeout: Duration) -> Result<Self> {
         let unreachable =
             |error: RosError| RobotError::Unreachable { peer: "the arm on ROS 2".to_owned(), why: error.to_string() };
@@ -86,7 +86,7 @@ impl TrajectoryArm {
         Ok(arm)
     }
 
-    /// Messages of feedback that came with motions.
+    /// Number of feedback messages received with motions.
     pub fn num_feedback(&self) -> u64 {
         self.num_feedback
     }
@@ -117,7 +117,7 @@ impl TrajectoryArm {
         })
     }
 
-    /// Why the arm is to stop, seen by `watch`; a state that was seen already says nothing new.
+    /// The reason to stop the arm, from `watch`; a repeated state gives no new information.
     fn observe(&self, watch: &mut Watch, seen_secs: &mut f64) -> Result<Option<StopReason>> {
         let state = self.arm_state(ArmMode::Moving)?;
         if state.time_secs == *seen_secs {
@@ -130,13 +130,13 @@ impl TrajectoryArm {
     fn cancel(&mut self, goal: &mut Goal) -> Result<()> {
         self.motions.cancel(goal, ANSWER).map_err(|error| self.lost(error))?;
         self.motions.result(goal, ANSWER).map_err(|error| self.lost(error))?;
-        // Where it came to rest is where the controller holds it.
+        // The position where it stopped is the one that the controller holds.
         self.commanded = None;
         Ok(())
     }
 }
 
-/// The motion's positions, velocities and accelerations at regular times, its end among them.
+/// The motion's positions, velocities and accelerations at regular times, including its end.
 fn trajectory(motion: &CheckedMotion, joints: &[String]) -> JointTrajectory {
     let duration_secs = motion.duration_secs();
     let num_points = (duration_secs / POINT_SECS).ceil().max(1.0) as usize;
@@ -158,7 +158,7 @@ fn trajectory(motion: &CheckedMotion, joints: &[String]) -> JointTrajectory {
     }
 }
 
-/// What an error code of FollowJointTrajectory means.
+/// The meaning of an error code of FollowJointTrajectory.
 fn error_name(code: i32) -> &'static str {
     match code {
         0 => "no error code",
@@ -205,7 +205,7 @@ impl Arm for TrajectoryArm {
                 }
                 Ok(stop) => stop,
                 Err(error) => {
-                    // It must not go on unseen.
+                    // It must not continue unobserved.
                     let _ = self.cancel(&mut goal);
                     return Err(error);
                 }
@@ -223,7 +223,9 @@ impl Arm for TrajectoryArm {
             }
             GoalEnd::Succeeded | GoalEnd::Aborted => Err(RobotError::Reflex(said.trim_end().to_owned())),
             GoalEnd::Cancelled => Err(RobotError::Stopped(StopReason::Interrupted)),
-            GoalEnd::Unknown => Err(self.lost(format!("{} forgot the motion: was it restarted?", self.motions.name()))),
+            GoalEnd::Unknown => {
+                Err(self.lost(format!("{} no longer knows the motion: was it restarted?", self.motions.name())))
+            }
         }
     }
 
@@ -285,7 +287,7 @@ impl Arm for TrajectoryArm {
         };
         let opening_m = result.position / self.config.gripper_position_per_m;
         match (command, end) {
-            // Controllers abort where something resists: that is what a grasp is.
+            // Controllers abort at a resistance, which is normal for a grasp.
             (HandCommand::Grasp { .. }, GoalEnd::Succeeded | GoalEnd::Aborted) => {
                 self.is_grasping = result.stalled && opening_m > MIN_HELD_WIDTH_M;
                 let known = self.known()?;
@@ -297,7 +299,7 @@ impl Arm for TrajectoryArm {
             }
             (HandCommand::Move { .. }, GoalEnd::Succeeded) => self.hand(),
             (HandCommand::Move { opening_m: told_m, .. }, GoalEnd::Aborted) => Err(RobotError::Hand(format!(
-                "it was to open to {:.0} mm and stands at {:.0} mm",
+                "the opening should be {:.0} mm, but is {:.0} mm",
                 told_m * 1e3,
                 opening_m * 1e3
             ))),
@@ -306,17 +308,17 @@ impl Arm for TrajectoryArm {
         }
     }
 
-    /// The driver has thresholds of its own.
+    /// The driver has its own thresholds.
     fn set_contact_sensitivity(&mut self, _sensitivity: ContactSensitivity) -> Result<()> {
         Ok(())
     }
 
-    /// The driver is told the load by other means.
+    /// The driver gets the load in other ways.
     fn set_load(&mut self, _load: Load) -> Result<()> {
         Ok(())
     }
 
-    /// A motion ends with the call that began it; what may still move is the hand.
+    /// A motion ends with the call that started it; only the hand may still be moving.
     fn stop(&mut self) -> Result<()> {
         match self.hand.take() {
             Some((_, goal)) => {
@@ -326,7 +328,7 @@ impl Arm for TrajectoryArm {
         }
     }
 
-    /// Nothing is recovered over ROS 2: that is done where the arm's driver is.
+    /// Nothing is recovered over ROS 2: that is done at the arm's driver.
     fn recover(&mut self) -> Result<()> {
         self.commanded = None;
         self.known().map(drop)

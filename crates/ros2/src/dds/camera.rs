@@ -14,24 +14,26 @@ use crate::error::RosError;
 use crate::messages::{CompressedImage, Header, Image, Time};
 use crate::names::Naming;
 
-/// A message's header, and its picture or why it cannot be read.
+/// A message's header, and its picture or the reason why it cannot be read.
 type Taken = (Header, Result<RgbImage, String>);
 
-/// A stamp this far from now is of another clock, as a simulation's or a recording's; the time of arrival then counts.
+/// A stamp that differs this much from now comes from another clock, as of a simulation or a recording; then the time
+/// of arrival is used.
 const MAX_STAMP_AGE: Duration = Duration::from_secs(60);
 
-/// What follows `ros2:` in a camera's address: `TOPIC?compressed&reliable&domain=7&rmw=cyclonedds&loopback`, each option where it is wanted.
+/// The part of a camera's address after `ros2:`: `TOPIC?compressed&reliable&domain=7&rmw=cyclonedds&loopback`, with
+/// optional options.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TopicAddress {
     /// The topic.
     pub topic: String,
-    /// Whether it has CompressedImage instead of Image, as one that ends with `/compressed` has.
+    /// Whether it has CompressedImage instead of Image, as a topic that ends with `/compressed` has.
     pub is_compressed: bool,
     /// Whether lost pictures are sent again.
     pub is_reliable: bool,
-    /// `ROS_DOMAIN_ID`, unless the option says another.
+    /// `ROS_DOMAIN_ID`, unless the option gives another.
     pub domain_id: u16,
-    /// Whether only this computer is heard.
+    /// Whether only this computer is used.
     pub is_loopback_only: bool,
 }
 
@@ -73,10 +75,10 @@ impl FromStr for TopicAddress {
     }
 }
 
-/// `ROS_DOMAIN_ID`, 0 where it is not set.
+/// `ROS_DOMAIN_ID`, 0 if it is not set.
 ///
 /// # Errors
-/// What is no domain.
+/// An invalid domain.
 pub fn domain_of_environment() -> Result<u16, String> {
     match std::env::var("ROS_DOMAIN_ID") {
         Err(_) => Ok(0),
@@ -94,7 +96,7 @@ enum Pictures {
 
 /// A topic's pictures.
 pub struct RosCamera {
-    // Kept alive: its topics end with it.
+    // Kept alive, because its topics end with it.
     _node: Node,
     pictures: Pictures,
     name: Arc<str>,
@@ -107,9 +109,9 @@ impl RosCamera {
     /// Subscribes to a topic; `name` is the camera's address in frames and errors.
     ///
     /// # Errors
-    /// What is no topic, and no network.
+    /// An invalid topic, and a missing network.
     pub fn open(address: &TopicAddress, name: &str, stall_timeout: Duration) -> Result<Self, RosError> {
-        // Nodes need names of their own.
+        // Nodes need unique names.
         let naming = Naming::new("", &format!("sdg_camera_{}", std::process::id()), &[])?;
         let mut node = Node::join(NodeConfig {
             domain_id: address.domain_id,
@@ -129,7 +131,7 @@ impl RosCamera {
         CameraError::Fault { camera: self.name.to_string(), fault }
     }
 
-    /// The next picture with its header; `None` where none comes in time.
+    /// The next picture with its header; `None` if none arrives in time.
     fn take(&self) -> Result<Option<Taken>, RosError> {
         let timeout = self.stall_timeout;
         Ok(match &self.pictures {
@@ -176,7 +178,7 @@ impl Camera for RosCamera {
     }
 }
 
-/// When a picture was taken; now, where the stamp is of another clock.
+/// The time at which a picture was taken; now, if the stamp comes from another clock.
 pub fn stamp_or_now(stamp: Time) -> SystemTime {
     let now = SystemTime::now();
     let is_near = |time: &SystemTime| {

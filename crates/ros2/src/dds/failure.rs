@@ -1,4 +1,4 @@
-//! What the network reports, as errors of this crate.
+//! Errors reported by the network, as errors of this crate.
 
 use crate::error::RosError;
 

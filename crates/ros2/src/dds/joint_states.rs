@@ -1,4 +1,4 @@
-//! Where an arm's topics and actions are, and what its joint_states tell.
+//! The names of an arm's topics and actions, and the content of its joint_states.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -13,7 +13,7 @@ use crate::messages::JointState;
 
 pub(super) type Joints = SVector<f64, 7>;
 
-/// Where an arm's topics and actions are.
+/// The names of an arm's topics and actions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ArmConfig {
     /// The arm's links, limits and hand.
@@ -24,16 +24,16 @@ pub struct ArmConfig {
     pub gripper_action: String,
     /// The topic of JointState.
     pub joint_states: String,
-    /// The arm's seven joints from the base on.
+    /// The arm's seven joints from the base.
     pub joints: [String; 7],
     /// The joints whose positions add up to the opening between the fingers.
     pub finger_joints: Vec<String>,
-    /// The gripper's position for an opening of 1 m: 0.5 where it is that of one finger.
+    /// The gripper's position for an opening of 1 m: 0.5 if it is that of one finger.
     pub gripper_position_per_m: f64,
 }
 
 impl Default for ArmConfig {
-    /// As franka_ros2 and Panda's MoveIt configuration name them.
+    /// As named by franka_ros2 and Panda's MoveIt configuration.
     fn default() -> Self {
         Self {
             geometry: ArmGeometry::panda(),
@@ -47,7 +47,7 @@ impl Default for ArmConfig {
     }
 }
 
-/// What joint_states told last.
+/// The last content of joint_states.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Known {
     pub(super) q: Joints,
@@ -74,7 +74,7 @@ impl StateReader {
             (Arc::clone(&known), Arc::clone(&is_stopped), config.clone(), states.topic().to_owned());
         let thread = std::thread::spawn(move || {
             while !stop.load(Ordering::SeqCst) {
-                // What is malformed is no state; its absence is told.
+                // Malformed messages are not states; missing states are reported.
                 let Ok(Some(received)) = states.receive(Duration::from_millis(100)) else { continue };
                 let mut known = shared.lock().unwrap_or_else(PoisonError::into_inner);
                 *known = merged(*known, &received.message, received.arrived, &config).or(*known);
@@ -97,7 +97,8 @@ impl Drop for StateReader {
     }
 }
 
-/// What a message says of the arm's joints, or of the fingers' alone where something is known of the arm; drivers publish both on one topic.
+/// The message's values for the arm's joints, or only for the fingers' if the arm's are already known; drivers publish
+/// both on one topic.
 fn merged(before: Option<Known>, message: &JointState, arrived: Instant, config: &ArmConfig) -> Option<Known> {
     let value = |values: &[f64], joint: &str| {
         let at = message.name.iter().position(|name| name == joint)?;

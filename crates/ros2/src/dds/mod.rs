@@ -1,6 +1,6 @@
 //! The network: nodes, topics, services, actions; a camera and an arm behind them.
 //!
-//! Calls block up to a time that is given; there is no runtime. Everything but [`Node`] may be moved to another thread.
+//! Calls block up to a given time; there is no runtime. Everything except [`Node`] may be moved to another thread.
 
 mod action;
 mod action_server;

@@ -1,4 +1,4 @@
-//! A node: a participant on the network with a name.
+//! A node: a named participant on the network.
 
 use std::net::Ipv4Addr;
 use std::str::FromStr;
@@ -23,7 +23,7 @@ use crate::error::RosError;
 use crate::messages::Message;
 use crate::names::Naming;
 
-/// Whose services are spoken: they differ between ROS 2's two usual middlewares, topics do not.
+/// The middleware whose services are used: ROS 2's two usual middlewares differ in services, not in topics.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Rmw {
     /// `rmw_fastrtps_cpp`, ROS 2's default.
@@ -54,15 +54,17 @@ impl Rmw {
     }
 }
 
-/// The highest domain whose ports there are.
+/// The highest domain that has ports.
 pub(super) const MAX_DOMAIN: u16 = 232;
-/// Larger than the system's: a picture is a burst of hundreds of packets. The kernel gives what it allows.
+/// Larger than the system's default: a picture is a burst of hundreds of packets. The kernel limits the value.
 const SOCKET_BUFFER_BYTES: usize = 8 << 20;
 
-/// `wait_for_service` looks at what is matched when it is called and then at events, of which `ros2-client` keeps eight and drops the rest:
-/// when the endpoints of two actions are matched within a millisecond, that of the last one may be dropped. So it is called again.
+/// `wait_for_service` checks the matches when it is called and then waits for events, of which `ros2-client` keeps
+/// eight and drops the rest: if the endpoints of two actions are matched within a millisecond, that of the last one may
+/// be dropped. It is therefore called repeatedly.
 const MATCH_AGAIN: Duration = Duration::from_millis(100);
-/// Cyclone's readers ask a writer that they have just matched for its state, and leave out what it sends before the answer; see action.rs.
+/// Cyclone's readers ask a writer that they have just matched for its state, and ignore its messages before the answer;
+/// see action.rs.
 const SETTLE: Duration = Duration::from_millis(200);
 
 /// A node, before it joins.
@@ -72,11 +74,11 @@ pub struct NodeConfig {
     pub naming: Naming,
     /// `ROS_DOMAIN_ID`.
     pub domain_id: u16,
-    /// Whose services.
+    /// The middleware of the services.
     pub rmw: Rmw,
-    /// Whether only this computer is heard and spoken to.
+    /// Whether the node communicates only with this computer.
     pub is_loopback_only: bool,
-    /// What `ros2 param get` tells, under these names.
+    /// The parameters for `ros2 param get`, by name.
     pub parameters: Vec<(String, String)>,
 }
 
@@ -89,7 +91,7 @@ impl NodeConfig {
 
 /// A node on the network, until it is dropped.
 pub struct Node {
-    // Dropped first: it tells the spinner to end.
+    // Dropped first: it ends the spinner.
     node: Option<ros2_client::Node>,
     naming: Naming,
     rmw: Rmw,
@@ -97,10 +99,10 @@ pub struct Node {
 }
 
 impl Node {
-    /// Joins.
+    /// Joins the network.
     ///
     /// # Errors
-    /// No socket, or a name that is none.
+    /// No socket, or an invalid name.
     pub fn join(config: NodeConfig) -> Result<Self, RosError> {
         let NodeConfig { naming, domain_id, rmw, is_loopback_only, parameters } = config;
         if domain_id > MAX_DOMAIN {
@@ -113,12 +115,12 @@ impl Node {
         let participant = builder.build().map_err(|error| network("ROS 2", error))?;
         let context = Context::from_domain_participant(participant).map_err(|error| network("ROS 2", error))?;
         let name = NodeName::new(naming.namespace(), naming.node()).map_err(|error| network("node", error))?;
-        // The parameter services speak Fast DDS's way of calling only: nobody else could use them.
+        // The parameter services support only Fast DDS's calls: no other middleware could use them.
         let mut options = NodeOptions::new().enable_rosout(true).start_parameter_services(rmw == Rmw::FastRtps);
         for (parameter, value) in &parameters {
             options = options.declare_parameter(parameter, ParameterValue::String(value.clone()));
         }
-        // The first values are checked by it too, and that of use_sim_time, which every node has.
+        // The initial values are also checked by it, including use_sim_time, which every node has.
         let is_fixed = move |name: &str, value: &ParameterValue| match value {
             ParameterValue::String(text) if parameters.iter().any(|(known, told)| known == name && told == text) => {
                 Ok(())
@@ -136,7 +138,7 @@ impl Node {
         Ok(Self { node: Some(node), naming, rmw, spinner: Some(spinner) })
     }
 
-    /// Names as this node has them.
+    /// Names as this node resolves them.
     pub fn naming(&self) -> &Naming {
         &self.naming
     }
@@ -144,7 +146,7 @@ impl Node {
     /// Receives a topic's messages.
     ///
     /// # Errors
-    /// What is no name, and what the network reports.
+    /// An invalid name, and errors reported by the network.
     pub fn subscribe<T: Message + 'static>(&mut self, topic: &str, qos: Qos) -> Result<Subscription<T>, RosError> {
         let (absolute, name) = self.name(topic)?;
         let profile = qos.profile();
@@ -159,7 +161,7 @@ impl Node {
     /// Sends messages to a topic.
     ///
     /// # Errors
-    /// As [`Self::subscribe`].
+    /// As for [`Self::subscribe`].
     pub fn publish<T: Message>(&mut self, topic: &str, qos: Qos) -> Result<Publisher<T>, RosError> {
         let (absolute, name) = self.name(topic)?;
         let profile = qos.profile();
@@ -174,7 +176,7 @@ impl Node {
     /// Answers a service's requests.
     ///
     /// # Errors
-    /// As [`Self::subscribe`].
+    /// As for [`Self::subscribe`].
     pub fn serve<Q: Cdr + Clone + 'static, A: Cdr + 'static>(
         &mut self,
         service: &str,
@@ -193,7 +195,7 @@ impl Node {
     /// Uses an action: its three services and two topics.
     ///
     /// # Errors
-    /// As [`Self::subscribe`].
+    /// As for [`Self::subscribe`].
     pub fn action_client<G, R, F>(&mut self, action: &str, of: ActionType) -> Result<ActionClient<G, R, F>, RosError>
     where
         G: Cdr + Clone + 'static,
@@ -218,7 +220,7 @@ impl Node {
     /// Serves an action.
     ///
     /// # Errors
-    /// As [`Self::subscribe`].
+    /// As for [`Self::subscribe`].
     pub fn action_server<G, R, F>(&mut self, action: &str, of: ActionType) -> Result<ActionServer<G, R, F>, RosError>
     where
         G: Cdr + Clone + 'static,
@@ -250,10 +252,10 @@ impl Node {
         self.node.as_mut().ok_or_else(|| network("node", "it has left"))
     }
 
-    /// Waits until somebody serves an action.
+    /// Waits until a server of an action exists.
     ///
     /// # Errors
-    /// Nobody in time.
+    /// No server in time.
     pub fn wait_for_server<G, R, F>(&self, client: &ActionClient<G, R, F>, timeout: Duration) -> Result<(), RosError>
     where
         G: Cdr + Clone + 'static,
@@ -278,7 +280,7 @@ impl Node {
         Err(network(client.name(), format!("nobody serves this action within {secs:.0} s")))
     }
 
-    /// How many readers a topic of this node has.
+    /// Number of readers of a topic of this node.
     pub fn num_readers<T: Cdr>(&self, publisher: &Publisher<T>) -> usize {
         self.node.as_ref().map_or(0, |node| publisher.inner().get_subscription_count(node))
     }
@@ -288,7 +290,7 @@ impl Drop for Node {
     fn drop(&mut self) {
         self.node = None;
         if let Some(spinner) = self.spinner.take() {
-            // A panic of it was printed by its own thread.
+            // Its thread has already printed a panic.
             let _ = spinner.join();
         }
     }

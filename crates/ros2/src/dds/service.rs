@@ -8,7 +8,7 @@ use super::wire::Wire;
 use crate::cdr::Cdr;
 use crate::error::RosError;
 
-/// Which request an answer is for.
+/// The request to which an answer belongs.
 pub type RequestId = ros2_client::RmwRequestId;
 
 /// A service's type, as in `std_srvs/srv/Trigger`.
@@ -36,10 +36,10 @@ impl<Q: Cdr + 'static, A: Cdr + 'static> Server<Q, A> {
         &self.name
     }
 
-    /// The next request, or why it is none; `None` where none comes in time. Either is to be answered.
+    /// The next request, or the reason why it is invalid; `None` if none arrives in time. Both must be answered.
     ///
     /// # Errors
-    /// What the network reports.
+    /// Errors reported by the network.
     #[allow(clippy::type_complexity, reason = "a request and its number")]
     pub fn receive(&self, timeout: Duration) -> Result<Option<(RequestId, Result<Q, RosError>)>, RosError> {
         let taken = wait_for(self.inner.async_receive_request(), Some(Instant::now() + timeout));
@@ -51,7 +51,7 @@ impl<Q: Cdr + 'static, A: Cdr + 'static> Server<Q, A> {
     /// Answers a request.
     ///
     /// # Errors
-    /// What the network reports.
+    /// Errors reported by the network.
     pub fn answer(&self, request: RequestId, answer: A) -> Result<(), RosError> {
         self.inner.send_response(request, Wire(Ok(answer))).map_err(|error| network(&self.name, error))
     }

@@ -15,29 +15,29 @@ use super::wire::Wire;
 use crate::cdr::Cdr;
 use crate::error::RosError;
 
-/// What is asked of a topic's delivery.
+/// The delivery settings of a topic.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Qos {
-    /// Whether what is lost is sent again.
+    /// Whether lost messages are sent again.
     pub is_reliable: bool,
-    /// Whether who comes later gets the last messages.
+    /// Whether late subscribers get the last messages.
     pub is_transient_local: bool,
-    /// How many messages are kept for a reader that is slow.
+    /// Number of messages kept for a slow reader.
     pub depth: usize,
 }
 
 impl Qos {
-    /// Of sensors: best effort, as ROS's `SensorDataQoS`.
+    /// For sensors: best effort, as ROS's `SensorDataQoS`.
     pub const SENSORS: Self = Self { is_reliable: false, is_transient_local: false, depth: 5 };
-    /// Of results: reliable.
+    /// For results: reliable.
     pub const RESULTS: Self = Self { is_reliable: true, is_transient_local: false, depth: 10 };
-    /// Of services: reliable.
+    /// For services: reliable.
     pub const SERVICES: Self = Self::RESULTS;
-    /// Of `/tf`.
+    /// For `/tf`.
     pub const TRANSFORMS: Self = Self { is_reliable: true, is_transient_local: false, depth: 100 };
-    /// Of `/tf_static`: who comes later gets it.
+    /// For `/tf_static`: late subscribers get it.
     pub const STATIC_TRANSFORMS: Self = Self { is_reliable: true, is_transient_local: true, depth: 100 };
-    /// Of actions' statuses.
+    /// For action statuses.
     pub(super) const STATUSES: Self = Self { is_reliable: true, is_transient_local: true, depth: 1 };
 
     pub(super) fn profile(self) -> QosProfile {
@@ -53,7 +53,7 @@ impl Qos {
     }
 }
 
-/// Senders whose counts are remembered.
+/// Number of senders whose counts are stored.
 const MAX_SENDERS: usize = 64;
 
 /// A topic's messages.
@@ -64,12 +64,12 @@ pub struct Subscription<T: Cdr + 'static> {
     num_lost: AtomicU64,
 }
 
-/// A message, and when it arrived.
+/// A message, and its time of arrival.
 #[derive(Debug, Clone)]
 pub struct Received<T> {
     /// The message.
     pub message: T,
-    /// When it was taken from the network.
+    /// The time at which it was taken from the network.
     pub arrived: Instant,
 }
 
@@ -83,10 +83,10 @@ impl<T: Cdr + 'static> Subscription<T> {
         &self.topic
     }
 
-    /// The next message; `None` where none comes in time.
+    /// The next message; `None` if none arrives in time.
     ///
     /// # Errors
-    /// [`RosError::Malformed`] for what is no message of this type; the next call goes on.
+    /// [`RosError::Malformed`] for an invalid message of this type; the next call continues.
     pub fn receive(&self, timeout: Duration) -> Result<Option<Received<T>>, RosError> {
         let Some(taken) = wait_for(self.inner.async_take(), Some(Instant::now() + timeout)) else { return Ok(None) };
         let arrived = Instant::now();
@@ -98,12 +98,12 @@ impl<T: Cdr + 'static> Subscription<T> {
         }
     }
 
-    /// Messages that were sent after the first that arrived, and did not arrive.
+    /// Number of messages that were sent after the first received one and did not arrive.
     pub fn num_lost(&self) -> u64 {
         self.num_lost.load(Ordering::Relaxed)
     }
 
-    /// Senders number their messages one by one.
+    /// Senders number their messages consecutively.
     fn count(&self, sender: Gid, number: i64) {
         let mut last_numbers = self.last_numbers.lock().unwrap_or_else(PoisonError::into_inner);
         if last_numbers.len() >= MAX_SENDERS && !last_numbers.contains_key(&sender) {
@@ -141,7 +141,7 @@ impl<T: Cdr> Publisher<T> {
     /// Sends a message.
     ///
     /// # Errors
-    /// A reader that is reliable and takes nothing.
+    /// A reliable reader that accepts nothing.
     pub fn send(&self, message: T) -> Result<(), RosError> {
         self.inner.publish(Wire(Ok(message))).map_err(|error| network(&self.topic, error.forget_data()))
     }

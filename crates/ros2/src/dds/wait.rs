@@ -1,4 +1,4 @@
-//! Waiting for a future in this thread, up to a time.
+//! Waits for a future in this thread, with a timeout.
 
 use std::future::Future;
 use std::pin::pin;
@@ -8,10 +8,12 @@ use std::task::{Context, Poll, Wake, Waker};
 use std::thread::Thread;
 use std::time::{Duration, Instant};
 
-/// A future is polled again after this at the latest: what `ros2-client` leaves out of a full channel of events is seen then.
+/// Longest time before a future is polled again: then events are noticed that `ros2-client` dropped from a full
+/// channel.
 const POLL_EVERY: Duration = Duration::from_millis(100);
 
-/// Whether the future is to be polled, beside the thread's own token, which code below the future takes away where it parks the thread itself.
+/// Whether the future is to be polled, in addition to the thread's own token, which code below the future consumes if
+/// it parks the thread itself.
 struct Woken(AtomicBool, Thread);
 
 impl Wake for Woken {
@@ -21,7 +23,7 @@ impl Wake for Woken {
     }
 }
 
-/// What the future gives; `None` where the deadline comes first. Without a deadline it waits for ever.
+/// The output of the future; `None` if the deadline comes first. Without a deadline it waits forever.
 pub(super) fn wait_for<F: Future>(future: F, deadline: Option<Instant>) -> Option<F::Output> {
     let woken = Arc::new(Woken(AtomicBool::new(false), std::thread::current()));
     let waker = Waker::from(Arc::clone(&woken));
@@ -61,7 +63,7 @@ mod tests {
                 return Poll::Ready(());
             }
             context.waker().wake_by_ref();
-            // As a channel does that waits: the thread's token is gone after it.
+            // As a waiting channel does: afterwards the thread's token is consumed.
             std::thread::park();
             Poll::Pending
         });

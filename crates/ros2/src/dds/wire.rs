@@ -1,4 +1,5 @@
-//! Our messages as those of `ros2-client`, which wants serde: a message's bytes, one by one, as CDR writes a tuple of them.
+//! Our messages in the form of `ros2-client`, which requires serde: a message's bytes, one by one, as CDR writes a
+//! tuple of them.
 
 use std::fmt;
 use std::marker::PhantomData;
@@ -10,10 +11,11 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use crate::cdr::{self, Cdr, CdrError};
 use crate::encoding::MAX_BYTES;
 
-/// A picture and what stands around it.
+/// A picture and the fields around it.
 const MAX_MESSAGE_BYTES: usize = MAX_BYTES + (1 << 16);
 
-/// A message on its way. What arrives and cannot be read is told with its place, not dropped: a service still answers then.
+/// A message in transfer. An unreadable message is reported with its position, not dropped, so that a service can still
+/// answer.
 #[derive(Debug, Clone)]
 pub(super) struct Wire<T>(pub(super) Result<T, CdrError>);
 
@@ -46,7 +48,7 @@ impl<'de, T: Cdr> Visitor<'de> for AllBytes<T> {
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut bytes: A) -> Result<Wire<T>, A::Error> {
         let mut all = Vec::new();
-        // The end of the message is the first byte that is not there.
+        // The end of the message is the first missing byte.
         while let Ok(Some(byte)) = bytes.next_element::<u8>() {
             all.push(byte);
             if all.len() > MAX_MESSAGE_BYTES {

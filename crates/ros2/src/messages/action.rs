@@ -1,4 +1,5 @@
-//! Actions of control_msgs: FollowJointTrajectory and GripperCommand. What all actions have in common comes from `ros2-client`.
+//! Actions of control_msgs: FollowJointTrajectory and GripperCommand. The part common to all actions comes from
+//! `ros2-client`.
 
 use super::geometry::{Transform, Twist};
 use super::{Header, structure};
@@ -9,7 +10,7 @@ structure! {
     Duration {
         /// Whole seconds.
         sec: i32,
-        /// And nanoseconds.
+        /// Nanoseconds.
         nanosec: u32,
     }
 }
@@ -17,7 +18,7 @@ structure! {
 impl Copy for Duration {}
 
 impl Duration {
-    /// So many seconds, to the nanosecond; 0 for what is negative or no number.
+    /// From seconds, to the nanosecond; 0 for a negative value or NaN.
     pub fn from_secs(secs: f64) -> Self {
         let nanos = (secs.max(0.0) * 1e9).round().min(f64::from(i32::MAX) * 1e9) as u64;
         Self { sec: i32::try_from(nanos / 1_000_000_000).unwrap_or(i32::MAX), nanosec: (nanos % 1_000_000_000) as u32 }
@@ -29,7 +30,7 @@ impl Duration {
     }
 }
 
-/// A result as it stands in `*_GetResult_Response`: behind the status's one byte, by which its alignment is shifted.
+/// A result as in `*_GetResult_Response`: after the status's one byte, which shifts its alignment.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct AfterStatus<T>(pub T);
 
@@ -66,7 +67,7 @@ structure! {
     JointTrajectory {
         /// A stamp of 0 starts at once.
         header: Header,
-        /// The joints that move.
+        /// The moving joints.
         joint_names: Vec<String>,
         /// In the order of time.
         points: Vec<JointTrajectoryPoint>,
@@ -74,7 +75,7 @@ structure! {
 }
 
 structure! {
-    /// `trajectory_msgs/msg/MultiDOFJointTrajectoryPoint`, which nothing here fills in.
+    /// `trajectory_msgs/msg/MultiDOFJointTrajectoryPoint`, not used here.
     MultiDofTrajectoryPoint {
         /// Of the frames.
         transforms: Vec<Transform>,
@@ -88,11 +89,11 @@ structure! {
 }
 
 structure! {
-    /// `trajectory_msgs/msg/MultiDOFJointTrajectory`, which nothing here fills in.
+    /// `trajectory_msgs/msg/MultiDOFJointTrajectory`, not used here.
     MultiDofTrajectory {
-        /// When.
+        /// Time.
         header: Header,
-        /// Which joints.
+        /// Names of the joints.
         joint_names: Vec<String>,
         /// In the order of time.
         points: Vec<MultiDofTrajectoryPoint>,
@@ -118,13 +119,13 @@ structure! {
     JointComponentTolerance {
         /// The joint.
         joint_name: String,
-        /// Which of its degrees of freedom.
+        /// The degree of freedom.
         component: u16,
         /// rad or m.
         position: f64,
-        /// And their rates.
+        /// Their rates.
         velocity: f64,
-        /// And theirs.
+        /// Their accelerations.
         acceleration: f64,
     }
 }
@@ -132,19 +133,19 @@ structure! {
 structure! {
     /// `control_msgs/action/FollowJointTrajectory_Goal`.
     FollowJointTrajectoryGoal {
-        /// Where the joints are to be when.
+        /// The joint positions over time.
         trajectory: JointTrajectory,
         /// Empty here.
         multi_dof_trajectory: MultiDofTrajectory,
-        /// On the way; empty: the controller's own.
+        /// Tolerances during the motion; empty: the controller's own.
         path_tolerance: Vec<JointTolerance>,
         /// Empty here.
         component_path_tolerance: Vec<JointComponentTolerance>,
-        /// At the end.
+        /// Tolerances at the end.
         goal_tolerance: Vec<JointTolerance>,
         /// Empty here.
         component_goal_tolerance: Vec<JointComponentTolerance>,
-        /// How much later than the trajectory says the end may be reached.
+        /// Largest delay of the end after the trajectory's time.
         goal_time_tolerance: Duration,
     }
 }
@@ -160,15 +161,15 @@ structure! {
 }
 
 structure! {
-    /// `control_msgs/action/FollowJointTrajectory_Feedback`; what follows the first three of a newer version is not read.
+    /// `control_msgs/action/FollowJointTrajectory_Feedback`; the further fields of a newer version are not read.
     FollowJointTrajectoryFeedback {
-        /// When.
+        /// Time.
         header: Header,
         /// The joints.
         joint_names: Vec<String>,
-        /// Where they are wanted.
+        /// The desired positions.
         desired: JointTrajectoryPoint,
-        /// Where they are.
+        /// The actual positions.
         actual: JointTrajectoryPoint,
         /// The difference.
         error: JointTrajectoryPoint,
@@ -178,7 +179,7 @@ structure! {
 structure! {
     /// `control_msgs/action/GripperCommand_Goal`.
     GripperCommandGoal {
-        /// Where the gripper's joint is wanted, m.
+        /// The desired position of the gripper's joint, m.
         position: f64,
         /// N.
         max_effort: f64,
@@ -188,13 +189,13 @@ structure! {
 structure! {
     /// `control_msgs/action/GripperCommand_Result`.
     GripperCommandResult {
-        /// Where the gripper's joint is, m.
+        /// The position of the gripper's joint, m.
         position: f64,
         /// N.
         effort: f64,
-        /// Whether it pushes and does not move.
+        /// Whether it pushes without moving.
         stalled: bool,
-        /// Whether it is where it was wanted.
+        /// Whether it reached its desired position.
         reached_goal: bool,
     }
 }
@@ -202,13 +203,13 @@ structure! {
 structure! {
     /// `control_msgs/action/GripperCommand_Feedback`.
     GripperCommandFeedback {
-        /// Where the gripper's joint is, m.
+        /// The position of the gripper's joint, m.
         position: f64,
         /// N.
         effort: f64,
-        /// Whether it pushes and does not move.
+        /// Whether it pushes without moving.
         stalled: bool,
-        /// Whether it is where it was wanted.
+        /// Whether it reached its desired position.
         reached_goal: bool,
     }
 }
@@ -222,7 +223,7 @@ mod tests {
     fn a_result_behind_the_status_is_aligned_with_it() {
         let result = FollowJointTrajectoryResult { error_code: 7, error_string: "a".to_owned() };
         let bytes = to_bytes(&AfterStatus(result.clone()));
-        // By hand: the status would be byte 0, so three bytes of padding stand before the i32.
+        // By hand: the status would be byte 0, so that three bytes of padding precede the i32.
         assert_eq!(bytes, [0, 0, 0, 7, 0, 0, 0, 2, 0, 0, 0, b'a', 0]);
         assert_eq!(from_bytes::<AfterStatus<FollowJointTrajectoryResult>>(&bytes).unwrap().0, result);
     }

@@ -5,9 +5,9 @@ use super::{Header, message, structure};
 structure! {
     /// `diagnostic_msgs/msg/KeyValue`.
     KeyValue {
-        /// What.
+        /// Name.
         key: String,
-        /// How much.
+        /// Value.
         value: String,
     }
 }
@@ -17,9 +17,9 @@ structure! {
     DiagnosticStatus {
         /// [`Self::OK`], [`Self::WARN`], [`Self::ERROR`] or [`Self::STALE`].
         level: u8,
-        /// Who says it.
+        /// Name of the source.
         name: String,
-        /// In a line.
+        /// Text, one line.
         message: String,
         /// The device.
         hardware_id: String,
@@ -29,22 +29,22 @@ structure! {
 }
 
 impl DiagnosticStatus {
-    /// Nothing is wrong.
+    /// No error.
     pub const OK: u8 = 0;
-    /// It works, but not as it should.
+    /// It works with restrictions.
     pub const WARN: u8 = 1;
     /// It does not work.
     pub const ERROR: u8 = 2;
-    /// Nothing is heard.
+    /// No data are received.
     pub const STALE: u8 = 3;
 }
 
 message! { "diagnostic_msgs",
     /// `diagnostic_msgs/msg/DiagnosticArray`.
     DiagnosticArray {
-        /// When.
+        /// Time.
         header: Header,
-        /// Of each part.
+        /// The status of each part.
         status: Vec<DiagnosticStatus>,
     }
 }

@@ -29,7 +29,7 @@ structure! {
 }
 
 structure! {
-    /// `geometry_msgs/msg/Quaternion`; all zeros as it is created, which is no rotation.
+    /// `geometry_msgs/msg/Quaternion`; all zeros by default, which is not a rotation.
     Quaternion {
         /// x.
         x: f64,
@@ -45,9 +45,9 @@ structure! {
 structure! {
     /// `geometry_msgs/msg/Pose`.
     Pose {
-        /// Where.
+        /// Position.
         position: Point,
-        /// Turned how.
+        /// Orientation.
         orientation: Quaternion,
     }
 }
@@ -55,7 +55,7 @@ structure! {
 message! { "geometry_msgs",
     /// `geometry_msgs/msg/PoseStamped`.
     PoseStamped {
-        /// When, and in which frame.
+        /// Time and frame.
         header: Header,
         /// The pose.
         pose: Pose,
@@ -67,7 +67,7 @@ structure! {
     PoseWithCovariance {
         /// The pose.
         pose: Pose,
-        /// Row by row: x, y, z, and rotations about them; zeros where nothing is known.
+        /// Row by row: x, y, z, and rotations about them; zeros for unknown values.
         covariance: Covariance,
     }
 }
@@ -101,9 +101,9 @@ impl crate::cdr::Cdr for Covariance {
 structure! {
     /// `geometry_msgs/msg/Transform`.
     Transform {
-        /// Along.
+        /// Translation.
         translation: Vector3,
-        /// And turned.
+        /// Rotation.
         rotation: Quaternion,
     }
 }
@@ -111,7 +111,7 @@ structure! {
 structure! {
     /// `geometry_msgs/msg/TransformStamped`: the pose of the child's frame in the header's.
     TransformStamped {
-        /// When, and the parent's frame.
+        /// Time, and the parent's frame.
         header: Header,
         /// The child's frame.
         child_frame_id: String,
@@ -130,11 +130,11 @@ structure! {
     }
 }
 
-/// A quaternion this far from length 1 is no rotation.
+/// A quaternion with a length this far from 1 is not a rotation.
 const MAX_LENGTH_ERROR: f64 = 1e-2;
 
 impl Quaternion {
-    /// The rotation; `None` for what is none.
+    /// The rotation; `None` for an invalid one.
     pub fn rotation(&self) -> Option<UnitQuaternion<f64>> {
         let quaternion = Quat::new(self.w, self.x, self.y, self.z);
         ((quaternion.norm() - 1.0).abs() < MAX_LENGTH_ERROR).then(|| UnitQuaternion::from_quaternion(quaternion))
@@ -148,7 +148,7 @@ impl From<UnitQuaternion<f64>> for Quaternion {
 }
 
 impl Transform {
-    /// As an isometry; `None` where a number is none or the rotation is none.
+    /// As an isometry; `None` if a number is not finite or the rotation is invalid.
     pub fn isometry(&self) -> Option<Isometry3<f64>> {
         let Vector3 { x, y, z } = self.translation;
         let rotation = self.rotation.rotation()?;

@@ -1,4 +1,4 @@
-//! sdg_interfaces, whose definitions stand in crates/ros2/sdg_interfaces.
+//! sdg_interfaces; its definitions are in crates/ros2/sdg_interfaces.
 
 use super::geometry::PoseStamped;
 use super::structure;
@@ -7,9 +7,9 @@ use super::vision::Detection2DArray;
 structure! {
     /// `sdg_interfaces/srv/Detect_Request`.
     DetectRequest {
-        /// Detections below it are left out; 0 stands for the node's own.
+        /// Minimum score of the returned detections; 0 for the node's own.
         min_score: f64,
-        /// How long a picture is waited for that is taken after the call; 0 stands for 5 s.
+        /// Time to wait for a picture taken after the call; 0 for 5 s.
         timeout_secs: f64,
     }
 }
@@ -19,13 +19,13 @@ structure! {
     DetectResponse {
         /// Whether a picture was searched; it may have no part.
         success: bool,
-        /// What was found, or why nothing was searched.
+        /// The result, or the reason why nothing was searched.
         message: String,
         /// Best first.
         detections: Detection2DArray,
-        /// Of each detection, where the camera is known: the tool centre point when closing.
+        /// For each detection, if the camera's pose is known: the tool centre point when closing.
         poses: Vec<PoseStamped>,
-        /// Of each pose: the width of the part between the fingers.
+        /// For each pose: the width of the part between the fingers.
         openings_m: Vec<f64>,
     }
 }
@@ -35,21 +35,21 @@ structure! {
     TeachRequest {
         /// Files on the node's computer: the photo.
         photo_path: String,
-        /// Its marks; empty: beside the photo.
+        /// Its annotation; empty for the file beside the photo.
         annotation_path: String,
-        /// The marks themselves, as COCO or LabelMe JSON, instead of a path.
+        /// The annotation itself, as COCO or LabelMe JSON, instead of a path.
         annotation: String,
         /// A to D or S; empty for C.
         model: String,
-        /// Where the grasp model is written.
+        /// The file for the grasp model.
         out_path: String,
         /// Height of the marks over the table; 0 for a model without lengths.
         mark_height_mm: f64,
         /// 0 for none.
         time_budget_secs: f64,
-        /// Decides the samples.
+        /// The seed of the samples.
         seed: u64,
-        /// Whether the node detects with the model from then on.
+        /// Whether the node then detects with the model.
         use_it: bool,
     }
 }
@@ -59,11 +59,11 @@ structure! {
     TeachResponse {
         /// Whether a model was taught.
         success: bool,
-        /// Why not.
+        /// The reason, if not.
         message: String,
         /// The grasp model.
         model_path: String,
-        /// How long it took.
+        /// The duration.
         seconds: f64,
     }
 }
@@ -71,7 +71,7 @@ structure! {
 structure! {
     /// `sdg_interfaces/srv/Grasp_Request`.
     GraspRequest {
-        /// Plan and check, and move nothing.
+        /// Plan and check without motion.
         dry_run: bool,
         /// Share of the joints' velocity limits; 0 for the node's own.
         speed: f64,
@@ -81,15 +81,15 @@ structure! {
 structure! {
     /// `sdg_interfaces/srv/Grasp_Response`.
     GraspResponse {
-        /// Whether the part is held; of a dry run, whether it can be grasped.
+        /// Whether the part is held; for a dry run, whether it can be grasped.
         success: bool,
-        /// Why not.
+        /// The reason, if not.
         message: String,
-        /// The last step that was begun: detect, hover, approach, close, lift or hold.
+        /// The last started step: detect, hover, approach, close, lift or hold.
         step: String,
-        /// Where the hand closed.
+        /// The pose at which the hand closed.
         pose: PoseStamped,
-        /// Between the fingers at the end.
+        /// Width between the fingers at the end.
         closed_width_m: f64,
     }
 }

@@ -1,4 +1,4 @@
-//! The messages that are exchanged, field by field as their packages define them (ROS 2 Humble to Jazzy).
+//! The supported messages, field by field as in their packages (ROS 2 Humble to Jazzy).
 
 mod action;
 mod diagnostic;
@@ -34,7 +34,7 @@ pub trait Message: Cdr {
     const NAME: &'static str;
 }
 
-/// A plain structure whose fields follow each other.
+/// A plain structure with its fields in sequence.
 macro_rules! structure {
     ($(#[$doc:meta])* $name:ident { $($(#[$field_doc:meta])* $field:ident: $type:ty,)+ }) => {
         $(#[$doc])*
@@ -55,7 +55,7 @@ macro_rules! structure {
     };
 }
 
-/// A structure that is a message by itself.
+/// A structure that is also a message.
 macro_rules! message {
     ($package:literal, $(#[$doc:meta])* $name:ident { $($fields:tt)+ }) => {
         $crate::messages::structure! { $(#[$doc])* $name { $($fields)+ } }
@@ -69,7 +69,7 @@ macro_rules! message {
 
 use {message, structure};
 
-/// What has no field is one byte on the network.
+/// A message without fields is one byte on the network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Empty;
 
@@ -80,7 +80,7 @@ impl Cdr for Empty {
         0_u8.write(to);
     }
 
-    /// Some senders leave the byte out.
+    /// Some senders omit the byte.
     fn read(_from: &mut Reader<'_>) -> Result<Self, CdrError> {
         Ok(Self)
     }

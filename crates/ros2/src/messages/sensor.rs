@@ -6,17 +6,17 @@ use super::{Header, message, structure};
 message! { "sensor_msgs",
     /// `sensor_msgs/msg/Image`.
     Image {
-        /// When it was taken, and the camera's optical frame.
+        /// Time of the picture, and the camera's optical frame.
         header: Header,
         /// Rows.
         height: u32,
-        /// Pixels of a row.
+        /// Pixels per row.
         width: u32,
-        /// As `rgb8`.
+        /// Encoding, such as `rgb8`.
         encoding: String,
-        /// Whether numbers of two bytes have the high one first.
+        /// Whether numbers of two bytes are big-endian.
         is_bigendian: u8,
-        /// Bytes of a row.
+        /// Bytes per row.
         step: u32,
         /// The rows, each of `step` bytes.
         data: Vec<u8>,
@@ -26,9 +26,9 @@ message! { "sensor_msgs",
 message! { "sensor_msgs",
     /// `sensor_msgs/msg/CompressedImage`.
     CompressedImage {
-        /// When it was taken, and the camera's optical frame.
+        /// Time of the picture, and the camera's optical frame.
         header: Header,
-        /// As `jpeg`, or `rgb8; jpeg compressed bgr8`.
+        /// Format, such as `jpeg` or `rgb8; jpeg compressed bgr8`.
         format: String,
         /// The file.
         data: Vec<u8>,
@@ -44,7 +44,7 @@ structure! {
         y_offset: u32,
         /// Rows; 0 for all.
         height: u32,
-        /// Pixels of a row; 0 for all.
+        /// Pixels per row; 0 for all.
         width: u32,
         /// Whether the picture is to be rectified.
         do_rectify: bool,
@@ -54,27 +54,27 @@ structure! {
 message! { "sensor_msgs",
     /// `sensor_msgs/msg/CameraInfo`.
     CameraInfo {
-        /// The picture's.
+        /// Header of the picture.
         header: Header,
         /// Rows of the calibrated picture.
         height: u32,
-        /// Pixels of a row.
+        /// Pixels per row.
         width: u32,
-        /// As `plumb_bob`.
+        /// Lens model, such as `plumb_bob`.
         distortion_model: String,
-        /// Of `plumb_bob`: k1, k2, p1, p2, k3.
+        /// For `plumb_bob`: k1, k2, p1, p2, k3.
         d: Vec<f64>,
         /// The camera matrix, row by row.
         k: [f64; 9],
-        /// Of a stereo camera.
+        /// For a stereo camera.
         r: [f64; 9],
         /// The matrix of the rectified picture, row by row.
         p: [f64; 12],
-        /// Pixels that were added up; 0 stands for 1.
+        /// Number of pixels that were added up; 0 means 1.
         binning_x: u32,
-        /// Likewise of rows.
+        /// The same for rows.
         binning_y: u32,
-        /// Which part of the picture was sent.
+        /// The part of the picture that was sent.
         roi: RegionOfInterest,
     }
 }
@@ -82,9 +82,9 @@ message! { "sensor_msgs",
 message! { "sensor_msgs",
     /// `sensor_msgs/msg/JointState`.
     JointState {
-        /// When.
+        /// Time.
         header: Header,
-        /// The joints that follow.
+        /// Names of the joints.
         name: Vec<String>,
         /// rad or m.
         position: Vec<f64>,

@@ -12,7 +12,7 @@ structure! {
     Time {
         /// Whole seconds.
         sec: i32,
-        /// And nanoseconds.
+        /// Nanoseconds.
         nanosec: u32,
     }
 }
@@ -20,13 +20,13 @@ structure! {
 impl Copy for Time {}
 
 impl Time {
-    /// Of the system's clock; what a signed 32-bit count of seconds cannot say is its nearest end.
+    /// From the system's clock; clamped to the range of a signed 32-bit count of seconds.
     pub fn from_system(time: SystemTime) -> Self {
         let since = time.duration_since(UNIX_EPOCH).unwrap_or_default();
         Self { sec: i32::try_from(since.as_secs()).unwrap_or(i32::MAX), nanosec: since.subsec_nanos() }
     }
 
-    /// Of the system's clock; `None` before 1970 and for nanoseconds that are no fraction of a second.
+    /// To the system's clock; `None` before 1970 and for nanoseconds of a second or more.
     pub fn to_system(self) -> Option<SystemTime> {
         let sec = u64::try_from(self.sec).ok()?;
         (self.nanosec < 1_000_000_000).then(|| UNIX_EPOCH + Duration::new(sec, self.nanosec))
@@ -41,9 +41,9 @@ impl Time {
 structure! {
     /// `std_msgs/msg/Header`.
     Header {
-        /// When what follows was measured.
+        /// Time of the measurement.
         stamp: Time,
-        /// The frame that it is given in.
+        /// Frame of the data.
         frame_id: String,
     }
 }
@@ -53,7 +53,7 @@ structure! {
     TriggerResponse {
         /// Whether it was done.
         success: bool,
-        /// What was done, or why not.
+        /// The action, or the reason for its failure.
         message: String,
     }
 }

@@ -1,4 +1,4 @@
-//! vision_msgs 4, as it is from Humble on.
+//! vision_msgs 4, as from Humble on.
 
 use super::geometry::PoseWithCovariance;
 use super::{Header, message, structure};
@@ -16,7 +16,7 @@ structure! {
 structure! {
     /// `vision_msgs/msg/Pose2D`.
     Pose2D {
-        /// Where.
+        /// Position.
         position: Point2D,
         /// rad, from x to y.
         theta: f64,
@@ -26,7 +26,7 @@ structure! {
 structure! {
     /// `vision_msgs/msg/BoundingBox2D`.
     BoundingBox2D {
-        /// Its middle and its turn.
+        /// Its centre and its turn.
         center: Pose2D,
         /// Width before the turn, pixels.
         size_x: f64,
@@ -38,7 +38,7 @@ structure! {
 structure! {
     /// `vision_msgs/msg/ObjectHypothesis`.
     ObjectHypothesis {
-        /// What it is.
+        /// Its class.
         class_id: String,
         /// 0 to 1.
         score: f64,
@@ -48,9 +48,9 @@ structure! {
 structure! {
     /// `vision_msgs/msg/ObjectHypothesisWithPose`.
     ObjectHypothesisWithPose {
-        /// What it is.
+        /// The class and the score.
         hypothesis: ObjectHypothesis,
-        /// Where it is.
+        /// Its pose.
         pose: PoseWithCovariance,
     }
 }
@@ -58,13 +58,13 @@ structure! {
 structure! {
     /// `vision_msgs/msg/Detection2D`.
     Detection2D {
-        /// The picture's.
+        /// Header of the picture.
         header: Header,
-        /// What it may be.
+        /// Its possible classes.
         results: Vec<ObjectHypothesisWithPose>,
-        /// Where it is in the picture.
+        /// Its box in the picture.
         bbox: BoundingBox2D,
-        /// Of a track.
+        /// Number of the track.
         id: String,
     }
 }
@@ -72,7 +72,7 @@ structure! {
 message! { "vision_msgs",
     /// `vision_msgs/msg/Detection2DArray`.
     Detection2DArray {
-        /// The picture's.
+        /// Header of the picture.
         header: Header,
         /// Best first.
         detections: Vec<Detection2D>,

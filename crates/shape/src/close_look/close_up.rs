@@ -1,4 +1,4 @@
-//! A photo made ready for close looks, and what is measured of a picture beside it.
+//! A photo prepared for close looks, and the measurements of a picture against it.
 
 use image::RgbImage;
 use sdg_geometry::{PlanarSimilarity, Polygon};
@@ -8,25 +8,25 @@ use super::look::CloseLook;
 use super::table::{TableColors, lab, squared};
 use crate::frame::Frame;
 
-/// The part's longer side, and the frame's, in pixels: what lies about the part tells of the table.
+/// The longer side of the part, and the side of the frame, in pixels. The surroundings of the part show the table.
 const PART_SIDE: f64 = 96.0;
 pub(super) const SIDE: usize = 120;
-/// Cells as deep as this inside the outline show the part, and those at such depths below 0 what lies about it.
+/// Cells at least this deep inside the outline show the part; cells at such depths below 0 show its surroundings.
 const INSIDE: f32 = 2.5;
 const AROUND: std::ops::Range<f32> = -12.0..-3.0;
-/// A cell is the table's within so many spreads of one of its colours, which takes up at least this share of what lies about the part.
+/// A cell shows the table if it lies within this many spreads of one of the table's colours, and that colour covers at
+/// least this share of the part's surroundings.
 const TABLE_SPREADS: f32 = 2.0;
 const AROUND_SPREADS: f32 = 2.5;
 const TABLE_SHARE: f32 = 0.12;
-/// And it is not the part's from this difference on between what is seen and what the photo leads one to expect, in units of
-/// [`lab`].
+/// A cell does not show the part if picture and expected colour differ by at least this, in units of [`lab`].
 const OTHER_COLOR: f32 = 10.0;
-/// Windows count by the edges that the photo has there, from this share of the strongest on.
+/// A window counts by the photo's edges in it, if they reach this share of the strongest.
 pub(super) const MIN_EDGES: f32 = 0.02;
-/// Windows this far outside the outline still show its edge.
+/// Windows at most this far outside the outline still show its edge.
 const NEAR: f32 = -6.0;
 
-/// A demonstration, ready to be looked at closely.
+/// A demonstration prepared for close looks.
 #[derive(Debug, Clone)]
 pub(crate) struct CloseUp {
     pub(super) frame: Frame,
@@ -38,23 +38,23 @@ pub(crate) struct CloseUp {
     /// The depth and the photo's colour of each cell.
     cell_depth: Vec<f32>,
     cell_colors: Vec<Option<[f32; 3]>>,
-    /// Cells that show the part and do not look like the photo's own table.
+    /// Cells that show the part and differ in colour from the photo's own table.
     is_part: Vec<bool>,
 }
 
-/// The photo's colour and the picture's.
+/// The colours of the photo and of the picture.
 type Pair = ([f32; 3], [f32; 3]);
 
-/// A picture in the frame, at a pose.
+/// A picture sampled into the frame at a pose.
 pub(crate) struct Seen {
     colors: Vec<Option<[f32; 3]>>,
     pub(super) gradients: Gradients,
-    /// How the photo's windows correlate with it.
+    /// The correlation of the photo's windows with it.
     pub(super) fits: Vec<f32>,
 }
 
 impl CloseUp {
-    /// Reads the part out of its cut-out; `outline` in its pixels.
+    /// Reads the part from its cut-out; `outline` is in pixels of the cut-out.
     pub(crate) fn new(cutout: &RgbImage, outline: &Polygon) -> Self {
         let frame = Frame::about(&outline.bounds(), PART_SIDE, SIDE);
         let colors = frame.sampled_sparsely(cutout, &PlanarSimilarity::IDENTITY);
@@ -90,7 +90,7 @@ impl CloseUp {
         Seen { colors, gradients, fits }
     }
 
-    /// The close look but for the likeness and the mirror image.
+    /// The close look without the likeness and the mirror image.
     pub(crate) fn look(&self, seen: &Seen, table: &TableColors) -> CloseLook {
         let is_seen = cell_means(&seen.colors);
         let fits = &seen.fits;
@@ -115,9 +115,9 @@ impl CloseUp {
         }
     }
 
-    /// The share of the outline's windows that hardly correlate.
+    /// The share of the outline's windows with hardly any correlation.
     fn share_without_rim(&self, fits: &[f32], is_seen: &[Option<[f32; 3]>]) -> f64 {
-        /// Half a cell to either side of the outline.
+        /// Half a cell on both sides of the outline.
         const AT_OUTLINE: f32 = 1.5;
         const HARDLY: f32 = 0.25;
         let at_outline = |i: &usize| self.cell_depth[*i].abs() < AT_OUTLINE && is_seen[*i].is_some();
@@ -129,7 +129,7 @@ impl CloseUp {
         f64::from(without as u32) / f64::from(all.max(1) as u32)
     }
 
-    /// Mean energy inside the outline beyond twice the photo's and what noise has.
+    /// Mean energy inside the outline above twice the photo's energy and the noise.
     fn added(&self, seen: &Seen) -> f64 {
         const DEEP: f32 = 3.0;
         const NOISE: f32 = 0.1;
@@ -141,7 +141,7 @@ impl CloseUp {
         f64::from(cells.iter().map(beyond).sum::<f32>()) / (cells.len() as f64).max(1.0)
     }
 
-    /// Where the picture shows its table and the photo the part.
+    /// The cells where the picture shows its table and the photo shows the part.
     fn bare(&self, seen: &Seen, table: &TableColors) -> f64 {
         let colors = cell_labs(&seen.colors);
         let around: Vec<[f32; 3]> = cells_where(&colors, |i| AROUND.contains(&self.cell_depth[i])).collect();
@@ -154,13 +154,13 @@ impl CloseUp {
                 else {
                     return false;
                 };
-                // A cell's shift is allowed: walls and holes of a part that stands up are displaced.
+                // A shift of one cell is allowed: walls and holes of a part with height are displaced by parallax.
                 let near = [-1, 0, 1].into_iter().flat_map(|dy| [-1, 0, 1].map(|dx| (dx, dy)));
                 near.filter_map(|(dx, dy)| expected[(i as isize + dy * across as isize + dx) as usize])
                     .all(|expected| squared(&color, &expected) > 3.0 * OTHER_COLOR * OTHER_COLOR)
             })
             .collect();
-        // Single cells and rows of them are misplaced edges: two by two count.
+        // Single cells and rows of cells are misplaced edges; only blocks of two by two count.
         let square = |i: usize| [i, i + 1, i + across, i + across + 1];
         let mut is_area = vec![false; is_bare.len()];
         for i in (0..is_bare.len() - across - 1).filter(|i| square(*i).iter().all(|j| is_bare[*j])) {
@@ -170,13 +170,13 @@ impl CloseUp {
         is_area.iter().filter(|is| **is).count() as f64 / (inside as f64).max(1.0)
     }
 
-    /// The photo's colours as they would look in this light: each channel scaled and shifted to the picture's, what differs most
-    /// counting least.
+    /// The photo's colours in this picture's light: each channel is scaled and shifted to fit the picture; large
+    /// differences have little weight.
     fn expected_colors(&self, seen: &[Option<[f32; 3]>]) -> Vec<Option<[f32; 3]>> {
         const ROUNDS: usize = 5;
-        /// Differences from here on count less, in units of [`lab`].
+        /// Differences above this have less weight, in units of [`lab`].
         const LARGE: f32 = 8.0;
-        /// Keeps a plain part's contrast from being stretched.
+        /// Keeps the contrast of a plain part from being amplified.
         const PLAIN: f32 = 50.0;
         const CONTRASTS: (f32, f32) = (0.3, 2.5);
         let pairs: Vec<Pair> = (0..seen.len())
@@ -213,7 +213,7 @@ impl CloseUp {
     }
 }
 
-/// Means over cells; `None` where less than half of one is there.
+/// Means over cells; `None` for a cell with less than half of its pixels.
 fn cell_means(pixels: &[Option<[f32; 3]>]) -> Vec<Option<[f32; 3]>> {
     let mut sums = vec![([0.0f32; 3], 0usize); num_cells(SIDE)];
     for (i, color) in pixels.iter().enumerate() {

@@ -1,12 +1,12 @@
-//! Signed gradients of photo and picture in one frame, compared place by place.
+//! Signed gradients of photo and picture in one frame, compared window by window.
 //!
 //! ```text
 //! frame ─ brightness, smoothed ─ gradient g ─ v = g / (|g| + noise) ─┬─ inside the part: v, with its sign
 //!                                                                    └─ along the outline: v at twice its angle, since the table changes
 //! photo's field ─ shifted by up to 2 px ─ correlation with the picture's in windows of 9 px ─ best shift of each window
 //! ```
-//! A window may follow a small parallax or distortion; an edge that is not there, or whose bright and dark side are exchanged, it
-//! cannot follow.
+//! A window may be shifted to follow a small parallax or distortion. It cannot follow a missing edge, or an edge whose
+//! bright and dark sides are exchanged.
 
 use std::ops::Range;
 
@@ -14,17 +14,17 @@ use pulp::{Simd, WithSimd};
 
 use crate::lanes::in_lanes;
 
-/// Windows stand so many pixels apart and are three times as wide.
+/// Distance between windows, in pixels; a window is three times as wide.
 pub(super) const CELL: usize = 3;
-/// Pixels within this distance of the outline are its edge; more than that inside, the part's surface.
+/// Pixels within this distance of the outline belong to its edge; pixels further inside belong to the part's surface.
 const RIM_PX: f32 = 2.5;
-/// How far a window may be shifted, squared, in pixels: two along a row or column and one across.
+/// Squared largest shift of a window, in pixels: two along a row or column and one diagonally.
 const MAX_SHIFT_SQUARED: isize = 5;
 const REACH: usize = 2;
-/// Gradients below this are noise, in grey levels a pixel, and below the second value as a share of the root mean square.
+/// Gradients below this are noise: the first in grey levels per pixel, the second as a share of the root mean square.
 const NOISE: f32 = 1.5;
 const NOISE_SHARE: f32 = 0.4;
-/// Mean squared length of `v` that every window is taken to have: between two empty windows nothing correlates.
+/// Mean squared length of `v` that is added to every window, so that two empty windows do not correlate.
 const EMPTY: f32 = 0.01;
 /// Binomial-like weights of a Gaussian of 1.2 pixels.
 const SMOOTHING: [f32; 7] = [0.0148, 0.0833, 0.2351, 0.3336, 0.2351, 0.0833, 0.0148];
@@ -33,15 +33,15 @@ const SMOOTHING: [f32; 7] = [0.0148, 0.0833, 0.2351, 0.3336, 0.2351, 0.0833, 0.0
 #[derive(Debug, Clone)]
 pub(super) struct Gradients {
     side: usize,
-    /// x and y of `v`, and of the same at twice its angle.
+    /// x and y of `v`, then of `v` at twice its angle.
     signed: [Vec<f32>; 2],
     doubled: [Vec<f32>; 2],
-    /// Squared lengths, the same of both.
+    /// Squared lengths, equal for both.
     energy: Vec<f32>,
 }
 
 impl Gradients {
-    /// Of sampled colours; the noise is judged where `counts`.
+    /// The gradients of sampled colours; the noise is measured where `counts` holds.
     pub(super) fn new(colors: &[Option<[f32; 3]>], side: usize, counts: impl Fn(usize) -> bool) -> Self {
         let brightness = smoothed(&filled(colors, side), side);
         let [mut signed, mut doubled] = [0, 1].map(|_| [0, 1].map(|_| vec![0.0f32; side * side]));
@@ -49,7 +49,7 @@ impl Gradients {
         for y in 1..side - 1 {
             for x in 1..side - 1 {
                 let at = |dx: usize, dy: usize| brightness[(y + dy - 1) * side + x + dx - 1];
-                // Scharr's kernels, in grey levels a pixel.
+                // Scharr's kernels, in grey levels per pixel.
                 let across = 3.0 * (at(2, 0) - at(0, 0) + at(2, 2) - at(0, 2)) + 10.0 * (at(2, 1) - at(0, 1));
                 let down = 3.0 * (at(0, 2) - at(0, 0) + at(2, 2) - at(2, 0)) + 10.0 * (at(1, 2) - at(1, 0));
                 let gradient = [across / 32.0, down / 32.0];
@@ -74,7 +74,7 @@ impl Gradients {
         Self { side, signed, doubled, energy }
     }
 
-    /// The same with nothing where `counts` does not hold.
+    /// The same, zero where `counts` does not hold.
     pub(super) fn only(mut self, counts: impl Fn(usize) -> bool) -> Self {
         for i in (0..self.energy.len()).filter(|i| !counts(*i)) {
             self.signed.iter_mut().chain(&mut self.doubled).for_each(|values| values[i] = 0.0);
@@ -83,7 +83,7 @@ impl Gradients {
         self
     }
 
-    /// Squared lengths in windows where `counts`, their means.
+    /// Mean squared lengths in windows, over the pixels where `counts` holds.
     pub(super) fn energy_in_windows(&self, counts: impl Fn(usize) -> bool) -> Vec<f32> {
         let mut cells = vec![0.0; num_cells(self.side)];
         for i in (0..self.energy.len()).filter(|i| counts(*i)) {
@@ -93,16 +93,16 @@ impl Gradients {
     }
 }
 
-/// What a photo says should be seen, row by row.
+/// The gradients expected from a photo, row by row.
 #[derive(Debug, Clone)]
 pub(super) struct Expected {
     side: usize,
-    /// x and y of what the surface shows, and of the outline's edge at twice its angle; 0 elsewhere.
+    /// x and y of the surface's gradients, and of the outline's edge at twice its angle; 0 elsewhere.
     surface: [Vec<f32>; 2],
     rim: [Vec<f32>; 2],
-    /// 1 where there is either, no nearer to the frame's border than shifts reach.
+    /// 1 where one of them is present and a shifted window stays inside the frame.
     counts: Vec<f32>,
-    /// Rows in which there is either.
+    /// Rows that contain one of them.
     rows: Range<usize>,
     /// Mean squared length in each window.
     pub(super) energy: Vec<f32>,
@@ -152,7 +152,8 @@ impl Expected {
     }
 }
 
-/// Sums in cells of the products of what is expected with a picture `offset` pixels further, and of the picture's squared lengths.
+/// Sums over cells of the products of the expected gradients with a picture shifted by `offset` pixels, and of the
+/// picture's squared lengths.
 struct ShiftedSums<'a> {
     expected: &'a Expected,
     picture: &'a Gradients,
@@ -205,7 +206,7 @@ impl WithSimd for ShiftedSums<'_> {
     }
 }
 
-/// Cells along a side of the frame, squared.
+/// Cells along a side of the frame, and its square.
 pub(super) fn num_cells(side: usize) -> usize {
     (side / CELL) * (side / CELL)
 }
@@ -215,7 +216,7 @@ pub(super) fn cell_of(pixel: usize, side: usize) -> usize {
     (pixel / side / CELL) * (side / CELL) + pixel % side / CELL
 }
 
-/// Means over a cell and its eight neighbours, of sums in cells; beyond the frame there is nothing.
+/// Means over a cell and its eight neighbours, from sums over cells; cells beyond the frame are empty.
 fn window_means(cells: &[f32], side: usize) -> Vec<f32> {
     let across = side / CELL;
     let mut row_sums = vec![0.0; cells.len() + 2 * across];
@@ -231,7 +232,7 @@ fn window_means(cells: &[f32], side: usize) -> Vec<f32> {
     (0..cells.len()).map(|i| (above[i] + here[i] + below[i]) / pixels).collect()
 }
 
-/// Brightness from 0 to 255; where there is no picture, that of the nearest pixel of the row, or of the row above.
+/// Brightness from 0 to 255; outside the picture, that of the nearest pixel of the row, or of the row above.
 fn filled(colors: &[Option<[f32; 3]>], side: usize) -> Vec<f32> {
     let mut brightness: Vec<Option<f32>> =
         colors.iter().map(|color| color.map(|color| 85.0 * color.iter().sum::<f32>())).collect();

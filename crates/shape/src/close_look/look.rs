@@ -1,39 +1,39 @@
-//! What a close look gives.
+//! The result of a close look.
 
-/// What a close look at a pose measures. All are 0 for the photo itself, but for the fits, which are 1.
+/// Measurements of a close look at a pose. For the photo itself all are 0, except the fits, which are 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CloseLook {
     /// [`crate::Likeness::log_odds`].
     pub likeness: f64,
-    /// [`crate::Details::log_odds`]; `None`, too, where the rest leaves no doubt that it is not the part.
+    /// [`crate::Details::log_odds`]; also `None` where the other measurements already exclude the part.
     pub details: Option<f64>,
     /// Share of the part where the picture shows its table and the photo does not, in `[0, 1]`.
     pub bare: f64,
     /// Mean correlation of signed gradients in windows, in `[-1, 1]`.
     pub fit: f64,
-    /// Share of the outline with no edge of its direction.
+    /// Share of the outline without an edge of its direction.
     pub no_rim: f64,
-    /// Mean energy of the edges inside the outline that the photo does not have.
+    /// Mean energy of the edges inside the outline that are absent from the photo.
     pub added: f64,
-    /// How the mirror image fits instead; `None` where the photo is its own mirror image.
+    /// The fit of the mirror image instead; `None` where the photo equals its mirror image.
     pub mirrored: Option<RivalFit>,
 }
 
 impl CloseLook {
-    /// Whether the pose is worth asking for rivals: others are refused. Chosen by hand, for time.
+    /// Whether the pose is good enough to be compared with rivals; other poses are refused. Chosen by hand, for time.
     pub(crate) fn is_plausible(&self) -> bool {
         self.fit >= 0.45 && self.bare < 0.25 && self.no_rim < 0.35
     }
 }
 
-/// How a rival fits a picture compared with the photo, where the two differ.
+/// The fit of a rival compared with the fit of the photo, where the two differ.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RivalFit {
-    /// Mean correlation of the photo's edges that the rival lacks, less that of the rival's that the photo lacks: below 0 the rival fits
-    /// better.
+    /// Mean correlation of the photo's edges that the rival lacks, minus that of the rival's edges that the photo
+    /// lacks; below 0 the rival fits better.
     pub margin: f64,
     /// Mean correlation of the rival's edges that the photo lacks.
     pub fit: f64,
-    /// How much of the photo's edges they differ in: with little, the margin says little.
+    /// The share of the photo's edges in which they differ; if it is small, the margin is weak evidence.
     pub share: f64,
 }

@@ -1,13 +1,13 @@
-//! A close look at a pose: table where the part should be, structure that is missing or too much, and whether the mirror image
-//! fits better.
+//! A close look at a pose: table where the part should be, missing or additional structure, and whether the mirror
+//! image fits better.
 //!
 //! ```text
 //! photo ───────────────────────────┐
 //! picture, turned and sized as it ─┼─ 120×120 pixels, the part 96 long ─┬─ colours by cell, table's colours ─ bare
 //! mirror image, where it fits best ┘                                    └─ signed gradients by window ─ fit, weak, added, rival
 //! ```
-//! [`crate::Structure`] asks how much agrees. Here what contradicts the pose is measured: a covering hand contradicts nothing, the table
-//! seen where the part should be does. The numbers are not bounded.
+//! [`crate::Structure`] measures agreement. This module measures contradiction: a hand that covers the part contradicts
+//! nothing, but visible table where the part should be does. The numbers are not bounded.
 
 mod close_up;
 mod gradients;

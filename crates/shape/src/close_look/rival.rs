@@ -1,4 +1,4 @@
-//! The mirror image as an explanation of the picture, against the photo: judged only where the two differ.
+//! The mirror image as an alternative explanation of the picture, compared with the photo only where the two differ.
 //!
 //! ```text
 //! mirror image ─ laid over the photo at all turns ─ starts: the turns at which they resemble each other most
@@ -21,30 +21,30 @@ use crate::gradient_field::GradientField;
 use crate::parallel;
 use crate::template::ShapeTemplate;
 
-/// Turns at which the rival is laid over the photo, how many of them are followed to the full size, and how many of the best are tried in
-/// pictures.
+/// Number of turns at which the rival is laid over the photo, number of those followed to full resolution, and number
+/// of the best that are tried in pictures.
 const NUM_TURNS: usize = 36;
 const NUM_FOLLOWED: usize = 14;
 const NUM_STARTS: usize = 4;
-/// Starts are at least so far apart, the second as a share of the edges' mean distance from the middle.
+/// Minimum distance between starts; the second is a share of the edges' mean distance from the centre.
 const APART_RAD: f64 = 0.2;
 const APART_SHARE: f64 = 0.25;
-/// How far it may lie from a start in a picture, which shows the part in perspective.
+/// Largest distance from a start in a picture, which shows the part in perspective.
 const REACH: Reach = Reach { shift_px: 16.0, turn_rad: 0.2, log_scale: 0.05 };
-/// A turn at which the photo's edges agree with themselves by this much is tried in pictures, and compared closely where the picture's
-/// agree with it by at most so much less than before.
+/// A turn at which the photo's edges agree with themselves by at least this is tried in pictures. It is compared
+/// closely if its agreement with the picture is lower than that of the original pose by at most the second value.
 const MIN_RESEMBLANCE: f64 = 0.4;
 const MAX_LOSS_BY_TURN: f64 = 0.03;
 /// The mirror image must differ from the photo in this share of its edges. Chosen by hand.
 const MIN_SHARE: f64 = 0.03;
-/// What a turn must differ in and gain. Chosen by hand.
+/// Minimum difference and minimum gain of a turn. Chosen by hand.
 const MIN_SHARE_OF_TURN: f64 = 0.02;
 const MIN_GAIN_BY_TURN: f64 = 0.1;
-/// A window differs where the other's edges correlate with its own by less.
+/// A window differs if the other's edges correlate with its own by less than this.
 const SAME: f32 = 0.6;
 
-/// Where `template` resembles the photo most, from its own pixels to the cut-out's: of `further` places and of all turns about the
-/// middle those that agree best with the photo's gradients and `count`.
+/// The poses at which `template` resembles the photo most, from its own pixels to the cut-out's: the best by agreement
+/// with the photo's gradients, among the poses `further` and all turns about the centre, for which `counts` holds.
 fn resembling(
     template: &ShapeTemplate,
     field: &GradientField,
@@ -82,13 +82,13 @@ fn resembling(
 pub(crate) struct Rival {
     close_up: CloseUp,
     template: ShapeTemplate,
-    /// Where it resembles the photo most: from its own pixels to the cut-out's.
+    /// The pose of greatest resemblance with the photo: from its own pixels to the cut-out's.
     starts: Vec<PlanarSimilarity>,
 }
 
 impl Rival {
-    /// The mirror image of a demonstration whose gradients are `field`; `None` where it is the same. `places` finds where a template's
-    /// part may be in the photo.
+    /// The mirror image of a demonstration whose gradients are `field`; `None` where it equals the demonstration.
+    /// `places` finds where a template's part may be in the photo.
     ///
     /// # Errors
     /// As [`ShapeTemplate::new`].
@@ -129,7 +129,8 @@ impl Rival {
         Self { close_up: close_up.clone(), template: template.clone(), starts }
     }
 
-    /// The turn at which the photo fits the picture better than at `pose`, where the two differ; `None` where none does.
+    /// The turn at which the photo fits the picture better than at `pose`, where the two differ; `None` if there is no
+    /// such turn.
     pub(crate) fn better_turn(
         &self,
         image: &RgbImage,
@@ -152,12 +153,12 @@ impl Rival {
         best.map(|(turn, _)| self.template.captured(field, &turn, &REACH))
     }
 
-    /// Where it may lie about a pose of the photo, and how well it agrees there.
+    /// The rival's possible pose near a pose of the photo, and its agreement there.
     fn followed(&self, field: &GradientField, pose: &PlanarSimilarity) -> Vec<(PlanarSimilarity, f64)> {
         parallel::map(&self.starts, |start| self.template.captured_roughly(field, &pose.compose(start), &REACH))
     }
 
-    /// Fits the rival about a pose of the photo, and compares the two there.
+    /// Fits the rival near a pose of the photo, and compares the two there.
     pub(crate) fn against(
         &self,
         photo: &CloseUp,
@@ -173,12 +174,12 @@ impl Rival {
 }
 
 impl CloseUp {
-    /// How much of the photo's edges this one differs in where it lies on it by `photo_from_own`.
+    /// The share of the photo's edges in which the rival differs when it lies on the photo by `photo_from_own`.
     fn share_differing(&self, photo: &CloseUp, photo_from_own: &PlanarSimilarity) -> f64 {
         self.laid_over(photo, &photo_from_own.inverse()).share(photo)
     }
 
-    /// The photo against this one, which lies there by `own_from_photo`.
+    /// The photo compared with this rival, which lies there by `own_from_photo`.
     fn duel(&self, photo: &CloseUp, seen: &Seen, own_from_photo: &PlanarSimilarity) -> RivalFit {
         let both = self.laid_over(photo, own_from_photo);
         let fit = both.photos.fit(&seen.fits);
@@ -186,24 +187,24 @@ impl CloseUp {
         RivalFit { margin: f64::from(fit - rivals_fit), fit: f64::from(rivals_fit), share: both.share(photo) }
     }
 
-    /// This one in the photo's frame, and where the two differ.
+    /// This rival in the photo's frame, and where the two differ.
     fn laid_over(&self, photo: &CloseUp, own_from_photo: &PlanarSimilarity) -> LaidOver {
         let depth = self.depths(photo, own_from_photo);
         let colors = photo.frame.sampled_sparsely(&self.image, own_from_photo);
         let gradients = Gradients::new(&colors, SIDE, |i| depth[i] > -3.0);
         let expected = Expected::new(&gradients, &depth);
-        // As pictures, each shows its part alone.
+        // Each picture shows its part alone.
         let of_rival = gradients.only(|i| depth[i] > -4.0);
         let of_photo = photo.gradients.clone().only(|i| photo.depth[i] > -4.0);
         let photos = Differing::new(&photo.expected, &of_rival);
         LaidOver { photos, rivals: Differing::new(&expected, &of_photo), expected }
     }
 
-    /// How far each pixel of the photo's frame lies inside this one's outline.
+    /// The depth of each pixel of the photo's frame inside the rival's outline.
     fn depths(&self, photo: &CloseUp, own_from_photo: &PlanarSimilarity) -> Vec<f32> {
         let place = |at: [f64; 2]| self.frame.place_of(&own_from_photo.apply(&photo.frame.place(at)));
         let [first, right] = [place([0.5, 0.5]), place([1.5, 0.5])];
-        // One pixel to the right; one down is the same turned by a quarter.
+        // One pixel to the right; one pixel down is that vector turned by a quarter.
         let [along, across] = [right[0] - first[0], right[1] - first[1]];
         let depth_at = |[x, y]: [f64; 2]| {
             let (column, row) = ((x + 1.0) as usize, (y + 1.0) as usize);
@@ -228,14 +229,14 @@ struct LaidOver {
 }
 
 impl LaidOver {
-    /// How much they differ in, as a share of the photo's edges.
+    /// The extent of their differences, as a share of the photo's edges.
     fn share(&self, photo: &CloseUp) -> f64 {
         let all: f32 = photo.expected.energy.iter().sum();
         f64::from((self.photos.sum() + self.rivals.sum()) / all.max(f32::MIN_POSITIVE))
     }
 }
 
-/// The edges that one has and another lacks, by window.
+/// The edges present in one and absent in the other, by window.
 struct Differing {
     windows: Vec<(usize, f32)>,
 }
@@ -253,7 +254,7 @@ impl Differing {
         self.windows.iter().map(|(_, differs)| differs).sum()
     }
 
-    /// How they correlate with a picture, whose windows correlate so.
+    /// Their correlation with a picture, given the correlations of the picture's windows.
     fn fit(&self, with_picture: &[f32]) -> f32 {
         let fit: f32 = self.windows.iter().map(|&(i, differs)| differs * with_picture[i]).sum();
         fit / self.sum().max(f32::MIN_POSITIVE)

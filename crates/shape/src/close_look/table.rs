@@ -1,35 +1,35 @@
-//! What a picture's table looks like: its frequent colours.
+//! The frequent colours of a picture's table.
 
 use image::RgbImage;
 
-/// Colours that a picture is described by.
+/// Number of colours that describe a picture.
 const NUM_COLORS: usize = 8;
-/// The longer side of the shrunk picture that they are read from.
+/// The longer side of the reduced picture from which the colours are read.
 const SIDE: u32 = 60;
-/// Rounds of the clustering. It has settled before.
+/// Rounds of the clustering; it converges earlier.
 const ROUNDS: usize = 8;
-/// Each further colour starts at the pixel that is farther from all before it than this share of the pixels: the farthest would
-/// be a highlight.
+/// Each further colour starts at the pixel whose distance to all earlier colours is exceeded by this share of the
+/// pixels; the farthest pixel would be a highlight.
 const START_QUANTILE: f64 = 0.97;
-/// Least spread of a colour, in the units of [`lab`]: what noise and shading give any surface.
+/// Minimum spread of a colour, in units of [`lab`]: noise and shading alone cause this much.
 const MIN_SPREAD: f32 = 3.0;
-/// A rarer colour is no table's.
+/// Minimum share of a table colour.
 const MIN_SHARE: f32 = 0.03;
 
 /// The frequent colours of one picture, shared by all poses in it. Deterministic.
 #[derive(Debug, Clone, Default)]
 pub struct TableColors {
-    /// Colour, and the spread about it.
+    /// Colour, and its spread.
     colors: Vec<([f32; 3], f32)>,
 }
 
 impl TableColors {
-    /// Reads them out of a picture; empty for an empty one.
+    /// Reads the colours of a picture; empty for an empty picture.
     pub fn new(image: &RgbImage) -> Self {
         Self::of(&shrunk(image))
     }
 
-    /// The same of colours as [`lab`] gives them.
+    /// The same from colours as [`lab`] returns them.
     pub(super) fn of(pixels: &[[f32; 3]]) -> Self {
         if pixels.is_empty() {
             return Self { colors: Vec::new() };
@@ -68,7 +68,7 @@ impl TableColors {
         Self { colors: colors.map(|(center, members)| (*center, spread(center, members))).collect() }
     }
 
-    /// Those of the colours that take up at least `share` of what lies about the part, within `near` spreads.
+    /// The colours that cover at least `share` of the part's surroundings, within `near` spreads.
     pub(super) fn among(&self, around: &[[f32; 3]], share: f32, near: f32) -> Self {
         let mut counts = vec![0; self.colors.len()];
         for pixel in around {
@@ -82,7 +82,7 @@ impl TableColors {
         Self { colors: colors.map(|(color, _)| *color).collect() }
     }
 
-    /// Distance to the nearest colour, in its spreads.
+    /// Distance to the nearest colour, in spreads of that colour.
     pub(super) fn distance(&self, pixel: &[f32; 3]) -> f32 {
         (0..self.colors.len()).map(|k| self.spreads(pixel, k)).fold(f32::INFINITY, f32::min)
     }
@@ -124,12 +124,13 @@ fn shrunk(image: &RgbImage) -> Vec<[f32; 3]> {
             }
         }
     }
-    // A picture that is narrower than a block has one of its own width.
+    // A picture narrower than a block has one block of its own width.
     let count = (block.min(width as usize) * block.min(height as usize)) as f32;
     sums.into_iter().map(|sum| lab(&sum.map(|value| value as f32 / (255.0 * count)))).collect()
 }
 
-/// CIE L*a*b* of an sRGB colour from 0 to 1, under D65, L* stretched to 255: differences are about as large as they look.
+/// CIE L*a*b* of an sRGB colour from 0 to 1, under D65, L* scaled to 255; distances correspond roughly to perceived
+/// differences.
 pub(super) fn lab(color: &[f32; 3]) -> [f32; 3] {
     let [r, g, b] =
         color.map(|value| if value <= 0.04045 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) });

@@ -1,8 +1,8 @@
-//! Whether the picture has the photo's own features where the photo has them: holes, lugs, print, lengths.
+//! Whether the picture shows the photo's features at the photo's places: holes, lugs, print, lengths.
 //!
-//! A second network beside the likeness ([`crate::likeness`]), which sees 64 pixels and knows parts from background: this one sees 128, and was
-//! trained on rendered parts and their look-alikes alone, in which one feature is moved, absent, added or of another size, or
-//! the print is another (docs/decisions/026-details.md).
+//! A second network beside the likeness ([`crate::likeness`]), which sees 64 pixels and knows parts from background:
+//! this one sees 128, and was trained on rendered parts and their look-alikes alone, in which one feature is moved,
+//! absent, added or of another size, or the print differs (docs/decisions/026-details.md).
 
 mod network;
 
@@ -13,25 +13,26 @@ use self::network::{Answer, CELL, CELLS_SIDE, Features, NUM_CHANNELS, Network, S
 use crate::frame::Frame;
 use crate::likeness::exposed_values;
 
-/// Pixels that the part's longer side has at least in photo and picture.
+/// Minimum longer side of the part in photo and picture, in pixels.
 const MIN_PX: f64 = 40.0;
-/// Below, only the features that are there count: a bearing of 50 pixels is taken for another although the training has such parts, too.
+/// Below this size only present features count: a bearing of 50 pixels is mistaken for another one, although the
+/// training set contains such parts.
 const MIN_PX_AGAINST: f64 = 75.0;
-/// The part's longer side in what the network sees.
+/// The part's longer side in the network's input.
 const PART_SIDE: f64 = SIDE as f64 / 1.2;
 
-/// A demonstration, ready to be compared with pictures by the network.
+/// A demonstration prepared for comparison with pictures by the network.
 #[derive(Debug, Clone)]
 pub struct Details {
     frame: Frame,
     colors: Vec<Option<[f32; 3]>>,
     inside: Vec<bool>,
-    /// Of a picture that fills the frame.
+    /// The same for a picture that fills the frame.
     features: Features,
 }
 
 impl Details {
-    /// Reads the part out of its cut-out; `outline` in its pixels.
+    /// Reads the part from its cut-out; `outline` is in pixels of the cut-out.
     pub fn new(cutout: &RgbImage, outline: &Polygon) -> Self {
         let frame = Frame::about(&outline.bounds(), PART_SIDE, SIDE);
         let colors = frame.sampled(cutout, &PlanarSimilarity::IDENTITY);
@@ -40,15 +41,17 @@ impl Details {
         Self { frame, colors, inside, features }
     }
 
-    /// ln of how much likelier the image shows the part at the pose than a look-alike or anything else, as the network was trained: with three wrong
-    /// poses for two right ones. `None` where photo or picture shows the part too small for its details.
+    /// ln of the odds that the image shows the part at the pose instead of a look-alike or anything else, with the
+    /// network's training ratio of three wrong poses for two right ones. `None` where photo or picture shows the part
+    /// too small for its details.
     pub fn log_odds(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> Option<f64> {
         let log_odds = f64::from(self.compared(image, image_from_cutout)?.log_odds);
         let is_small = self.longer_side_px(image_from_cutout) < MIN_PX_AGAINST;
         Some(if is_small { log_odds.max(0.0) } else { log_odds })
     }
 
-    /// Squares of the image, in its pixels, in which it rather differs from the photo; none where nothing counts against the pose.
+    /// Squares of the image, in its pixels, that probably differ from the photo; empty where nothing counts against the
+    /// pose.
     pub fn differing(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> Vec<Polygon> {
         if self.longer_side_px(image_from_cutout) < MIN_PX_AGAINST {
             return Vec::new();
@@ -64,7 +67,7 @@ impl Details {
         cells.into_iter().enumerate().filter_map(differs).collect()
     }
 
-    /// Pixels of the part's longer side, in the photo or in the picture, whichever has fewer.
+    /// Length in pixels of the part's longer side, the smaller of photo and picture.
     fn longer_side_px(&self, image_from_cutout: &PlanarSimilarity) -> f64 {
         PART_SIDE * self.frame.step() * image_from_cutout.scale.min(1.0)
     }

@@ -1,4 +1,4 @@
-//! The network's weights, what it makes of one picture, and how it compares two.
+//! The network's weights, its features of one picture, and its comparison of two.
 //!
 //! ```text
 //! photo ──── tower (3 convolutions) ─ 32×32×24 ─┐
@@ -14,9 +14,9 @@ use safetensors::SafeTensors;
 use crate::error::ShapeError;
 use crate::layers::{Layer, Linear, add_products, answered, convolved, layer, pooled};
 
-/// Rows and columns of what the network sees.
+/// Rows and columns of the network's input.
 pub(super) const SIDE: usize = 128;
-/// Values of a pixel: colour, whether it lies in the outline, whether it lies in the picture.
+/// Values of a pixel: colour, inside the outline or not, inside the picture or not.
 pub(super) const NUM_CHANNELS: usize = 5;
 const TOWER: [Layer; 3] = [layer(NUM_CHANNELS, 16, 2), layer(16, 32, 2), layer(32, NUM_FEATURES, 1)];
 const NUM_FEATURES: usize = 24;
@@ -27,9 +27,9 @@ const NUM_BEFORE_CELLS: usize = 2;
 pub(super) const CELLS_SIDE: usize = 16;
 /// Pixels of a cell's side.
 pub(super) const CELL: usize = SIDE / CELLS_SIDE;
-/// A cell counts from this share of it on that lies in the outline.
+/// Minimum share of a cell inside the outline for the cell to count.
 const MIN_INSIDE: f32 = 0.3;
-/// Log-odds of the surest cell where no cell counts.
+/// Largest log-odds of a cell where no cell counts.
 const NO_CELL: f32 = -20.0;
 const NUM_OUTPUTS: usize = 64;
 /// Mean and maximum of the last convolution's channels, the largest log-odds of a cell, the mean probability of the cells.
@@ -46,16 +46,16 @@ pub(super) struct Network {
     answer: Linear,
 }
 
-/// How photo and picture compare.
+/// The comparison of photo and picture.
 #[derive(Debug, Clone)]
 pub(super) struct Answer {
-    /// ln of how much likelier the picture shows the part than not.
+    /// ln of the odds that the picture shows the part.
     pub(super) log_odds: f32,
-    /// Of [`CELLS_SIDE`] rows of cells, ln of how much likelier the two differ there than not; `None` outside of the outline.
+    /// For [`CELLS_SIDE`] rows of cells, ln of the odds that the two differ there; `None` outside the outline.
     pub(super) cells: Vec<Option<f32>>,
 }
 
-/// What the tower makes of one picture, row by row.
+/// The tower's output for one picture, row by row.
 #[derive(Debug, Clone)]
 pub(super) struct Features(Vec<f32>);
 
@@ -65,7 +65,7 @@ static SHIPPED: LazyLock<Network> = LazyLock::new(|| {
 });
 
 impl Network {
-    /// The one trained by us.
+    /// The weights that we trained.
     pub(super) fn shipped() -> &'static Self {
         &SHIPPED
     }
@@ -94,7 +94,7 @@ impl Network {
         Arch::new().dispatch(Tower { network: self, values })
     }
 
-    /// `inside` says which pixels lie in the outline.
+    /// `inside` marks the pixels in the outline.
     pub(super) fn compared(&self, photo: &Features, picture: &Features, inside: &[bool]) -> Answer {
         Arch::new().dispatch(Comparing { network: self, photo, picture, inside })
     }

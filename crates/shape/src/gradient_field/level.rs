@@ -1,4 +1,4 @@
-//! One level of a [`GradientField`](super::GradientField), and how it is read between its pixels.
+//! One level of a [`GradientField`](super::GradientField), and interpolation between its pixels.
 
 use wide::f32x4;
 
@@ -6,30 +6,30 @@ use super::tensors::{BAND, Planes, structure_tensors, tensors_of_part};
 use crate::config::GradientConfig;
 use crate::parallel;
 
-/// What one pixel keeps: `[d.x, d.y, tr]` (see the module's legend).
+/// The value of one pixel: `[d.x, d.y, tr]` (see the module's legend).
 pub(crate) type DirectionSample = [f32; 3];
 
-/// One level of a [`GradientField`], or a window of it: places are those of the level.
+/// One level of a [`GradientField`], or a window of it; positions are those of the level.
 #[derive(Debug, Clone)]
 pub(crate) struct GradientLevel {
     width: usize,
     height: usize,
-    /// Each with a fourth number, so that it is read at once.
+    /// Each with a fourth number, so that it is read in one load.
     samples: Vec<[f32; 4]>,
-    /// Samples in a row, and the number that the level's first one would have: 0 or, in a window, below.
+    /// Samples per row, and the index that the level's first sample would have: 0, or below 0 in a window.
     stride: usize,
     before: usize,
     floor: f32,
     reading: Reading,
 }
 
-/// What every reading between pixels needs.
+/// Values needed for every interpolation.
 #[derive(Debug, Clone, Copy)]
 struct Reading {
     /// Width and height, and the last pixel of each.
     size: [f32; 2],
     last: [f32; 2],
-    /// The last pixel that has a neighbour, and how far away that is.
+    /// The last pixel that has a neighbour, and the index distance of that neighbour.
     last_pair: [i32; 2],
     step: [usize; 2],
 }
@@ -53,14 +53,14 @@ impl GradientLevel {
         Self::of(planes, tensors, floor)
     }
 
-    /// All of a level, from its tensors.
+    /// A whole level, from its tensors.
     pub(super) fn of(planes: &Planes, mut samples: Vec<[f32; 4]>, floor: f32) -> Self {
         let (width, height) = (planes.width, planes.height);
         parallel::for_each_stretch(&mut samples, BAND * width.max(1), |_, samples| directions(samples, floor));
         Self { width, height, samples, stride: width, before: 0, floor, reading: Reading::new(width, height, width) }
     }
 
-    /// Part of a level from its corner on. Computed on the thread that needs it: others may wait for it.
+    /// Part of a level, from its corner. Computed on the thread that needs it, because others may wait for it.
     pub(super) fn window(planes: &Planes, corner: [usize; 2], size: [usize; 2], floor: f32) -> Self {
         let (width, height) = (planes.width, planes.height);
         let mut samples = tensors_of_part(planes, corner, size);
@@ -88,7 +88,7 @@ impl GradientLevel {
         self.floor
     }
 
-    /// Where the sample of a pixel of the level stands.
+    /// The index of the sample of a level pixel.
     #[inline(always)]
     fn idx_of(&self, row: usize, col: usize) -> usize {
         (row * self.stride + col).wrapping_sub(self.before)
@@ -101,7 +101,7 @@ impl GradientLevel {
         if !(x >= 0.0 && y >= 0.0 && x < width && y < height) {
             return None;
         }
-        // No image has so many pixels a side that 32 bits would not hold them; 64 take several times as long.
+        // No image has more pixels per side than 32 bits hold; 64 bits take several times as long.
         let [dx, dy, energy, _] = *self.samples.get(self.idx_of(y as i32 as usize, x as i32 as usize))?;
         Some([dx, dy, energy])
     }
@@ -134,8 +134,8 @@ impl GradientLevel {
 }
 
 impl GradientLevel {
-    /// The bilinear samples `[d.x, d.y, tr, 0]` at the first `out.len()` places, with the bits of [`Self::bilinear`]; zeros outside the
-    /// image. Which of the places lie inside, as 1 or 0.
+    /// The bilinear samples `[d.x, d.y, tr, 0]` at the first `out.len()` places, bit for bit as [`Self::bilinear`];
+    /// zeros outside the image. Also returns 1 for the places inside and 0 for the others.
     #[inline(always)]
     pub(crate) fn bilinear_all<const N: usize>(&self, x: &[f32; N], y: &[f32; N], out: &mut [f32x4]) -> [f32; N] {
         let Reading { size, last, last_pair, .. } = self.reading;
@@ -165,15 +165,15 @@ impl GradientLevel {
     }
 }
 
-/// A whole number from 0 to 2²³ − 1 as an integer: added to 2²³, its bits are the last of the sum's. A conversion that must answer for
-/// every float is not made in lanes.
+/// Converts a whole number from 0 to 2²³ − 1 to an integer: after adding 2²³ its bits are the lowest of the sum. A
+/// conversion that handles every float is not vectorised.
 #[inline(always)]
 pub(crate) fn whole(value: f32) -> u32 {
     const TWO_TO_23: f32 = 8_388_608.0;
     (value + TWO_TO_23).to_bits() & 0x007f_ffff
 }
 
-/// Energy that an edge must exceed, where the quiet quarter has this much.
+/// Minimum energy of an edge, given the energy of the quiet quarter.
 pub(super) fn floor_of(quiet: f32, config: &GradientConfig) -> f32 {
     config.min_gradient.powi(2) + config.noise_factor * quiet
 }
@@ -189,7 +189,7 @@ fn directions(samples: &mut [[f32; 4]], floor: f32) {
 
 /// Energy of the pixels of the quiet quarter, read from at most a few thousand of them.
 pub(super) fn quiet_energy(samples: &[[f32; 4]]) -> f32 {
-    // A prime stride does not fall in step with rows or with a periodic texture.
+    // A prime stride does not coincide with rows or with a periodic texture.
     let stride = (samples.len() / 4096).max(1) | 1;
     let mut energies: Vec<f32> = samples.iter().step_by(stride).map(|s| s[0]).collect();
     if energies.is_empty() {

@@ -1,17 +1,17 @@
-//! The gradients of one image, as every template reads them: directions without sign, on a pyramid.
+//! The gradients of one image, as every template reads them: unsigned directions, on a pyramid.
 //!
 //! Per level `m` (its pixel is `2^m` image pixels), at each pixel:
 //! - `tr`: energy of the gradient, `gx² + gy²` averaged over the three channels and over a 3×3
 //!   binomial window, in (grey levels / level pixel)²;
-//! - `v = (gx² − gy², 2 gx gy)`, averaged alike: the gradient's direction at twice its angle, so
-//!   that a gradient and its negative are the same and neighbours of one direction add up;
-//! - `d = v / (tr + floor)`, the direction that is kept: length near 1 on a clean edge, near 0 where
-//!   directions are mixed (corners, clutter) or where there is nothing above the noise.
+//! - `v = (gx² − gy², 2 gx gy)`, averaged in the same way: the gradient's direction at twice its
+//!   angle, so that a gradient equals its negative and neighbours of one direction add up;
+//! - `d = v / (tr + floor)`, the stored direction: its length is near 1 on a clean edge, and near 0
+//!   where directions are mixed (corners, clutter) or nothing exceeds the noise.
 //!
-//! Averaging the structure tensor over channels (Di Zenzo, 1986) sees edges that have the same
-//! brightness on both sides but another colour.
+//! Averaging the structure tensor over channels (Di Zenzo, 1986) detects edges between two colours
+//! of the same brightness.
 //!
-//! A level of many pixels is computed where it is read alone, window by window ([`windows`]).
+//! A level of many pixels is computed only where it is read, window by window ([`windows`]).
 
 mod level;
 mod tensors;
@@ -26,17 +26,17 @@ use self::windows::Windows;
 
 use crate::config::GradientConfig;
 
-/// Levels are added while both sides keep this many pixels. Chosen by hand, not measured.
+/// Levels are added while both sides have at least this many pixels. Chosen by hand, not measured.
 const SMALLEST_LEVEL_SIDE: usize = 24;
-/// Level 6 makes one pixel of 64: no part needs more. Derived from the coarsest extent of a template, 32 level pixels: a
-/// part of 2048 image pixels.
+/// At level 6 one pixel covers 64; no part needs more. Derived from the coarsest extent of a template, 32 level pixels:
+/// a part of 2048 image pixels.
 const MAX_LEVELS: usize = 7;
 
 /// Gradient directions of one image on a pyramid, computed once and read by any number of templates.
 ///
 /// # Shapes
-/// Level `m` has `width >> m` by `height >> m` pixels; a point `p` of the image stands at
-/// `p / 2^m` there.
+/// Level `m` has `width >> m` by `height >> m` pixels; a point `p` of the image is at `p / 2^m`
+/// there.
 #[derive(Debug, Clone)]
 pub struct GradientField {
     levels: Vec<Level>,
@@ -45,7 +45,7 @@ pub struct GradientField {
 #[derive(Debug, Clone)]
 enum Level {
     Whole(GradientLevel),
-    /// Of many pixels, of which a search reads few at the finest level.
+    /// For an image of many pixels, of which a search reads few at the finest level.
     Windows(Box<Windows>),
 }
 
@@ -58,7 +58,7 @@ impl GradientField {
         Self::with_config(image, &GradientConfig::DEFAULT)
     }
 
-    /// As [`new`](Self::new), with another sense of what is noise.
+    /// As [`new`](Self::new), with other noise settings.
     pub fn with_config(image: &RgbImage, config: &GradientConfig) -> Self {
         Self::with_windows_from(image, config, MAX_WHOLE)
     }
@@ -102,7 +102,7 @@ impl GradientField {
         idx.min(self.levels.len() - 1)
     }
 
-    /// All of a level.
+    /// A whole level.
     pub(crate) fn level(&self, idx: usize) -> &GradientLevel {
         match &self.levels[idx] {
             Level::Whole(level) => level,
@@ -137,7 +137,7 @@ mod tests {
     use image::Rgb;
     use wide::f32x4;
 
-    /// Whatever is read of a window has the bits of the whole level, at borders too.
+    /// Values read from a window equal those of the whole level bit for bit, also at borders.
     #[test]
     fn windows_read_what_the_whole_level_reads() {
         let noise = |x: u32, y: u32| {
@@ -177,7 +177,7 @@ mod tests {
         assert!(num_windows > 150 && read > 50_000, "{num_windows} {read}");
     }
 
-    /// A level of many pixels takes its noise from some of its rows, another from pixels all over.
+    /// A level of many pixels estimates its noise from some of its rows, other levels from pixels everywhere.
     #[test]
     fn the_noise_of_a_level_is_the_same_either_way() {
         let image = RgbImage::from_fn(900, 700, |x, y| {

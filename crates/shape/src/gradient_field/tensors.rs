@@ -38,7 +38,7 @@ impl Planes {
         Self { width, height, channels }
     }
 
-    /// Part of it, from its upper left corner.
+    /// Part of it, given its upper left corner.
     fn cut(&self, [left, top]: [usize; 2], [width, height]: [usize; 2]) -> Self {
         let mut channels = [(); 3].map(|()| Vec::with_capacity(width * height));
         for (cut, channel) in channels.iter_mut().zip(&self.channels) {
@@ -55,10 +55,10 @@ fn of_each_channel(values: impl Fn(usize) -> Vec<u8> + Sync + Send) -> [Vec<u8>;
     [(); 3].map(|()| channels.next().unwrap_or_default())
 }
 
-/// A tensor depends on pixels so far to each side. Derived: 2 of the blur, 1 of the difference, 1 of the smoothing.
+/// A tensor depends on pixels within this distance. Derived: 2 of the blur, 1 of the difference, 1 of the smoothing.
 const DEPENDS_ON: usize = 4;
 
-/// The tensors of a part of the picture, with the bits that they have among those of the whole.
+/// The tensors of a part of the picture, equal bit for bit to those of the whole picture.
 pub(super) fn tensors_of_part(planes: &Planes, corner: [usize; 2], size: [usize; 2]) -> Vec<[f32; 4]> {
     let whole = [planes.width, planes.height];
     let first = corner.map(|at| at.saturating_sub(DEPENDS_ON));
@@ -73,13 +73,13 @@ pub(super) fn tensors_of_part(planes: &Planes, corner: [usize; 2], size: [usize;
     part
 }
 
-/// Pixels repeated at each end of a row, so that the filters need no case for the border. Derived: the radius of the 5-tap
+/// Pixels repeated at each end of a row, so that the filters need no border case. Derived: the radius of the 5-tap
 /// filter.
 const PAD: usize = 2;
-/// The 5-tap binomial filter in both directions multiplies by this much. Derived: 16 × 16.
+/// Gain of the 5-tap binomial filter in both directions. Derived: 16 × 16.
 const BLUR_GAIN: f32 = 256.0;
 
-/// Rows that one thread takes at a time. Chosen for time; results do not depend on it.
+/// Rows that one thread takes at a time. Chosen for time; it does not change results.
 pub(super) const BAND: usize = 64;
 
 /// `[tr, v.x, v.y, 0]` of every pixel, row by row.
@@ -92,7 +92,7 @@ pub(super) fn structure_tensors(planes: &Planes) -> Vec<[f32; 4]> {
     samples
 }
 
-/// The same of the rows from `start` to before `end`, through rings of three rows that stay in the cache.
+/// The same for the rows from `start` to before `end`, through rings of three rows that stay in the cache.
 fn tensors_of_band(planes: &Planes, start: usize, end: usize) -> Vec<[f32; 4]> {
     let mut samples = vec![[0.0; 4]; planes.width * (end - start)];
     fill_band(planes, start, end, &mut samples);

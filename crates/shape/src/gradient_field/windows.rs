@@ -9,7 +9,8 @@
 //! │    └────────┘          │
 //! └────────────────────────┘
 //! ```
-//! A search follows few places to the finest level; of a picture of twelve megapixels with a small part that is a tenth of its pixels.
+//! A search follows few places to the finest level; for a picture of twelve megapixels with a small part these are a
+//! tenth of its pixels.
 
 use std::sync::OnceLock;
 
@@ -20,15 +21,15 @@ use crate::parallel;
 
 /// Side of a cell, in level pixels. Chosen by hand, for time.
 const CELL: usize = 128;
-/// Margins of windows: that of the least that holds what is read is taken. Chosen by hand, for time.
+/// Margins of windows; the smallest that covers the read area is used. Chosen by hand, for time.
 const MARGINS: [usize; 5] = [96, 160, 256, 384, 512];
-/// Beyond what was asked for: readings between pixels.
+/// Added to the requested area, for interpolation between pixels.
 const LEEWAY: f64 = 2.0;
-/// Rows whose pixels tell how strong the noise is, and how many of them in all. Chosen by hand, for time.
+/// Number of rows from whose pixels the noise is estimated, and the total number of pixels. Chosen by hand, for time.
 const QUIET_ROWS: usize = 32;
 const QUIET_PIXELS: usize = 4096;
 
-/// The level, and what was computed of it so far.
+/// The level, and the windows computed so far.
 #[derive(Debug, Clone)]
 pub(super) struct Windows {
     planes: Planes,
@@ -54,7 +55,8 @@ impl Windows {
         [self.planes.width, self.planes.height]
     }
 
-    /// All of the level, for what is swept. Computed before the lock is taken: a thread that waits for others must hold none.
+    /// The whole level, for the sweep. Computed before the lock is taken: a thread that waits for others must not hold
+    /// a lock.
     pub(super) fn whole(&self) -> &GradientLevel {
         match self.whole.get() {
             Some(whole) => whole,
@@ -65,12 +67,12 @@ impl Windows {
         }
     }
 
-    /// What can be read within `reach` of a place, in level pixels.
+    /// The samples that can be read within `reach` of a place, in level pixels.
     pub(super) fn about(&self, center: [f64; 2], reach: f64) -> &GradientLevel {
         let size = self.size();
         let fits = MARGINS.iter().position(|&margin| reach + LEEWAY <= margin as f64);
         let Some((idx, &margin)) = fits.map(|idx| (idx, &MARGINS[idx])) else { return self.whole() };
-        // A place outside the picture is read at the border, which the nearest cell's window holds.
+        // A place outside the picture is read at the border, which is in the nearest cell's window.
         let cell = [0, 1].map(|k| (center[k].max(0.0) as usize / CELL).min((size[k] - 1) / CELL));
         self.windows[idx][cell[1] * size[0].div_ceil(CELL) + cell[0]].get_or_init(|| {
             let corner = cell.map(|at| (at * CELL).saturating_sub(margin));

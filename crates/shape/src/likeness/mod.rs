@@ -1,13 +1,13 @@
-//! The probability that photo and picture show the same part, by a small network whose input is both, aligned.
+//! The probability that photo and picture show the same part, computed by a small network from both, aligned.
 //!
 //! ```text
 //! cut-out ────────────────────────┐
 //!                                 ├─ 64×64 pixels each, the part about 53 long ─ network ─ log-odds of the same part
 //! picture, turned and sized as it ┘
 //! ```
-//! Agreements of edges and colours count how much differs. The network can tell the causes apart: something lying over
-//! the part, its shadow, a highlight, or a hole that belongs elsewhere. It was trained on generated parts and knows no part in
-//! particular (docs/decisions/008-likeness.md).
+//! The agreements of edges and colours measure the amount of difference. The network distinguishes the causes: an
+//! object that covers the part, its shadow, a highlight, or a hole at a wrong place. It was trained on generated parts
+//! and is not specific to any part (docs/decisions/008-likeness.md).
 
 mod network;
 mod pair;
@@ -20,14 +20,14 @@ use self::pair::Photo;
 pub(crate) use self::pair::exposed_values;
 pub use self::pair::{NUM_CHANNELS, Pair, SIDE};
 
-/// A demonstration, ready to be compared with pictures by the network.
+/// A demonstration prepared for comparison with pictures by the network.
 #[derive(Debug, Clone)]
 pub struct Likeness {
     photo: Photo,
 }
 
 impl Likeness {
-    /// Reads the part out of its cut-out; `outline` in its pixels.
+    /// Reads the part from its cut-out; `outline` is in pixels of the cut-out.
     pub fn new(cutout: &RgbImage, outline: &Polygon) -> Self {
         Self { photo: Photo::new(cutout, outline) }
     }
@@ -37,8 +37,8 @@ impl Likeness {
         self.photo.beside(image, image_from_cutout)
     }
 
-    /// ln of how much likelier the image shows the part at the pose than anything else that looks like it, as the network was
-    /// trained: with three wrong poses for a right one.
+    /// ln of the odds that the image shows the part at the pose instead of something similar, with the network's
+    /// training ratio of three wrong poses for a right one.
     pub fn log_odds(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> f64 {
         f64::from(LikenessNetwork::shipped().log_odds(&self.photo.values_beside(image, image_from_cutout)))
     }

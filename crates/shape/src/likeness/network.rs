@@ -1,4 +1,4 @@
-//! The network's weights and what it makes of a pair. No machine learning library is needed for that: nine million
+//! The network's weights and its output for a pair. It needs no machine learning library: nine million
 //! multiplications in plain loops.
 
 use std::sync::LazyLock;
@@ -10,7 +10,7 @@ use super::pair::{NUM_CHANNELS, SIDE};
 use crate::error::ShapeError;
 use crate::layers::{Layer, Linear, answered, convolved, layer, pooled};
 
-/// The convolutions: 64, 32, 16, 16, 8, 8 and 4 pixels a side.
+/// The convolutions: 64, 32, 16, 16, 8, 8 and 4 pixels per side.
 pub const LAYERS: [Layer; 6] = [
     layer(NUM_CHANNELS, 16, 2),
     layer(16, 32, 2),
@@ -21,7 +21,7 @@ pub const LAYERS: [Layer; 6] = [
 ];
 /// Mean and maximum of the last convolution's channels.
 const NUM_POOLED: usize = 2 * LAYERS[LAYERS.len() - 1].outputs;
-/// Units between those and the answer.
+/// Hidden units between those and the output.
 pub const NUM_HIDDEN: usize = 64;
 
 /// Weights of the network.
@@ -38,7 +38,7 @@ static SHIPPED: LazyLock<LikenessNetwork> = LazyLock::new(|| {
 });
 
 impl LikenessNetwork {
-    /// The one trained by us.
+    /// The weights that we trained.
     pub fn shipped() -> &'static Self {
         &SHIPPED
     }
@@ -61,7 +61,7 @@ impl LikenessNetwork {
         })
     }
 
-    /// ln of how much likelier the pair is to show one part than not; `values` as [`super::Pair::values`] gives them.
+    /// ln of the odds that the pair shows one part; `values` as [`super::Pair::values`] gives them.
     pub fn log_odds(&self, values: &[f32]) -> f32 {
         Arch::new().dispatch(Forward { network: self, values })
     }

@@ -1,23 +1,24 @@
-//! Photo and picture side by side, in the frame of the photo, as the network sees them.
+//! Photo and picture side by side, in the photo's frame: the input of the network.
 
 use image::RgbImage;
 use sdg_geometry::{PlanarSimilarity, Polygon};
 
 use crate::frame::Frame;
 
-/// Rows and columns of what the network sees.
+/// Rows and columns of the network's input.
 pub const SIDE: usize = 64;
-/// Values of a pixel: the photo's colour, the picture's, whether it lies in the outline, whether it lies in the picture.
+/// Values of a pixel: the photo's colour, the picture's colour, inside the outline or not, inside the picture or not.
 pub const NUM_CHANNELS: usize = 8;
-/// The part's longer side in it: what surrounds the part tells whether its outline is there.
+/// The part's longer side in the input; the surroundings of the part show whether its outline is there.
 const PART_SIDE: f64 = SIDE as f64 / 1.2;
-/// Mean brightness of the part, in photo and picture, once exposure is taken out; brighter than four times that is as white.
+/// Mean brightness of the part, in photo and picture, after exposure is normalised; four times this value is white, and
+/// brighter values are clipped.
 const MEAN: f32 = 0.5;
 const MAX: f32 = 2.0;
-/// Keeps a black part from being brightened without bounds.
+/// Limits the brightening of a black part.
 const DARK: f32 = 0.02;
 
-/// A photo's colours, and which of them count.
+/// A photo's colours, and a flag for those that count.
 #[derive(Debug, Clone)]
 pub(super) struct Photo {
     frame: Frame,
@@ -28,9 +29,9 @@ pub(super) struct Photo {
 /// The input of the network at a pose: colours from 0 to 1, row by row; `None` where there is no picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pair {
-    /// The photo's.
+    /// The photo's colours.
     pub photo: Vec<Option<[f32; 3]>>,
-    /// The picture's, at the pose.
+    /// The picture's colours, at the pose.
     pub picture: Vec<Option<[f32; 3]>>,
     /// Whether a pixel lies in the outline.
     pub inside: Vec<bool>,
@@ -56,8 +57,8 @@ impl Photo {
 }
 
 impl Pair {
-    /// What the network is given: [`NUM_CHANNELS`] values a pixel, row by row. Exposure is taken out: the part is equally bright
-    /// in both. Its hue is not.
+    /// The network's input: [`NUM_CHANNELS`] values per pixel, row by row. Exposure is normalised, so that the part is
+    /// equally bright in both; hue is not.
     pub fn values(&self) -> Vec<f32> {
         values(&self.photo, &self.picture, &self.inside)
     }
@@ -74,13 +75,13 @@ fn values(photo: &[Option<[f32; 3]>], picture: &[Option<[f32; 3]>], inside: &[bo
     values
 }
 
-/// Colours with the exposure taken out: their mean inside is [`MEAN`]; 0 where there is none.
+/// Colours with normalised exposure: their mean inside is [`MEAN`]; 0 where there is none.
 pub(crate) fn exposed_values(colors: &[Option<[f32; 3]>], inside: &[bool]) -> impl Iterator<Item = [f32; 3]> {
     let gain = gain(colors, inside);
     colors.iter().map(move |color| exposed(color, gain))
 }
 
-/// What brings the mean colour inside to [`MEAN`].
+/// The factor that brings the mean colour inside to [`MEAN`].
 fn gain(colors: &[Option<[f32; 3]>], inside: &[bool]) -> f32 {
     let (mut sum, mut count) = (0.0, 0);
     for color in colors.iter().zip(inside).filter(|(_, inside)| **inside).filter_map(|(color, _)| *color) {
@@ -118,7 +119,7 @@ mod tests {
         Photo::new(&photo(1.0), &outline)
     }
 
-    /// Mean difference of photo and picture inside the outline, as the network is given them.
+    /// Mean difference of photo and picture inside the outline, in the network's input.
     fn difference(pair: &Pair) -> f32 {
         let values = pair.values();
         let inside: Vec<_> = values.chunks_exact(NUM_CHANNELS).filter(|pixel| pixel[6] == 1.0).collect();
@@ -130,13 +131,13 @@ mod tests {
     fn the_same_part_looks_the_same_however_it_lies_and_is_lit() {
         assert_eq!(difference(&taught().beside(&photo(1.0), &PlanarSimilarity::IDENTITY)), 0.0);
         assert!(difference(&taught().beside(&photo(0.6), &PlanarSimilarity::IDENTITY)) < 0.05);
-        // The picture turned by a quarter, and the pose with it.
+        // The picture and the pose turned by a quarter.
         let turned = image::imageops::rotate90(&photo(1.0));
         let pose =
             PlanarSimilarity { scale: 1.0, angle: Angle::from_degrees(90.0), tx: f64::from(turned.width()), ty: 0.0 };
         let pair = taught().beside(&turned, &pose);
         assert!(difference(&pair) < 0.02, "{}", difference(&pair));
-        // Half a turn further the corner is elsewhere.
+        // After another half turn the corner is elsewhere.
         let center = Point2::new(80.0, 60.0);
         let wrong = PlanarSimilarity::about(center, center, Angle::from_degrees(180.0), 1.0);
         assert!(difference(&taught().beside(&photo(1.0), &wrong)) > 0.1);

@@ -1,12 +1,12 @@
-//! The template turned and scaled in every way that is tried, as shifts into the look-up tables.
+//! The template at every turn and scale that is tried, as offsets into the look-up tables.
 
 use std::f64::consts::TAU;
 
 use crate::edge_points::EdgePoint;
 use crate::search::responses::{NUM_DIRECTIONS, PITCH, SPREAD, direction_idx, table_idx};
 
-/// How far the outer points may move from one pose to the next, in level pixels: half of it to either side is what
-/// directions are spread. Derived from the spread.
+/// Largest movement of the outer points from one pose to the next, in level pixels: directions are spread by half
+/// of it in both directions. Derived from the spread.
 const POSE_STEP: f64 = 2.0 * SPREAD as f64;
 
 /// One turn and scale.
@@ -17,7 +17,7 @@ pub(crate) struct Variant {
     looks: Vec<Look>,
 }
 
-/// One look: into which table, and how far from the part's place, in places.
+/// One read: the table, and the distance from the part's place, in places.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Look {
     table: u8,
@@ -31,17 +31,17 @@ pub(crate) struct Bank {
     pub(crate) variants: Vec<Variant>,
     /// Scales of every angle.
     pub(crate) num_scales: usize,
-    /// From one angle to the next.
+    /// Step of the angle.
     pub(crate) angle_step_rad: f64,
-    /// How far looks reach from the part's place, in places.
+    /// Largest distance of a read from the part's place, in places.
     pub(crate) reach: usize,
-    /// Points of every variant; the most that a pose can score is this many times a full response.
+    /// Points of every variant; the largest score of a pose is this many times a full response.
     pub(crate) num_points: usize,
 }
 
 impl Bank {
     /// Turns and scales at most `num_points` of `points`, seen on a level whose pixel is `pixel_size` demonstration
-    /// pixels; `log_scales` are the least and the largest ln scale.
+    /// pixels; `log_scales` are the smallest and the largest ln scale.
     pub(crate) fn new(points: &[EdgePoint], num_points: usize, pixel_size: f64, log_scales: [f64; 2]) -> Self {
         let sampled = sample_by_weight(points, num_points);
         let outer = outer_radius(&sampled) / pixel_size;
@@ -55,7 +55,7 @@ impl Bank {
         let mut variants = Vec::with_capacity(num_angles * num_scales);
         for angle_idx in 0..num_angles {
             for scale_idx in 0..num_scales {
-                // A single scale stands in the middle of its range.
+                // A single scale is in the middle of its range.
                 let log_scale = if num_scales > 1 {
                     log_scales[0] + scale_idx as f64 * log_scale_step
                 } else {
@@ -79,7 +79,7 @@ impl Variant {
             .map(|point| {
                 let [x, y] = point.offset.map(f64::from);
                 let [dx, dy] = point.double.map(f64::from);
-                // The part's centre stands in the middle of its place.
+                // The part's centre is in the middle of its place.
                 let middle = 0.5 * PITCH as f64;
                 let col = (factor * (cos * x - sin * y) + middle).floor() as i32;
                 let row = (factor * (sin * x + cos * y) + middle).floor() as i32;
@@ -92,12 +92,12 @@ impl Variant {
                 }
             })
             .collect();
-        // Neighbouring looks touch the same memory.
+        // Neighbouring reads use the same memory.
         looks.sort_unstable();
         Self { angle_rad, log_scale, looks }
     }
 
-    /// `(table, shift)` of every look, in tables whose rows are `stride` apart.
+    /// `(table, offset)` of every read, in tables whose rows are `stride` apart.
     pub(crate) fn shifts(&self, stride: usize) -> Vec<(usize, isize)> {
         self.looks
             .iter()
@@ -106,7 +106,7 @@ impl Variant {
     }
 }
 
-/// At most `count` points, each as often as its share of the weight: equal weights add up in bytes.
+/// At most `count` points, each repeated in proportion to its weight, because equal weights can be summed in bytes.
 fn sample_by_weight(points: &[EdgePoint], count: usize) -> Vec<EdgePoint> {
     let total: f64 = points.iter().map(|p| f64::from(p.weight)).sum();
     let mut sampled = Vec::with_capacity(count);
@@ -120,8 +120,8 @@ fn sample_by_weight(points: &[EdgePoint], count: usize) -> Vec<EdgePoint> {
     sampled
 }
 
-/// Distance from the centre within which nine points of ten lie, in demonstration pixels. The share was chosen by hand, so
-/// that a single far point does not make all steps small.
+/// Distance from the centre within which nine points of ten lie, in demonstration pixels. The share was chosen by hand;
+/// with it a single distant point does not make all steps small.
 fn outer_radius(points: &[EdgePoint]) -> f64 {
     let mut radii: Vec<f64> = points.iter().map(|p| f64::from(p.offset[0]).hypot(f64::from(p.offset[1]))).collect();
     radii.sort_by(f64::total_cmp);

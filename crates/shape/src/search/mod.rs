@@ -1,4 +1,4 @@
-//! The taught part looked for in a whole image, with no network and no teaching.
+//! Searches a whole image for the taught part, without a network or training.
 //!
 //! ```text
 //! demonstration ─ edge points of a coarse level ─ Bank: every turn and scale as shifts into tables
@@ -43,32 +43,32 @@ use crate::structure::Structure;
 use crate::surface::Surface;
 use crate::template::ShapeTemplate;
 
-/// What is looked for, and what is reported.
+/// Settings of the search and of its results.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct SearchConfig {
-    /// Scales looked for: 1 is the demonstration's own size. A narrow range around 1, where the camera's height is
-    /// known, is faster and mistakes less. The default was chosen by hand.
+    /// Range of scales; 1 is the demonstration's own size. A narrow range around 1, where the camera's height is
+    /// known, is faster and causes fewer errors. The default was chosen by hand.
     pub scales: RangeInclusive<f64>,
-    /// Matches that agree less are not reported, in `[0, 1]`. The default was chosen by hand.
+    /// Minimum agreement of a reported match, in `[0, 1]`. The default was chosen by hand.
     pub min_agreement: f64,
-    /// Most matches reported. The default was chosen by hand.
+    /// Maximum number of reported matches. The default was chosen by hand.
     pub max_matches: usize,
     /// Edge points compared at every pose of the sweep over the image, 8 to 1024. The sweep's time is proportional to
-    /// it. The default was chosen by hand, not measured. Beyond the 128 points that are read at the swept level, points
-    /// only repeat.
+    /// it. The default was chosen by hand, not measured. At most 128 different points are read at the swept level;
+    /// above that, points repeat.
     pub num_points: usize,
-    /// Most starts of the sweep that are climbed at the coarsest level of the template, 8 to 4096, the best of every scale
-    /// first. 64 of them always are; more only where parts are found and further starts resemble theirs.
+    /// Maximum number of starts of the sweep that are climbed at the template's coarsest level, 8 to 4096, the best of
+    /// every scale first. At least 64 are climbed; more only if parts are found and further starts resemble theirs.
     pub max_starts: usize,
     /// How the edges are read.
     pub shape: ShapeConfig,
 }
 
 impl SearchConfig {
-    /// What [`Default`] gives for [`num_points`](Self::num_points).
+    /// The value of [`Default`] for [`num_points`](Self::num_points).
     pub const DEFAULT_NUM_POINTS: usize = 64;
-    /// What [`Default`] gives for [`max_starts`](Self::max_starts): about a hundred of each scale. Chosen by hand.
+    /// The value of [`Default`] for [`max_starts`](Self::max_starts): about a hundred per scale. Chosen by hand.
     pub const DEFAULT_MAX_STARTS: usize = 1024;
 }
 
@@ -90,10 +90,10 @@ impl Default for SearchConfig {
     }
 }
 
-/// The taught part, found.
+/// A match of the taught part.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Match {
-    /// Where the demonstration lies in the image.
+    /// The pose of the demonstration in the image.
     pub image_from_demonstration: PlanarSimilarity,
     /// Edges and surface together, in `[0, 1]`: [`Agreement::both`].
     pub agreement: f64,
@@ -101,7 +101,7 @@ pub struct Match {
     pub evidence: Evidence,
 }
 
-/// A place that was followed to the full size.
+/// A place that was followed to full resolution.
 #[derive(Debug, Clone, Copy)]
 struct Found {
     pose: PlanarSimilarity,
@@ -114,45 +114,46 @@ impl Found {
     }
 }
 
-/// The level that is swept shows the part at least this large, in level pixels. Chosen by hand, not measured; the
-/// sweep's time grows with its fourth power.
+/// Minimum size of the part at the swept level, in level pixels. Chosen by hand, not measured; the sweep's time
+/// grows with its fourth power.
 const SWEEP_EXTENT: f64 = 50.0;
-/// Edge points read at that level, from which every pose samples. Chosen by hand, not measured.
+/// Edge points read at that level; every pose uses a sample of them. Chosen by hand, not measured.
 const SWEEP_POINTS: usize = 128;
-/// With fewer edge points than this at a level, the next finer one is swept. Chosen by hand, not measured.
+/// Minimum number of edge points at a level; with fewer, the next finer level is swept. Chosen by hand, not measured.
 const MIN_SWEEP_POINTS: usize = 32;
-/// Bounds of [`SearchConfig::num_points`]: fewer points tell no pose from another, and the responses of 1024 points add up
-/// within the sweep's 16 bits. The upper bound is derived, the lower one chosen by hand.
+/// Bounds of [`SearchConfig::num_points`]: fewer points do not distinguish poses, and the responses of 1024 points fit
+/// the sweep's 16-bit sums. The upper bound is derived, the lower one chosen by hand.
 const NUM_POINTS_BOUNDS: (usize, usize) = (8, 1024);
 /// Bounds of [`SearchConfig::max_starts`]. Chosen by hand.
 const MAX_STARTS_BOUNDS: (usize, usize) = (8, 4096);
-/// Bounds of the scales that may be looked for: beyond, the swept level shows too little or too much. Chosen by
+/// Bounds of the range of scales; outside them the part at the swept level is too small or too large. Chosen by
 /// hand, not measured.
 const SCALE_BOUNDS: (f64, f64) = (0.5, 2.0);
-/// Starts that are climbed at once, and climbed ones that are followed to the full size at once. Chosen by hand for time.
+/// Starts that are climbed together, and climbed starts that are followed to full resolution together. Chosen by hand
+/// for time.
 const STARTS_AT_ONCE: usize = 64;
 const FOLLOWED_AT_ONCE: usize = 8;
-/// Further starts are followed as long as one of the last agrees so well that it may be a part. Chosen by hand, below every
-/// right pose but the poorest twentieth on generated parts.
+/// Further starts are followed as long as the agreement of one of the last is at least this. Chosen by hand, below
+/// every right pose on generated parts except the lowest twentieth.
 const WORTH_MORE: f64 = 0.4;
-/// Parts of one picture: their ln sizes differ by at most the one, two steps of scale, and their responses by at most the other
-/// factor. Chosen by hand, for time: of ten photographed clips in a picture all are found.
+/// Parts of one picture: the largest difference of their ln sizes, two steps of scale, and the largest ratio of their
+/// responses. Chosen by hand, for time: of ten photographed clips in a picture all are found.
 const SAME_SIZE: f64 = 0.2;
 const SAME_RESPONSE: f64 = 0.85;
-/// A start that responds less is not worth a climb. Chosen by hand, not measured.
+/// Minimum response of a start for a climb. Chosen by hand, not measured.
 const MIN_RESPONSE: f64 = 0.2;
-/// How far a climb may go from its start: in places, and in steps of angle and scale. A little more than to the
-/// next start. Chosen by that reasoning, not measured.
+/// Largest distance of a climb from its start: in places, and in steps of angle and scale. Slightly more than
+/// the distance of the next start. Derived from that, not measured.
 const FOLLOW_PLACES: f64 = 2.5;
 const FOLLOW_STEPS: f64 = 1.5;
-/// How many matches that agree less than surely are refined again: of those that may be a part, and of all. Chosen by hand,
-/// not measured: more cost time.
+/// Maximum number of matches below certain agreement that are refined again: of those that may be a part, and in total.
+/// Chosen by hand, not measured: more take more time.
 const MAX_NUM_POLISHED: usize = 16;
 const MIN_NUM_POLISHED: usize = 3;
-/// Share of the part's area that two matches may both claim. Chosen by hand, not measured.
+/// Largest share of the part's area that two matches may share. Chosen by hand, not measured.
 const MAX_OVERLAP: f64 = 0.3;
 
-/// Looks for one taught part in whole images.
+/// Searches whole images for one taught part.
 ///
 /// On 640×480 pixels a search over all scales from 0.75 to 1.3 takes some tens of milliseconds on two cores, and time
 /// grows with the number of pixels; for a part smaller than about 100 pixels it is up to four times that.
@@ -165,11 +166,11 @@ pub struct ShapeSearch {
     likeness: Likeness,
     details: Details,
     close_up: CloseUp,
-    /// `None` where the mirror image is the same, or has too few edges, and for a part of revolution.
+    /// `None` where the mirror image equals the demonstration or has too few edges, and for a part of revolution.
     mirrored: Option<Rival>,
-    /// `None` for a part of revolution, whose profile tells its ends.
+    /// `None` for a part of revolution, whose ends are distinguished by its profile.
     turned: Option<Rival>,
-    /// Of a part of revolution alone.
+    /// For a part of revolution only.
     profile: Option<Profile>,
     outline: Polygon,
     bank: Bank,
@@ -177,14 +178,14 @@ pub struct ShapeSearch {
 }
 
 impl ShapeSearch {
-    /// Makes a demonstration ready to be looked for: milliseconds.
+    /// Prepares a demonstration for the search; takes milliseconds.
     ///
     /// # Units and frames
     /// `outline` is in pixels of `image`, as for [`ShapeTemplate::new`].
     ///
     /// # Errors
-    /// As [`ShapeTemplate::new`]; [`ShapeError::InvalidConfig`] for scales outside 0.5 to 2, a least agreement outside
-    /// 0 to 1 and fewer than 8 or more than 1024 points.
+    /// As [`ShapeTemplate::new`]; [`ShapeError::InvalidConfig`] for scales outside 0.5 to 2, a minimum agreement
+    /// outside 0 to 1 and fewer than 8 or more than 1024 points.
     pub fn new(image: &RgbImage, outline: &Polygon, config: &SearchConfig) -> Result<Self, ShapeError> {
         check_config(config)?;
         let template = ShapeTemplate::new(image, outline, &config.shape)?;
@@ -211,7 +212,7 @@ impl ShapeSearch {
             likeness: Likeness::new(image, outline),
             details: Details::new(image, outline),
             turned: if profile.is_some() { None } else { Some(turned()) },
-            // What differs from the mirror image is the light on one side of the axis.
+            // The difference from the mirror image is the light on one side of the axis.
             mirrored: if profile.is_some() { None } else { mirrored() },
             profile,
             close_up,
@@ -222,15 +223,15 @@ impl ShapeSearch {
         })
     }
 
-    /// Finds the part wherever it lies in `image`, best first; empty where it is not seen.
+    /// Finds the part anywhere in `image`, best match first; empty if there is none.
     ///
-    /// Several may lie there, turned in any way; deterministic.
+    /// Several parts may lie there, at any turn; deterministic.
     pub fn search(&self, image: &RgbImage) -> Vec<Match> {
         let field = GradientField::with_config(image, &self.config.shape.gradient);
         self.search_picture(&Picture { image, field: &field, table: &TableColors::new(image) })
     }
 
-    /// As [`search`](Self::search), with what is read out of the image at hand because others read it too.
+    /// As [`search`](Self::search), with the image's data given by the caller because others use it too.
     pub fn search_picture(&self, picture: &Picture<'_>) -> Vec<Match> {
         let field = picture.field;
         if self.sweep_level_idx >= field.num_levels() || field.width().min(field.height()) == 0 {
@@ -254,7 +255,8 @@ impl ShapeSearch {
         matches
     }
 
-    /// Follows starts, the best first; once parts are found, further starts that resemble theirs, and else none.
+    /// Follows starts, the best first. Once parts are found, it follows further starts that resemble theirs; without a
+    /// part, no more.
     fn follow_best(&self, picture: &Picture<'_>, mut starts: Vec<Start>) -> Vec<Found> {
         let mut climbed_before: Vec<Pose> = Vec::new();
         let mut all = Vec::new();
@@ -269,7 +271,8 @@ impl ShapeSearch {
         all
     }
 
-    /// Those of `later` that have the size of a part found and respond about as well as the best of `before` that has it.
+    /// The starts of `later` that have the size of a found part and respond about as strongly as the best of `before`
+    /// of that size.
     fn resembling(&self, mut later: Vec<Start>, before: &[Start], found: &[Found]) -> Vec<Start> {
         let parts = found.iter().filter(|found| found.is_worth_more());
         let log_scales: Vec<f64> = parts.map(|found| found.pose.scale.ln()).collect();
@@ -282,7 +285,7 @@ impl ShapeSearch {
         later
     }
 
-    /// Follows climbed starts to the full size, as long as that finds something.
+    /// Follows climbed starts to full resolution, as long as that finds something.
     fn follow(&self, picture: &Picture<'_>, climbed: &[Pose]) -> Vec<Found> {
         let mut all = Vec::new();
         for few in climbed.chunks(FOLLOWED_AT_ONCE) {
@@ -308,23 +311,23 @@ impl ShapeSearch {
         self.surface.brightness(image, image_from_demonstration)
     }
 
-    /// The scales that are looked for.
+    /// The range of scales.
     pub fn scales(&self) -> &RangeInclusive<f64> {
         &self.config.scales
     }
 
-    /// The edges that poses are refined by.
+    /// The edges by which poses are refined.
     pub fn template(&self) -> &ShapeTemplate {
         &self.template
     }
 
-    /// The axis of a part of revolution; `None` for any other part.
+    /// The axis of a part of revolution; `None` for other parts.
     pub fn revolution(&self) -> Option<&Revolution> {
         self.profile.as_ref().map(|profile| &profile.revolution)
     }
 
-    /// By which share of `shift`, in `[0, 1]`, the outline of a part of revolution lies beside the pose that all edges agree on; 0 for
-    /// any other part. Edges on its upper side, higher than its outline, hold the pose there.
+    /// The share of `shift`, in `[0, 1]`, between the outline of a part of revolution and the pose that all edges agree
+    /// on; 0 for other parts. Edges on its upper side, which are higher than its outline, hold the pose there.
     ///
     /// # Units and frames
     /// `shift` is in pixels of the picture that `field` is of.
@@ -332,7 +335,7 @@ impl ShapeSearch {
         self.profile.as_ref().map_or(0.0, |profile| profile.share_of(field, pose, shift))
     }
 
-    /// The demonstration over an image.
+    /// The demonstration laid over an image.
     pub fn comparison<'a>(&'a self, picture: &Picture<'a>) -> Comparison<'a> {
         let Self { template, surface, structure, likeness, details, close_up, mirrored, turned, profile, .. } = self;
         let (min_agreement, mirrored, turned) = (self.config.min_agreement, mirrored.as_ref(), turned.as_ref());
@@ -351,7 +354,7 @@ impl ShapeSearch {
         }
     }
 
-    /// Refined from all around, where a match is poor: its start may have been on the wrong side of a shadow.
+    /// Refined from all directions where a match is poor: its start may have been on the wrong side of a shadow.
     fn polish(&self, picture: &Picture<'_>, found: Vec<Found>) -> Vec<Found> {
         let sure = self.config.shape.refinement.sure_agreement;
         let (poor, mut others): (Vec<Found>, Vec<Found>) =
@@ -373,7 +376,7 @@ impl ShapeSearch {
         if is_in_range && refined.agreement > found.agreement { refined } else { *found }
     }
 
-    /// The best first; of those that claim the same area, the best alone.
+    /// Best first; of matches that claim the same area, only the best.
     fn apart(&self, mut found: Vec<Found>) -> Vec<Found> {
         found.sort_by(|a, b| b.agreement.total_cmp(&a.agreement));
         let mut kept: Vec<Found> = Vec::new();
@@ -385,18 +388,18 @@ impl ShapeSearch {
         kept
     }
 
-    /// How far a start is followed: about itself, and within the scales looked for.
+    /// The range of a climb: near its start, and within the scales of the search.
     fn range_about(&self, pose: Pose) -> CaptureRange {
         let [least, largest] = [self.config.scales.start().ln(), self.config.scales.end().ln()];
         let turn = FOLLOW_STEPS * self.bank.angle_step_rad;
-        // Edges move as far by a change of ln scale as by the same angle.
+        // A change of ln scale moves edges as far as the same angle does.
         let (low, high) = ((pose.log_scale - turn).max(least), (pose.log_scale + turn).min(largest));
         let shift = FOLLOW_PLACES * self.place_pitch();
         CaptureRange::around(Pose { log_scale: 0.5 * (low + high), ..pose }, [shift, shift, turn, 0.5 * (high - low)])
     }
 
-    /// Climbs from every start at the template's coarsest level; the best by edges and surface first, no two alike and none
-    /// like those before.
+    /// Climbs from every start at the template's coarsest level; the best by edges and surface first, without
+    /// duplicates and without those found before.
     fn climb_starts(&self, picture: &Picture<'_>, starts: &[Start], before: &[Pose]) -> Vec<Pose> {
         let mut climbed = parallel::map(starts, |start| {
             let pose = self.pose_of(start);
@@ -425,7 +428,7 @@ impl ShapeSearch {
         place_pitch(self.sweep_level_idx)
     }
 
-    /// Whether two matches can both be there: parts do not lie in each other.
+    /// Whether two matches can both be right: parts do not overlap.
     fn are_apart(&self, one: &PlanarSimilarity, other: &PlanarSimilarity) -> bool {
         let one_from_other = one.inverse().compose(other);
         self.surface.share_inside(&self.outline, &one_from_other) <= MAX_OVERLAP
@@ -442,8 +445,8 @@ fn pose_of(start: &Start, bank: &Bank, sweep_level_idx: usize) -> Pose {
     Pose { center: Point2::new(x, y), angle_rad: variant.angle_rad, log_scale: variant.log_scale }
 }
 
-/// Where in a photo, whose gradients are `photo`, a part of about its size may lie, wholly or partly: its own other places, or its
-/// mirror image's. `points` are the part's at the level that is swept.
+/// The places in a photo, whose gradients are `photo`, where a part of about its size may lie, wholly or partly: other
+/// places of the part itself, or of its mirror image. `points` are the part's at the swept level.
 fn places_in_photo(
     points: &[EdgePoint],
     level_idx: usize,
@@ -451,7 +454,7 @@ fn places_in_photo(
     photo: &GradientField,
     config: &SearchConfig,
 ) -> Vec<PlanarSimilarity> {
-    /// Places that are refined. Chosen by hand, for time.
+    /// Number of places that are refined. Chosen by hand, for time.
     const MAX_PLACES: usize = 48;
     const SAME_LOG_SCALES: [f64; 2] = [-0.02, 0.02];
     const REACH: Reach = Reach { shift_px: 8.0, turn_rad: 0.1, log_scale: 0.02 };
@@ -497,7 +500,7 @@ fn check_config(config: &SearchConfig) -> Result<(), ShapeError> {
     let within = |scale: f64| (SCALE_BOUNDS.0..=SCALE_BOUNDS.1).contains(&scale);
     let checks = [
         ("scales", "from 0.5 on", least, within(least)),
-        ("scales", "up to 2, and no less than they begin with", largest, within(largest) && largest >= least),
+        ("scales", "up to 2, and no less than the lower end", largest, within(largest) && largest >= least),
         ("min_agreement", "in [0, 1]", config.min_agreement, (0.0..=1.0).contains(&config.min_agreement)),
         (
             "num_points",

@@ -1,20 +1,20 @@
-//! Look-up tables of one image: how well each of a few quantised directions agrees with each place.
+//! Look-up tables of one image: the agreement of each of a few quantised directions with each place.
 //!
-//! Legend: `k` one of [`NUM_DIRECTIONS`] directions, evenly spaced over half a turn since gradients have no sign;
-//! the response of direction `k` at pixel `(x, y)` of the pyramid level is the best of
-//! `cos 2(direction k − gradient direction)` over the pixels at most [`SPREAD`] away, from 0 to [`FULL`]. An edge point
-//! of the template whose normal is nearest to direction `k` reads its share of the agreement with one look.
+//! Legend: `k` one of [`NUM_DIRECTIONS`] directions, evenly spaced over half a turn since gradients have no sign; the
+//! response of direction `k` at pixel `(x, y)` of the pyramid level is the best of `cos 2(direction k − gradient
+//! direction)` over the pixels at most [`SPREAD`] away, from 0 to [`FULL`]. An edge point of the template whose normal
+//! is nearest to direction `k` reads its share of the agreement with one table access.
 //!
-//! Places, where the part's centre is tried, are [`PITCH`] pixels apart. Pixels are therefore kept in one table for
-//! each remainder of x and y: neighbouring places look at neighbouring bytes.
+//! The part's centre is tried at places that are [`PITCH`] pixels apart. Pixels are therefore kept in one table for
+//! each remainder of x and y, so that neighbouring places read neighbouring bytes.
 //!
-//! Spreading lets places and turns stand further apart than an edge is wide, while directions are still read where a
-//! thin part shows both its edges.
+//! Spreading allows a step between places and turns that is wider than an edge, and directions are still read where
+//! a thin part shows both its edges.
 //!
 //! # Source
 //! The idea of spread directions, response maps and their order in memory is LINE-2D's (Hinterstoisser et al.,
-//! *Gradient Response Maps for Real-Time Detection of Textureless Objects*, 2012). Here the tables are filled from the
-//! directions themselves instead of from bit masks, so that an edge's strength and sharpness count.
+//! *Gradient Response Maps for Real-Time Detection of Textureless Objects*, 2012). Here the tables are computed from
+//! the directions themselves instead of bit masks, so that an edge's strength and sharpness count.
 
 use std::f32::consts::TAU;
 
@@ -24,8 +24,8 @@ use crate::gradient_field::{GradientLevel, whole};
 use crate::lanes::in_lanes;
 use crate::parallel;
 
-/// Directions over half a turn; neighbours are 11.25° apart, which costs at most 2 % of the cosine. Derived:
-/// that loss against the number of tables, which must fit in a byte.
+/// Directions over half a turn; neighbours are 11.25° apart, which costs at most 2 % of the cosine. Derived
+/// from that loss and from the number of tables, which must fit in a byte.
 pub(crate) const NUM_DIRECTIONS: usize = 16;
 /// Response of an edge of exactly the table's direction. Small, so that 16 of them add up within a byte. Derived: 17 × 15 is 255.
 pub(crate) const FULL: u8 = 15;
@@ -39,24 +39,25 @@ pub(crate) fn direction_idx(double: [f32; 2]) -> usize {
 /// Level pixels from one place to the next. Chosen together with [`SPREAD`]: the responses of neighbouring places overlap.
 /// Not measured.
 pub(crate) const PITCH: usize = 2;
-/// How far responses are spread, in level pixels to every side. Chosen by hand, not measured.
+/// How far responses are spread, in level pixels in every direction. Chosen by hand, not measured.
 pub(crate) const SPREAD: usize = 2;
 
-/// Places that are summed at once; a table ends with as many zeros, so that the last block may be read whole. Chosen for
-/// time; results do not depend on it.
+/// Places that are summed together; a table ends with as many zeros, so that the last block may be read whole. Chosen
+/// for time; it does not change results.
 pub(crate) const BLOCK: usize = 128;
 
-/// The table of direction `k` that holds pixels whose x and y leave these remainders by [`PITCH`].
+/// The table of direction `k` with the pixels whose x and y have these remainders modulo [`PITCH`].
 pub(crate) fn table_idx(k: usize, x: usize, y: usize) -> usize {
     (k * PITCH + y % PITCH) * PITCH + x % PITCH
 }
 
-/// The tables of one pyramid level, padded with zeros so that templates may hang over the border.
+/// The tables of one pyramid level, padded with zeros so that templates may extend beyond the border.
 ///
 /// # Shapes
-/// A table is flat; the pixels of place `(x, y)` stand at [`Responses::idx_of`]. Rows share the padding between them.
+/// A table is flat; the pixels of place `(x, y)` are at [`Responses::idx_of`]. Adjacent rows share the padding between
+/// them.
 pub(crate) struct Responses {
-    /// Places in a row, and rows of places.
+    /// Places per row, and rows of places.
     pub(crate) width: usize,
     pub(crate) height: usize,
     pad: usize,
@@ -64,7 +65,7 @@ pub(crate) struct Responses {
 }
 
 impl Responses {
-    /// Fills the tables; templates may reach `pad` places out of the image.
+    /// Fills the tables; templates may extend `pad` places beyond the image.
     pub(crate) fn new(level: &GradientLevel, pad: usize) -> Self {
         let pad = pad + 1;
         let mut made = Self {
@@ -90,7 +91,7 @@ impl Responses {
         self.width + self.pad
     }
 
-    /// Where place `(x, y)` stands in a table.
+    /// The index of place `(x, y)` in a table.
     pub(crate) fn idx_of(&self, x: usize, y: usize) -> usize {
         (y + self.pad) * self.stride() + self.pad + x
     }
@@ -106,7 +107,7 @@ impl Responses {
         vec![vec![0u8; len]; PITCH * PITCH]
     }
 
-    /// Puts a row of one direction's responses into its tables.
+    /// Writes a row of one direction's responses into its tables.
     fn split(&self, row: usize, responses: &[u8], tables: &mut [Vec<u8>]) {
         let at = self.idx_of(0, row / PITCH);
         for right in 0..PITCH {
@@ -122,7 +123,7 @@ impl Responses {
     }
 }
 
-/// The directions of a level, each coordinate on its own: they are read once for each direction of a table.
+/// The directions of a level, one array per coordinate, because they are read once for each direction of a table.
 struct DirectionPlanes {
     width: usize,
     height: usize,
@@ -145,7 +146,7 @@ impl DirectionPlanes {
     fn spread(&self, direction: [f32; 2], mut put: impl FnMut(usize, &[u8])) {
         const RING: usize = 2 * SPREAD + 1;
         let (width, height) = (self.width, self.height);
-        // Each row spread to the left and right; the last few are kept.
+        // Each row spread to the left and right; the last few rows are kept.
         let mut across = [(); RING].map(|()| vec![0u8; width]);
         let mut plain = vec![0u8; width + 2 * SPREAD];
         let mut spread = vec![0u8; width];
@@ -192,7 +193,7 @@ impl WithSimd for Responded<'_> {
     }
 }
 
-/// Raises every value to at least its counterpart.
+/// Raises every value at least to its counterpart.
 fn raise(values: &mut [u8], to: &[u8]) {
     for (value, &other) in values.iter_mut().zip(to) {
         *value = (*value).max(other);

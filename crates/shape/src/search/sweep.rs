@@ -1,12 +1,12 @@
-//! All poses of a bank tried at all places of an image.
+//! Tries all poses of a bank at all places of an image.
 //!
 //! ```text
 //! tables ─ per stretch of places, per variant: add a shifted table row per point ─ best variant of each place and group
 //!        ─ local maxima ─ starts, the best of each scale in turn
 //! ```
-//! A group is one scale within one quarter of the turn, and a place keeps the best variant of each: a part that looks much the
-//! same turned by half a turn keeps both for the finer levels to decide, and so does a part in clutter or noise, where the
-//! smallest scale agrees best almost everywhere, because its points lie closest together.
+//! A group is one scale within one quarter of the turn, and a place keeps the best variant of each group. A part that
+//! is similar after half a turn therefore keeps both turns, and the finer levels decide. The same holds for a part in
+//! clutter or noise, where the smallest scale agrees best almost everywhere because its points are closest together.
 
 use pulp::{Simd, WithSimd};
 
@@ -15,23 +15,23 @@ use crate::parallel;
 use crate::search::bank::Bank;
 use crate::search::responses::{BLOCK, FULL, Responses};
 
-/// Places that one thread takes at a time, in blocks of [`BLOCK`]. Chosen for time; results do not depend on it.
+/// Places that one thread takes at a time, in blocks of [`BLOCK`]. Chosen for time; it does not change results.
 const STRETCH: usize = 1024;
-/// Looks added up in bytes before they are carried over into 16 bits. Derived.
+/// Reads summed in bytes before they are carried into 16 bits. Derived.
 const LOOKS_PER_BYTE: usize = 255 / FULL as usize;
-/// Parts of the turn that each keep their own best of every scale. Two would be enough for half a turn; four were chosen by hand, not
-/// measured.
+/// Sectors of the turn, each with its own best of every scale. Two would be enough for half a turn; four were chosen by
+/// hand, not measured.
 const NUM_SECTORS: usize = 4;
-/// A start is the best within this many places. Chosen by hand, not measured.
+/// A start is the maximum within this many places. Chosen by hand, not measured.
 const PEAK_RADIUS: usize = 2;
 
-/// A place, a variant, and how well they agree.
+/// A place, a variant, and their agreement.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Start {
     /// Column and row of the place.
     pub(crate) place: [usize; 2],
     pub(crate) variant_idx: usize,
-    /// Share of the most that can be had, in `[0, 1]`.
+    /// Share of the largest possible sum, in `[0, 1]`.
     pub(crate) response: f64,
 }
 
@@ -66,7 +66,7 @@ pub(crate) fn sweep(responses: &Responses, bank: &Bank, count: usize, min_respon
         field.peaks(least).map(start).collect::<Vec<_>>()
     })
     .concat();
-    // Stable sorts: equal ones stay in the order of groups and rows, whatever the threads did.
+    // Stable sorts keep equal ones in the order of groups and rows, independent of the threads.
     starts.sort_by(|a, b| b.response.total_cmp(&a.response));
     let mut of_scale = vec![0; bank.num_scales];
     let with_rank = |start: Start| {
@@ -80,7 +80,7 @@ pub(crate) fn sweep(responses: &Responses, bank: &Bank, count: usize, min_respon
     ranked.into_iter().map(|(_, start)| start).collect()
 }
 
-/// Which variants compete with each other at a place.
+/// The variants that compete with each other at a place.
 struct Groups {
     count: usize,
     /// Of every variant.
@@ -95,7 +95,7 @@ impl Groups {
     }
 }
 
-/// The sums of one group at all places, with a border that no peak is lower than.
+/// The sums of one group at all places, with a border of lowest values.
 struct PeakField {
     width: usize,
     height: usize,
@@ -103,7 +103,7 @@ struct PeakField {
 }
 
 impl PeakField {
-    /// `sums` by the offset from the first place's: some from there on.
+    /// `sums` from an offset relative to the first place.
     fn new<'a>(responses: &Responses, sums_from: impl Fn(usize) -> &'a [i16]) -> Self {
         let (width, height) = (responses.width, responses.height);
         let stride = width + 2 * PEAK_RADIUS;
@@ -123,7 +123,7 @@ impl PeakField {
         Self { width, height, sums }
     }
 
-    /// Places, row by row, whose sum is at least `least` and the most within [`PEAK_RADIUS`].
+    /// Places, row by row, whose sum is at least `least` and the maximum within [`PEAK_RADIUS`].
     fn peaks(&self, least: i16) -> impl Iterator<Item = ([usize; 2], i16)> {
         let stride = self.width + 2 * PEAK_RADIUS;
         let rows = self.sums.chunks_exact(stride).skip(PEAK_RADIUS).take(self.height).enumerate();
@@ -143,7 +143,7 @@ impl PeakField {
     }
 }
 
-/// The best of each place of a stretch, per group.
+/// The best of each place of a chunk, per group.
 struct Swept {
     sums: Vec<Vec<i16>>,
     variants: Vec<Vec<u16>>,
@@ -169,7 +169,7 @@ impl WithSimd for SweepStretch<'_> {
             sums: vec![vec![-1; len.next_multiple_of(BLOCK)]; groups.count],
             variants: vec![vec![0; len.next_multiple_of(BLOCK)]; groups.count],
         };
-        // Neighbouring variants look at nearly the same bytes: block by block, those stay in the first-level cache.
+        // Neighbouring variants read nearly the same bytes; block by block, those stay in the first-level cache.
         for start in (0..len).step_by(BLOCK) {
             let from = (at + start) as isize;
             for (variant_idx, looks) in shifts.iter().enumerate() {
@@ -228,9 +228,9 @@ mod tests {
         Bank::new(&points, 64, 1.0, [-0.1, 0.1])
     }
 
-    /// One look at a time, with a case for the border.
+    /// One read at a time, with a border case.
     fn naive(responses: &Responses, bank: &Bank, x: usize, y: usize, variant_idx: usize) -> u32 {
-        // Rows this far apart tell a shift's x and y.
+        // Rows this far apart make a shift's x and y distinguishable.
         const APART: isize = 1000;
         bank.variants[variant_idx]
             .shifts(APART as usize)

@@ -25,7 +25,7 @@ pub enum Solid {
     Disc { center: [f64; 2], radius: f64, height: f64 },
     /// A torus lying flat.
     Ring { center: [f64; 2], radius: f64, thickness: f64 },
-    /// Takes away everything within `radius`.
+    /// Removes everything within `radius`.
     Hole { center: [f64; 2], radius: f64 },
 }
 
@@ -170,7 +170,7 @@ pub fn parts() -> Vec<Part> {
     ]
 }
 
-/// A rod, a ring, a plate or a disc of random size: what lies about besides the part.
+/// A rod, a ring, a plate or a disc of random size: distractors beside the part.
 pub fn distractor(rng: &mut Pcg64Mcg) -> Part {
     let grey = rng.random_range(0.15..0.85);
     let albedo = [0; 3].map(|_| (grey + rng.random_range(-0.12..0.12f64)).clamp(0.05, 0.95));
@@ -199,7 +199,7 @@ pub fn distractor(rng: &mut Pcg64Mcg) -> Part {
     Part { name: "distractor", solids, albedo, gloss: rng.random_range(0.0..0.6) }
 }
 
-/// What lies under the parts.
+/// The surface under the parts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Table {
     Plain,
@@ -461,7 +461,7 @@ pub fn outline(part: &Part, image_from_part: &PlanarSimilarity) -> Polygon {
     let (mut at, mut heading) = (start, 0usize);
     loop {
         vertices.push(Point2::new(0.5 * f64::from(at.0) + 0.25, 0.5 * f64::from(at.1) + 0.25));
-        // Moore tracing: turn left from where we came from until the part is met.
+        // Moore tracing: turn left from the previous direction until the part is met.
         let next = (0..8).map(|k| (heading + 6 + k) % 8).find(|&d| inside(at.0 + AROUND[d].0, at.1 + AROUND[d].1));
         let Some(direction) = next else { break };
         at = (at.0 + AROUND[direction].0, at.1 + AROUND[direction].1);

@@ -43,7 +43,7 @@ pub fn mask(outline: &Polygon, like: &Plane) -> Mask {
     outline.rasterize(like.width() as u32, like.height() as u32)
 }
 
-/// The picture as seen after `image_from_source`; beyond its border it is mirrored.
+/// The picture transformed by `image_from_source`; beyond its border it is mirrored.
 pub fn warped(source: &Plane, image_from_source: &PlanarSimilarity, width: u32, height: u32) -> Plane {
     let back = image_from_source.inverse();
     Plane::from_fn(width, height, |x, y| {

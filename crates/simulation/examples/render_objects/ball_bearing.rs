@@ -111,7 +111,7 @@ pub fn ball_bearing() -> Part {
     }
 }
 
-/// A face ground in rings, the same in every direction: a turn of the bearing must not show.
+/// A face ground in rings, equal in every direction, so that a turn of the bearing is not visible.
 fn concentric(base: [f64; 3], strength: f64, seed: u64) -> Texture {
     let rings = Noise::new_stretched(1, 40, seed);
     Texture::paint(128, |u, v| {
@@ -121,7 +121,8 @@ fn concentric(base: [f64; 3], strength: f64, seed: u64) -> Texture {
     })
 }
 
-/// What a bright ball shows from above: the lit ceiling in the middle, the dark surroundings below it at its rim.
+/// The appearance of a bright ball from above: the lit ceiling in the middle, the dark surroundings below it at its
+/// rim.
 fn mirror_ball() -> Texture {
     Texture::paint(32, |u, v| {
         let radius = 2.0 * (u - 0.5).hypot(v - 0.5);

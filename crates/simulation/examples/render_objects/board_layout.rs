@@ -1,8 +1,8 @@
-//! Where everything on the circuit board stands, in metres: the board from above, its middle beside the grasp.
+//! Positions of everything on the circuit board, in metres: the board from above, its centre beside the grasp.
 
-/// Plan that the textures of board and plastics cover.
+/// Area covered by the textures of board and plastics.
 pub const SPAN: f64 = 0.11;
-/// The board from above: its middle lies beside the grasp, since the connectors at -x weigh more.
+/// The board from above: its centre is beside the grasp, because the connectors at -x are heavier.
 pub const LENGTH: f64 = 0.092;
 pub const WIDTH: f64 = 0.052;
 pub const MIDDLE_X: f64 = 0.004;

@@ -1,4 +1,4 @@
-//! What is printed and etched on the circuit board, and the colours of the plastics that stand on it.
+//! The print and the tracks of the circuit board, and the colours of its plastic components.
 
 use nalgebra::{Point2, Vector2};
 use rand::{Rng, SeedableRng};
@@ -129,7 +129,7 @@ pub fn board_texture() -> Texture {
     })
 }
 
-/// The plastics from above, each in its colour, with what is written on them.
+/// The plastics from above, each in its colour, with the print on them.
 pub fn plastics_texture() -> Texture {
     let texts = [
         (Lettering::level("SDG32", 4.0, 3.6, 1.9), [0.62, 0.62, 0.60]),

@@ -199,7 +199,7 @@ fn screw_head() -> TriangleMesh {
         ],
         28,
     );
-    // The socket is filled by a bar but for a cross.
+    // The socket is filled by a bar except for a cross.
     let bar = box_solid(0.0036, 0.0006, 0.0019, 0.0002);
     let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), FRAC_PI_2 / 2.0);
     mesh.append(&bar.transformed(&Isometry3::from_parts(Translation3::identity(), turn)));

@@ -18,16 +18,16 @@ const HALF_LENGTH: f64 = 0.044;
 const HALF_WIDTH: f64 = 0.022;
 const WALL: f64 = 0.005;
 const FLOOR: f64 = 0.004;
-/// How much of the top is machined.
+/// Depth of the machined top.
 const SKIN: f64 = 0.0010;
-/// How much lower than the long walls seats and lugs end: faces in one plane that overlap would be lit twice.
+/// Distance by which seats and lugs end below the long walls: overlapping faces in one plane would be lit twice.
 const SEAT_LOWER: f64 = 0.00006;
 const LUG_LOWER: f64 = 0.00012;
 /// Bolt lugs at the corners: their centres and radii.
 const LUG: (f64, f64) = (0.0375, 0.0255);
 const LUG_RADIUS: f64 = 0.0066;
 const BOLT_RADIUS: f64 = 0.0028;
-/// Feet at both ends: centre, and how far they reach.
+/// Feet at both ends: centre, and extent.
 const FOOT_CENTRE: f64 = 0.050;
 const FOOT_END: f64 = 0.065;
 const FOOT_HEIGHT: f64 = 0.006;
@@ -46,12 +46,12 @@ const FEET: [Foot; 2] = [
 
 /// A wall across the box with a bearing's half bore in its top.
 struct Seat {
-    /// Where the wall begins and how thick it is, along x.
+    /// Start and thickness of the wall, along x.
     wall: [f64; 2],
     /// Bore, and the boss about it (none for the partition).
     radius: f64,
     boss_radius: f64,
-    /// Where the boss begins and how long it is.
+    /// Start and length of the boss.
     boss: Option<[f64; 2]>,
 }
 
@@ -118,7 +118,7 @@ pub fn housing() -> Part {
             foot.bolts.iter().map(|y| circle(Point2::new(foot.side * 0.0590, *y), 0.0032, 24)).collect();
         feet.append(&extrude(&outline, &holes, FOOT_HEIGHT, 0.0010));
     }
-    // Ribs that stiffen the long walls, clear of where the jaws close.
+    // Ribs that stiffen the long walls, away from the jaws.
     for (x, side) in [(0.0200, 1.0), (0.0200, -1.0), (-0.0200, -1.0)] {
         feet.append(&moved(box_solid(0.0032, 0.0050, 0.024, 0.0006), x, side * (HALF_WIDTH + 0.0020), 0.0));
     }

@@ -65,7 +65,7 @@ pub fn key() -> Part {
         description: "Key with a moulded bow of 43 by 28 by 9 mm: nickel-plated brass blade, 35 mm long, six cuts and two \
                       milled grooves; slot for a ring, emblem, three grip ribs",
         pieces: vec![
-            // A transponder and the blade's root stand in the bow.
+            // A transponder and the blade's root are in the bow.
             Piece { name: "bow", mesh: bow.textured_from_above(0.05), density: 1.3 * PLASTIC, material: "moulded" },
             Piece { name: "ribs", mesh: ribs.textured_from_above(0.05), density: PLASTIC, material: "moulded" },
             Piece {

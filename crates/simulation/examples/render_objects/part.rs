@@ -1,4 +1,4 @@
-//! What a part is made of, and how it is written.
+//! The pieces of a part, and its output files.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::fmt::Write as _;
@@ -28,7 +28,7 @@ pub struct Piece {
     pub material: &'static str,
 }
 
-/// How a surface looks.
+/// The appearance of a surface.
 pub struct Finish {
     pub name: &'static str,
     pub texture: Texture,
@@ -36,7 +36,7 @@ pub struct Finish {
     pub shininess: f64,
 }
 
-/// A part: what is seen, what touches, where it is held.
+/// A part: its visible pieces, its collision shapes, its grasp.
 pub struct Part {
     pub name: &'static str,
     pub title: &'static str,
@@ -49,13 +49,13 @@ pub struct Part {
     pub jaw_width: f64,
     pub grasp_height: f64,
     pub mark_height: f64,
-    /// The highest at the marks, where it is above them.
+    /// The highest surface at the marks, if it is above them.
     pub seen_height: f64,
     pub friction: f64,
     pub symmetry: RotationalSymmetry,
 }
 
-/// A mesh elsewhere.
+/// A moved mesh.
 pub fn moved(mesh: TriangleMesh, x: f64, y: f64, z: f64) -> TriangleMesh {
     mesh.transformed(&Isometry3::translation(x, y, z))
 }
@@ -69,7 +69,7 @@ pub fn centred_texture(mesh: TriangleMesh, metres: f64) -> TriangleMesh {
     mesh
 }
 
-/// Lays a solid that stands along z on its side: from `start` on along x turned by `yaw`, its former -x on top.
+/// Lays a solid that stands along z on its side: from `start` along x turned by `yaw`, with its former -x on top.
 pub fn laid(mesh: TriangleMesh, start: Point3<f64>, yaw: f64) -> TriangleMesh {
     let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw);
     mesh.transformed(&(Isometry3::from_parts(Translation3::from(start), turn) * lying_along_x(0.0)))

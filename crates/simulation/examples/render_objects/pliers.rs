@@ -22,7 +22,7 @@ const JAW_TIP: f64 = 0.0520;
 const GAP: f64 = 0.00025;
 const HANDLE_MIDDLE: f64 = 0.0054;
 const HANDLE: [(f64, f64); 4] = [(-0.0240, 0.0108), (-0.0500, 0.0205), (-0.0800, 0.0225), (-0.1085, 0.0160)];
-/// Plan that the steel's texture covers.
+/// Area covered by the steel's texture.
 const SPAN: f64 = 0.10;
 
 /// The part.
@@ -34,7 +34,7 @@ pub fn pliers() -> Part {
     steel.append(&solid(&mirrored(&jaw(LAP_RADIUS - 0.0006))));
     steel.append(&solid(&tang(LAP_RADIUS - 0.0006)));
     steel.append(&solid(&mirrored(&tang(CUT_RADIUS))));
-    // The lap ends a little lower: faces in one plane that overlap would be lit twice.
+    // The lap ends slightly lower: overlapping faces in one plane would be lit twice.
     let lap = cylinder(LAP_RADIUS, THICKNESS / 2.0 - 0.0001, 0.0004, 56);
     steel.append(&moved(lap, 0.0, 0.0, THICKNESS / 2.0));
     let lower_lap = moved(cylinder(JOINT_HALF_WIDTH - 0.0004, THICKNESS / 2.0, 0.0004, 56), 0.0, 0.0, 0.0001);
@@ -75,7 +75,7 @@ pub fn pliers() -> Part {
                       riveted pivot; dipped red handles with black inlays",
         pieces: vec![
             Piece { name: "steel", mesh: centred_texture(steel, SPAN), density: STEEL, material: "ground" },
-            // Most of the lower lap stands within the other pieces.
+            // Most of the lower lap is inside the other pieces.
             Piece { name: "lap", mesh: lower_lap.textured_from_above(0.03), density: 0.3 * STEEL, material: "oiled" },
             Piece {
                 name: "rivet",
@@ -158,7 +158,7 @@ fn jaw(cut_radius: f64) -> Vec<Point2<f64>> {
     outline
 }
 
-/// What leads from the joint into the handle at +y, from above, counter-clockwise, cut out by a circle about the pivot.
+/// The piece from the joint into the handle at +y, from above, counter-clockwise, cut out by a circle about the pivot.
 fn tang(cut_radius: f64) -> Vec<Point2<f64>> {
     let mut outline: Vec<_> = [
         (-0.0003, JOINT_HALF_WIDTH),

@@ -68,7 +68,7 @@ pub fn pneumatic_cylinder() -> Part {
     let mut collisions = vec![
         box_between([REAR_CAP[0], -CAP, 0.0], [REAR_CAP[1], CAP, 2.0 * CAP]),
         box_between([FRONT_CAP[0], -CAP, 0.0], [FRONT_CAP[1], CAP, 2.0 * CAP]),
-        // What four tie rods span.
+        // The span of the four tie rods.
         box_between(
             [REAR_CAP[1], -TIE - TIE_RADIUS, CAP - TIE - TIE_RADIUS],
             [FRONT_CAP[0], TIE + TIE_RADIUS, CAP + TIE + TIE_RADIUS],

@@ -49,7 +49,7 @@ const LETTERS: [(char, [u8; 7]); 40] = [
 
 /// A texture of the plan `span` metres wide and high about the origin, `colour` given the place in metres.
 ///
-/// A mesh fits to it with `centred_texture(mesh, span)`. Each texel is the mean of nine places.
+/// It fits a mesh with `centred_texture(mesh, span)`. Each texel is the mean of nine samples.
 pub fn plan_texture(size: u32, span: f64, mut color: impl FnMut(Point2<f64>) -> Color) -> Texture {
     let texel = span / f64::from(size);
     Texture::paint(size, |u, v| {
@@ -83,7 +83,7 @@ impl Lettering {
         Self { text, centre, height: height_mm * 1e-3, upright: false }
     }
 
-    /// Whether a place is covered by ink.
+    /// Whether a point is covered by ink.
     pub fn covers(&self, place: Point2<f64>) -> bool {
         let dot = self.height / 7.0;
         let from_centre = place - self.centre;
@@ -100,14 +100,14 @@ impl Lettering {
     }
 }
 
-/// Distance of a place to a segment.
+/// Distance of a point from a segment.
 pub fn distance_to_segment(place: Point2<f64>, from: Point2<f64>, to: Point2<f64>) -> f64 {
     let along = to - from;
     let part = ((place - from).dot(&along) / along.norm_squared().max(1e-18)).clamp(0.0, 1.0);
     (place - (from + along * part)).norm()
 }
 
-/// Whether a place lies in a level rectangle given by its middle and its size.
+/// Whether a point lies in a level rectangle given by its centre and its size.
 pub fn in_rectangle(place: Point2<f64>, middle: (f64, f64), size: (f64, f64)) -> bool {
     (place.x - middle.0).abs() <= size.0 / 2.0 && (place.y - middle.1).abs() <= size.1 / 2.0
 }

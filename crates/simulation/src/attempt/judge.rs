@@ -1,10 +1,10 @@
-//! The truth about a grasp, which the arm does not know: where the part is and what touches it.
+//! The truth about a grasp, unknown to the arm: the part's pose and its contacts.
 
 use sdg_robot::{GraspStep, Result, StepObserver};
 
 use crate::workcell::Workcell;
 
-/// Judges each step by the physics, and shakes the part where the workcell's errors ask for it.
+/// Judges each step by the physics, and shakes the part if the workcell's errors ask for it.
 pub(super) struct Judge {
     success_height_m: f64,
     pub(super) shake_amplitude_m: Option<f64>,
@@ -17,7 +17,7 @@ impl Judge {
 }
 
 impl Workcell {
-    /// Why the part is not between both fingers; `None` where it is.
+    /// The reason why the part is not between both fingers; `None` if it is.
     pub fn why_not_grasped(&self) -> Option<String> {
         match self.fingers_on_object() {
             [true, true] => None,
@@ -28,7 +28,7 @@ impl Workcell {
         }
     }
 
-    /// Why the part is not up and between both fingers; `None` where it is.
+    /// The reason why the part is not lifted and between both fingers; `None` if it is.
     pub fn why_not_lifted(&self, success_height_m: f64) -> Option<String> {
         let height = self.object_height_m().unwrap_or(0.0);
         let fingers = self.fingers_on_object();

@@ -23,16 +23,16 @@ use judge::Judge;
 
 pub use report::AttemptReport;
 
-/// Where the sequence goes and how it is judged.
+/// Settings of an attempt and of its judgement.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AttemptConfig {
     /// Settings of the grasp sequence.
     pub grasp: GraspConfig,
     /// Height of the part's lowest point above the table that counts as grasped, in metres.
     pub success_height_m: f64,
-    /// Pictures from outside while it happens.
+    /// Pictures from outside during the attempt.
     pub record: Option<RecordConfig>,
-    /// Where the part is put down, and how.
+    /// Settings for putting the part down.
     pub placing: Option<(PlaceGoal, PlacingConfig)>,
 }
 
@@ -42,14 +42,15 @@ impl Default for AttemptConfig {
     }
 }
 
-/// The hand's angular velocity in rehearsals, rad/s. Franka's 2.5 hold for motions that are commanded in Cartesian space; at the pace of
-/// rehearsals joint motions, which Franka limits joint by joint, turn the hand at up to twice that.
+/// The hand's angular velocity in rehearsals, rad/s. Franka's limit of 2.5 applies to motions commanded in Cartesian
+/// space; at the pace of rehearsals joint motions, which Franka limits joint by joint, turn the hand at up to twice
+/// that.
 const REHEARSED_ANGULAR_VELOCITY_RAD_S: f64 = 6.0;
 const REHEARSED_ANGULAR_ACCELERATION_RAD_S2: f64 = 60.0;
 
 impl Workcell {
-    /// What every motion in the workcell keeps to: Franka's limits over the table, but for the hand's turning, since joint motions
-    /// go at the pace of rehearsals.
+    /// The limits of every motion in the workcell: Franka's limits over the table, except for the hand's rotation,
+    /// because of the pace of rehearsals.
     pub fn safety_limits() -> SafetyLimits {
         let mut cartesian = CartesianLimits::panda();
         cartesian.angular_velocity_rad_s = REHEARSED_ANGULAR_VELOCITY_RAD_S;
@@ -57,12 +58,12 @@ impl Workcell {
         SafetyLimits { cartesian, fingertip_beyond_tcp_m: FINGERTIP_BEYOND_TCP_M, ..SafetyLimits::default() }
     }
 
-    /// Where the wrist camera is.
+    /// The pose of the wrist camera.
     pub fn wrist_camera(&self) -> CameraPose {
         CameraPose::OnFlange(self.panda.flange_from_tcp() * self.tcp_from_camera())
     }
 
-    /// `flange_from_camera` of the wrist camera as the robot is told it: with the error of its hand-eye calibration.
+    /// `flange_from_camera` of the wrist camera as given to the robot: with the error of its hand-eye calibration.
     pub fn told_flange_from_camera(&self) -> Isometry3<f64> {
         let camera_from_assumed = self.config().errors.camera_from_assumed.unwrap_or_else(Isometry3::identity);
         self.panda.flange_from_tcp() * self.tcp_from_camera() * camera_from_assumed
@@ -70,11 +71,11 @@ impl Workcell {
 
     /// Tries to grasp the part once, from a start configuration drawn from `seed`.
     ///
-    /// Everything is put back to the start first, so that the same seed and finder give the same
+    /// Everything is first reset to the start, so that the same seed and finder give the same
     /// attempt.
     ///
     /// # Errors
-    /// Errors of the simulation or of perception itself, and whatever stops the arm; a grasp that fails is a report.
+    /// Errors of the simulation or of perception itself, and of a stopped arm; a failed grasp is a report.
     pub fn run_attempt(
         &mut self,
         finder: &mut dyn PartFinder<Self>,
@@ -131,14 +132,14 @@ impl Workcell {
         })
     }
 
-    /// How far the part really lies beside its place.
+    /// The true offset of the part from its place.
     fn true_place_error(&self, config: &AttemptConfig) -> Option<GraspError> {
         let (goal, _) = config.placing.as_ref()?;
         let spec = &self.config().scene.object.as_ref()?.spec;
         Some(spec.grasp_error(&self.base_from_object()?, &goal.base_from_part(0.0, 0.0)))
     }
 
-    /// Puts everything back to the start of an attempt: the arm at rest in a configuration drawn from `seed`.
+    /// Resets everything to the start of an attempt: the arm at rest in a configuration drawn from `seed`.
     ///
     /// # Errors
     /// A first look-out pose that the arm cannot reach.
@@ -147,7 +148,7 @@ impl Workcell {
         self.reset(&start)
     }
 
-    /// A configuration around the ready pose, well above the table, from which the first look can be
+    /// A configuration near the ready pose, well above the table, from which the first look can be
     /// reached without coming near the table.
     fn random_start(&self, config: &GraspConfig, seed: u64) -> Result<JointVector> {
         const SPREAD_RAD: [f64; 7] = [0.9, 0.4, 0.5, 0.4, 0.6, 0.4, 0.9];

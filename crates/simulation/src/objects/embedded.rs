@@ -12,10 +12,10 @@ macro_rules! embedded {
 /// A file's name and bytes, compiled in.
 pub(super) type EmbeddedFile = (&'static str, &'static [u8]);
 
-/// How many of [`EMBEDDED`] are the paper's parts: they come first.
+/// Number of the paper's parts in [`EMBEDDED`]; they come first.
 pub(super) const NUM_PAPER_PARTS: usize = 8;
 
-/// Name and files of every part that is compiled in: the paper's eight, then the held-out four.
+/// Name and files of every compiled-in part: the paper's eight, then the held-out four.
 pub(super) static EMBEDDED: &[(&str, &[EmbeddedFile])] = embedded! {
     "pendulum": [
         "object.json", "object.xml",

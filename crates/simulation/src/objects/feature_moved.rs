@@ -1,7 +1,7 @@
-//! Look-alikes with one feature elsewhere: a feature of the part moved over it, or one region stretched or shortened.
+//! Look-alikes with one changed feature: a moved feature, or a stretched or shortened region.
 //!
-//! All is judged from above, as the camera sees it: a moved feature must find the same ground under it, at the same
-//! height, and the picture must change visibly.
+//! Everything is judged from above, as the camera sees it: a moved feature must have the same surface under it, at
+//! the same height, and the picture must change visibly.
 
 use nalgebra::{Point2, Point3, Vector2, Vector3};
 use rand::{Rng, SeedableRng};
@@ -16,39 +16,39 @@ use super::mjcf_tags::{Tag, map_tags};
 use super::shape::{VisualMesh, triangles};
 use crate::error::Result;
 
-/// How far a feature moves, as a share of the part's box diagonal.
+/// Distance of the move, as a share of the part's box diagonal.
 const MOVES: std::ops::Range<f64> = 0.05..0.10;
 
 /// Side of a cell of the views from above, in metres.
 const CELL_M: f64 = 0.001;
-/// Heights that differ by less look the same from above, in metres.
+/// Smaller height differences are not visible from above, in metres.
 const SAME_HEIGHT_M: f64 = 0.001;
-/// Ground that is this much higher or lower is other ground, in metres.
+/// Surfaces that differ in height by more than this are different, in metres.
 const SAME_GROUND_M: f64 = 0.0015;
-/// Share of a feature's cells that may have other ground than before.
+/// Largest share of a feature's cells with another surface than before.
 const MAX_OTHER_GROUND: f64 = 0.04;
-/// Least share of what is seen from above that must change.
+/// Minimum share of the visible cells from above that must change.
 const MIN_CHANGE: f64 = 0.012;
-/// Distances and directions that are tried for each feature.
+/// Distances and directions tried for each feature.
 const MOVES_PER_FEATURE: usize = 8;
 
-/// Length of the region that is stretched, as a share of the part's length.
+/// Length of the stretched region, as a share of the part's length.
 const STRETCHED_SHARE: f64 = 0.3;
-/// Pieces up to this share of the part's box diagonal keep their shape where a region is stretched.
+/// Pieces up to this share of the part's box diagonal keep their shape when a region is stretched.
 const RIGID_SHARE: f64 = 0.3;
 
-/// How the points of a part move.
+/// The movement of a part's points.
 enum Change {
     /// Some pieces by a vector, together.
     Move { feature: Vec<usize>, bounds: Bounds, by: Vector3<f64> },
-    /// What lies beyond a region along x by a distance, the region itself stretched between.
+    /// The points beyond a region along x by a distance; the region itself is stretched between.
     Stretch { from: f64, to: f64, by: f64 },
     /// The bore of a round part to another radius.
     Bore { radius: f64, outer: f64, by: f64 },
 }
 
 impl ObjectSpec {
-    /// The part with one feature moved, and what was done in words.
+    /// The part with one feature moved, and a description in words.
     ///
     /// # Errors
     /// As `visual_meshes`.
@@ -91,7 +91,7 @@ impl ObjectSpec {
 }
 
 impl Change {
-    /// Where a point of a piece goes.
+    /// The new position of a point of a piece.
     fn applied(&self, piece: usize, bounds: &Bounds, rigid_m: f64, p: Point3<f64>) -> Point3<f64> {
         match self {
             Self::Move { feature, by, .. } => match feature.binary_search(&piece) {
@@ -103,7 +103,7 @@ impl Change {
             }
             Self::Stretch { .. } => self.along_x(p),
             Self::Bore { .. } => {
-                // What stands around the axis is turned narrower; what stands beside it (a ball) moves as a whole.
+                // Pieces around the axis are made narrower; a piece beside it (a ball) moves as a whole.
                 let around_axis = bounds.contains(&Point3::new(0.0, 0.0, bounds.centre().z), 0.0);
                 if around_axis { self.radially(p) } else { p + (self.radially(bounds.centre()) - bounds.centre()) }
             }
@@ -130,7 +130,7 @@ impl Change {
         Point3::new(p.x * factor, p.y * factor, p.z)
     }
 
-    /// Moves a collision shape with what it stands for; false where it stays.
+    /// Moves a collision shape with its visible piece; false if it stays.
     fn move_shape(&self, tag: &mut Tag) -> bool {
         if tag.get("group") != Some("3") {
             return false;
@@ -172,7 +172,7 @@ impl Change {
                 }
                 true
             }
-            // What touches table and jaws is the outer ring.
+            // The outer ring touches table and jaws.
             Self::Bore { .. } => false,
         }
     }
@@ -209,7 +209,7 @@ impl Change {
     }
 }
 
-/// A feature and a move that pass all checks, at random; `None` where there is none.
+/// A random feature and move that pass all checks; `None` if there is none.
 fn moved_feature(meshes: &[VisualMesh], pieces: &Pieces, rng: &mut Pcg64Mcg) -> Option<Change> {
     let all = triangles(meshes);
     let before = HeightMap::new(&all, CELL_M);
@@ -259,7 +259,7 @@ impl Parted {
         Self { feature_triangles, rest_triangles, rest, cells }
     }
 
-    /// Whether the feature finds the same ground under it after a move.
+    /// Whether the feature has the same surface under it after a move.
     fn still_stands(&self, by: &Vector3<f64>) -> bool {
         let ground = |at: &Point2<f64>| self.rest.at(at).map(|(z, _)| z);
         let is_same = |a: Option<f64>, b: Option<f64>| match (a, b) {
@@ -268,7 +268,7 @@ impl Parted {
             _ => false,
         };
         let others = self.cells.iter().filter(|at| !is_same(ground(at), ground(&(**at + by.xy())))).count();
-        // What stands beside the rest must touch it there as much as here.
+        // A feature beside the rest must touch it as much as before.
         let touching = |shift: Vector2<f64>| {
             let neighbours = [[1.5, 0.0], [-1.5, 0.0], [0.0, 1.5], [0.0, -1.5]].map(|d| Vector2::from(d) * CELL_M);
             self.cells.iter().filter(|at| neighbours.iter().any(|d| ground(&(**at + shift + d)).is_some())).count()
@@ -279,7 +279,7 @@ impl Parted {
             && after as f64 >= 0.85 * before as f64
     }
 
-    /// Share of what is seen from above that a move changes.
+    /// Share of the visible cells from above that a move changes.
     fn change(&self, before: &HeightMap, by: &Vector3<f64>) -> f64 {
         let moved = self.feature_triangles.iter().map(|(corners, mesh)| (corners.map(|p| p + by), *mesh));
         let after: Vec<_> = self.rest_triangles.iter().copied().chain(moved).collect();
@@ -287,7 +287,7 @@ impl Parted {
     }
 }
 
-/// The cells of a map with those that lie between filled ones of the same row.
+/// The cells of a map and those between filled ones of the same row.
 fn filled_rows(map: &HeightMap) -> Vec<Point2<f64>> {
     let mut cells = Vec::new();
     for row in 0..map.height {
@@ -303,7 +303,7 @@ fn filled_rows(map: &HeightMap) -> Vec<Point2<f64>> {
     cells
 }
 
-/// Stretches or shortens the region along x in which the part changes least, so that what lies beyond stands elsewhere.
+/// Stretches or shortens the region along x in which the part changes least, so that the points beyond it move.
 fn stretched(meshes: &[VisualMesh], pieces: &Pieces, rng: &mut Pcg64Mcg) -> Change {
     let map = HeightMap::new(&triangles(meshes), CELL_M);
     let bounds = pieces.bounds();
@@ -313,13 +313,13 @@ fn stretched(meshes: &[VisualMesh], pieces: &Pieces, rng: &mut Pcg64Mcg) -> Chan
             (0..map.height).map(height).collect()
         })
         .collect();
-    // How much each column differs from the one before it, in cells.
+    // Difference of each column from the one before it, in cells.
     let changes: Vec<usize> = columns
         .windows(2)
         .map(|pair| pair[0].iter().zip(&pair[1]).filter(|(a, b)| a.abs_diff(**b) > 1).count())
         .collect();
     let region = ((STRETCHED_SHARE * map.width as f64) as usize).clamp(1, changes.len().max(1));
-    // Both ends stay what they are: the region keeps off them.
+    // Both ends are unchanged: the region keeps a distance from them.
     let margin = map.width / 10;
     let starts = margin..changes.len().saturating_sub(region + margin).max(margin + 1);
     let cost = |start: usize| changes.iter().skip(start).take(region).sum::<usize>();
@@ -333,7 +333,7 @@ fn stretched(meshes: &[VisualMesh], pieces: &Pieces, rng: &mut Pcg64Mcg) -> Chan
 fn other_bore(meshes: &[VisualMesh], pieces: &Pieces, rng: &mut Pcg64Mcg) -> Change {
     let radii = meshes.iter().flat_map(|visual| visual.mesh.positions.iter().map(|p| p.x.hypot(p.y)));
     let (radius, outer) = radii.fold((f64::INFINITY, 0.0), |(low, high), r| (f64::min(low, r), f64::max(high, r)));
-    // A wall is left in the middle of the smallest bore.
+    // A wall remains in the middle of the smallest bore.
     let by = (pieces.bounds().diagonal_m() * rng.random_range(MOVES)).min(0.7 * radius);
     Change::Bore { radius, outer, by: -by }
 }

@@ -1,14 +1,14 @@
-//! The features of a part: groups of connected pieces of its meshes that could be elsewhere on it.
+//! The features of a part: groups of connected pieces of its meshes that can be moved.
 //!
 //! ```text
-//! meshes ─> pieces ─> what touches what ─> from the largest piece outwards: each piece with all that stands on it
+//! meshes ─> pieces ─> contacts between pieces ─> from the largest piece outwards: each piece with all pieces on it
 //! ```
 
 use nalgebra::{Point3, Vector3};
 
 use super::shape::VisualMesh;
 
-/// Pieces whose boxes are this near touch, in metres.
+/// Pieces whose boxes are this close touch, in metres.
 const TOUCH_M: f64 = 0.0004;
 
 /// The largest feature, as a share of the part's box diagonal.
@@ -51,7 +51,7 @@ impl Bounds {
         (0..3).all(|k| self.low[k] <= other.high[k] + TOUCH_M && other.low[k] <= self.high[k] + TOUCH_M)
     }
 
-    /// The volume, thin boxes counted as a millimetre thick.
+    /// The volume, with thin boxes counted as a millimetre thick.
     fn volume(&self) -> f64 {
         self.size().map(|side| side.max(0.001)).product()
     }
@@ -63,7 +63,7 @@ pub(super) struct Piece {
     pub(super) bounds: Bounds,
 }
 
-/// Every piece of a part, and which piece each point belongs to.
+/// Every piece of a part, and the piece of each point.
 pub(super) struct Pieces {
     pub(super) pieces: Vec<Piece>,
     /// For each mesh and position the index into `pieces`.
@@ -93,9 +93,9 @@ impl Pieces {
 
     /// Groups of pieces that could be moved together, as sorted indices, each group once.
     ///
-    /// The part's body is the piece with the largest box; from there each piece stands on the largest of its neighbours
-    /// that are one step nearer to the body. A feature is a piece with all that stands on it, and with the small things
-    /// that touch it.
+    /// The part's body is the piece with the largest box; every other piece is attached to the largest of its
+    /// neighbours that are one step closer to the body. A feature is a piece with all pieces attached to it, and with
+    /// the small pieces that touch it.
     pub(super) fn features(&self) -> Vec<Vec<usize>> {
         let count = self.pieces.len();
         let bounds = |idx: usize| &self.pieces[idx].bounds;

@@ -1,4 +1,4 @@
-//! A part written as the folder from which it can be read.
+//! Writes a part as a folder from which it can be read.
 
 use std::fs;
 use std::path::Path;
@@ -9,8 +9,8 @@ use super::{OBJECT_FORMAT, ObjectSpec};
 use crate::error::{Result, SimulationError};
 
 impl ObjectSpec {
-    /// Writes `object.json`, `object.xml` and the meshes and textures into a folder, which is made;
-    /// [`ObjectSpec::from_folder`] reads it.
+    /// Writes `object.json`, `object.xml` and the meshes and textures into a folder, which is
+    /// created; [`ObjectSpec::from_folder`] reads it.
     ///
     /// # Errors
     /// [`SimulationError::File`] for a file that cannot be written.

@@ -1,4 +1,4 @@
-//! A part seen from above without perspective: how high it is at each place, and which piece shows there.
+//! A part seen from above without perspective: its height and its visible piece at each point.
 
 use nalgebra::{Isometry2, Point2, Point3};
 
@@ -11,12 +11,12 @@ pub(crate) struct HeightMap {
     pub(crate) corner: Point2<f64>,
     pub(crate) width: usize,
     pub(crate) height: usize,
-    /// Row by row (along y): height of the highest surface in metres and the number of its piece.
+    /// Row by row (along y): height of the highest surface in metres and the index of its piece.
     pub(crate) cells: Vec<Option<(f64, u32)>>,
 }
 
 impl HeightMap {
-    /// Draws triangles with the number of their piece.
+    /// Draws triangles with the index of their piece.
     pub(crate) fn new(triangles: &[([Point3<f64>; 3], u32)], cell_m: f64) -> Self {
         let mut low = Point2::new(f64::INFINITY, f64::INFINITY);
         let mut high = Point2::new(f64::NEG_INFINITY, f64::NEG_INFINITY);
@@ -38,7 +38,7 @@ impl HeightMap {
     }
 
     fn draw(&mut self, corners: &[Point3<f64>; 3], piece: u32) {
-        // In cells, the middle of cell (0, 0) at (0, 0).
+        // In cells, with the centre of cell (0, 0) at (0, 0).
         let [a, b, c] = corners.map(|p| {
             Point3::new((p.x - self.corner.x) / self.cell_m - 0.5, (p.y - self.corner.y) / self.cell_m - 0.5, p.z)
         });
@@ -68,14 +68,14 @@ impl HeightMap {
         }
     }
 
-    /// Height (m) and number of the piece at a point.
+    /// Height (m) and index of the piece at a point.
     pub(crate) fn at(&self, point: &Point2<f64>) -> Option<(f64, u32)> {
         let cell = (point - self.corner) / self.cell_m;
         let inside = cell.x >= 0.0 && cell.y >= 0.0 && cell.x < self.width as f64 && cell.y < self.height as f64;
         if inside { self.cells[cell.y as usize * self.width + cell.x as usize] } else { None }
     }
 
-    /// The middles of the cells where something shows, with its height and piece.
+    /// The centres of the filled cells, with height and piece.
     pub(crate) fn filled(&self) -> impl Iterator<Item = (Point2<f64>, f64, u32)> + '_ {
         self.cells.iter().enumerate().filter_map(|(idx, cell)| {
             let (z, piece) = (*cell)?;
@@ -84,15 +84,15 @@ impl HeightMap {
         })
     }
 
-    /// Middle of what shows; the origin for an empty map.
+    /// Centre of the filled cells; the origin for an empty map.
     pub(crate) fn centre(&self) -> Point2<f64> {
         let (sum, count) =
             self.filled().fold((nalgebra::Vector2::zeros(), 0), |(sum, count), (at, ..)| (sum + at.coords, count + 1));
         if count == 0 { Point2::origin() } else { Point2::from(sum / f64::from(count)) }
     }
 
-    /// Share of the cells at which this map, moved, and another differ: one shows something where the other does not, or
-    /// their heights are more than `tolerance_m` apart; of all cells where either shows something.
+    /// Share of the cells at which this map, moved, and another differ: one is filled and the other is not, or their
+    /// heights differ by more than `tolerance_m`; relative to all cells filled in either.
     pub(crate) fn difference(&self, other: &Self, other_from_self: &Isometry2<f64>, tolerance_m: f64) -> f64 {
         let (mut both, mut alike, mut own) = (0usize, 0usize, 0usize);
         for (at, z, _) in self.filled() {

@@ -1,4 +1,4 @@
-//! Parts that resemble a part: mirrored, with one feature moved, of another size.
+//! Parts that resemble a part: mirrored, with one feature moved, or of another size.
 //!
 //! ```text
 //! ObjectSpec ─> meshes, marks, collision shapes, inertia changed together ─> ObjectSpec of its own name
@@ -14,12 +14,12 @@ use super::mjcf_tags::{Tag, map_tags};
 use super::obj_mesh::ObjMesh;
 use crate::error::Result;
 
-/// In what a look-alike differs from the part.
+/// The difference between a look-alike and the part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum LookAlikeKind {
     /// The mirror image in a vertical plane.
     Mirrored,
-    /// One feature stands elsewhere.
+    /// One feature is elsewhere.
     FeatureMoved,
     /// The whole part in another size.
     Scaled {
@@ -53,9 +53,9 @@ impl fmt::Display for LookAlikeKind {
 /// A part that resembles another one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LookAlike {
-    /// How it differs from the part.
+    /// Its difference from the part.
     pub kind: LookAlikeKind,
-    /// The part itself, to be placed like any other.
+    /// The part itself, placed like any other.
     pub spec: ObjectSpec,
     /// The difference in words.
     pub description: String,
@@ -63,14 +63,15 @@ pub struct LookAlike {
 
 /// Side of a cell of the views from above, in metres.
 const CELL_M: f64 = 0.001;
-/// Heights that differ by less look the same from above, in metres.
+/// Smaller height differences are not visible from above, in metres.
 const SAME_HEIGHT_M: f64 = 0.001;
-/// Least difference of a part to its mirror image at the turn where they are most alike. Of the shipped parts, the pliers
-/// (1.3 %) and the housing (2.0 %) stay below it, the key (3.4 %: its cuts) and all others that differ (20 % and more) above.
+/// Minimum difference of a part from its mirror image at the turn of greatest similarity. Of the shipped parts, the
+/// pliers (1.3 %) and the housing (2.0 %) are below it, the key (3.4 %: its cuts) and all others that differ (20 % and
+/// more) above.
 const MIN_MIRROR_DIFFERENCE: f64 = 0.03;
 
 impl ObjectSpec {
-    /// The kinds of look-alikes that this part has: all, but for the mirror image where it equals the part.
+    /// The kinds of look-alikes of this part: all, except the mirror image if it equals the part.
     ///
     /// # Errors
     /// As [`ObjectSpec::look_alike`].
@@ -79,7 +80,7 @@ impl ObjectSpec {
         Ok(LookAlikeKind::ALL.into_iter().filter(|kind| *kind != LookAlikeKind::Mirrored || is_chiral).collect())
     }
 
-    /// A look-alike of this part; `seed` picks the feature that is moved, and how far.
+    /// A look-alike of this part; `seed` determines the moved feature, and its movement.
     ///
     /// # Errors
     /// [`crate::SimulationError::File`] for a part whose shapes are not given as OBJ meshes.
@@ -94,8 +95,8 @@ impl ObjectSpec {
         Ok(LookAlike { kind, spec, description })
     }
 
-    /// Share of what is seen from above that differs between the part and its mirror image, at the turn where they are
-    /// most alike.
+    /// Share of the visible cells from above that differ between the part and its mirror image, at the turn of
+    /// greatest similarity.
     ///
     /// # Errors
     /// As [`ObjectSpec::look_alike`].
@@ -140,7 +141,7 @@ impl ObjectSpec {
             };
             tag.map_numbers("pos", negate(&[1]));
             tag.map_numbers("fromto", negate(&[1, 4]));
-            // A turn is mirrored by turning the other way about x and z.
+            // A turn is mirrored by reversing the rotation about x and z.
             tag.map_numbers("quat", negate(&[1, 3]));
             tag.map_numbers("euler", negate(&[0, 2]));
             tag.map_numbers("axisangle", negate(&[0, 2]));
@@ -194,7 +195,7 @@ impl ObjectSpec {
         }
     }
 
-    /// Replaces the meshes that are seen; the map is given the number of the geom.
+    /// Replaces the visible meshes; the map gets the index of the geom.
     pub(super) fn map_meshes(&mut self, map: impl Fn(usize, ObjMesh) -> ObjMesh) -> Result<()> {
         let meshes = self.visual_meshes()?;
         for (idx, visual) in meshes.into_iter().enumerate() {
@@ -207,12 +208,12 @@ impl ObjectSpec {
     }
 }
 
-/// A nanometre or a microgram: numbers then have few digits, and are read as they were written.
+/// A nanometre or a microgram: numbers then have few digits, and are read back unchanged.
 pub(super) fn rounded(value: f64) -> f64 {
     (value * 1e9).round() / 1e9
 }
 
-/// Whether a tag says where or how heavy something of the part is.
+/// Whether a tag contains a position or a mass of the part.
 fn has_shape(tag: &Tag) -> bool {
     matches!(tag.name.as_str(), "geom" | "inertial" | "site")
 }

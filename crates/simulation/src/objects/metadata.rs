@@ -1,4 +1,4 @@
-//! `object.json`: its content, and the checks that its types leave open.
+//! `object.json`: its content, and the checks beyond its types.
 
 use nalgebra::Point3;
 use sdg_geometry::RotationalSymmetry;
@@ -11,7 +11,7 @@ pub const OBJECT_FORMAT: u32 = 1;
 /// The widest part that the Panda's hand can take, in metres.
 pub const LARGEST_JAW_WIDTH_M: f64 = HAND_OPENING_MAX_M;
 
-/// `object.json` as it is written.
+/// The content of `object.json`.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Metadata {
@@ -26,7 +26,7 @@ pub(super) struct Metadata {
     pub(super) jaw_width_m: f64,
     pub(super) grasp_height_m: f64,
     pub(super) mark_height_m: f64,
-    /// As `mark_height_m` where it is missing.
+    /// Equal to `mark_height_m` if it is missing.
     pub(super) seen_height_m: Option<f64>,
     pub(super) rest_height_m: f64,
     pub(super) symmetry: RotationalSymmetry,
@@ -35,7 +35,7 @@ pub(super) struct Metadata {
 }
 
 impl Metadata {
-    /// Checks what the types leave open; the error names the field, what was expected and what was found.
+    /// Checks beyond the types; the error names the field, the expected and the found value.
     pub(super) fn check(&self) -> std::result::Result<(), String> {
         if self.format != OBJECT_FORMAT {
             return Err(format!("format: expected {OBJECT_FORMAT}, found {}", self.format));
@@ -63,7 +63,7 @@ impl Metadata {
             return Err(format!("footprint: expected three or more finite points, found {:?}", self.footprint));
         }
         match self.symmetry {
-            // A fold of zero or one says nothing.
+            // A fold of zero or one has no meaning.
             RotationalSymmetry::Fold(count @ 0..=1) => Err(format!("symmetry: expected fold 2 or more, found {count}")),
             _ => Ok(()),
         }

@@ -33,7 +33,7 @@ impl Tag {
         self.attributes.iter().find(|(known, _)| known == key).map(|(_, value)| value.as_str())
     }
 
-    /// The numbers of an attribute; `None` where it is absent or has something else.
+    /// The numbers of an attribute; `None` if it is absent or contains something else.
     pub(super) fn numbers(&self, key: &str) -> Option<Vec<f64>> {
         self.get(key)?.split_ascii_whitespace().map(|word| word.parse().ok()).collect()
     }
@@ -56,7 +56,7 @@ impl Tag {
     }
 }
 
-/// All tags of a text in their order, without comments and closing tags.
+/// All tags of a text in order, without comments and closing tags.
 pub(super) fn tags(mjcf: &str) -> Vec<Tag> {
     let mut found = Vec::new();
     map_tags(mjcf, |tag| {
@@ -66,7 +66,7 @@ pub(super) fn tags(mjcf: &str) -> Vec<Tag> {
     found
 }
 
-/// The text with its tags changed; a tag for which `change` returns false stays as it was written.
+/// The text with its tags changed; a tag for which `change` returns false is not changed.
 pub(super) fn map_tags(mjcf: &str, mut change: impl FnMut(&mut Tag) -> bool) -> String {
     let mut text = String::with_capacity(mjcf.len());
     let mut rest = mjcf;

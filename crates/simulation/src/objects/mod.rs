@@ -1,4 +1,4 @@
-//! The parts that are grasped: what they weigh, where they are marked and held, and their MJCF.
+//! The grasped parts: their masses, marks and grasps, and their MJCF.
 //!
 //! A part is a folder with `object.json` (numbers and marks, see [`ObjectSpec`]), `object.xml` (MJCF with one body
 //! named `object` and its free joint `object_joint`) and the meshes and textures that the MJCF names. The parts of
@@ -6,7 +6,7 @@
 //!
 //! The **object frame** has z up as the part rests on the table. The **marks** `grasp_start` and `grasp_end` lie
 //! along the part's axis where the gripper holds it: the jaws close across the line between them, and the tool
-//! centre point goes to their mean in x and y, at `grasp_height_m` above the table.
+//! centre point moves to their mean in x and y, at `grasp_height_m` above the table.
 
 mod embedded;
 mod extruded;
@@ -41,7 +41,7 @@ pub(crate) use height_map::HeightMap;
 pub use look_alike::{LookAlike, LookAlikeKind};
 pub use sdg_geometry::RotationalSymmetry;
 
-/// The body tag that every `object.xml` has once; the part's pose is written into it.
+/// The body tag that occurs once in every `object.xml`; the part's pose is written into it.
 const BODY_TAG: &str = "<body name=\"object\">";
 
 /// One part: its numbers in metres and kilograms, its marks in the object frame, its MJCF.
@@ -51,7 +51,7 @@ pub struct ObjectSpec {
     pub name: String,
     /// Name for people, such as "Fuel line".
     pub title: String,
-    /// What the part is.
+    /// Description of the part.
     pub description: String,
     /// Mass in kilograms.
     pub mass_kg: f64,
@@ -65,16 +65,16 @@ pub struct ObjectSpec {
     pub jaw_width_m: f64,
     /// Height of the tool centre point over the table when the part is held.
     pub grasp_height_m: f64,
-    /// Height of the marks over the table: the plane on which marks in a picture are to be placed.
+    /// Height of the marks over the table: the plane of the marks in a picture.
     ///
-    /// For a round bar this is the height of its axis, since its outline in a picture stays centred on the axis
-    /// from wherever above it is seen.
+    /// For a round bar this is the height of its axis, because its outline in a picture stays centred on the
+    /// axis for any camera position above it.
     pub mark_height_m: f64,
-    /// Height over the table of the surface that a picture shows at the marks; above `mark_height_m` for a round bar.
+    /// Height over the table of the visible surface at the marks; above `mark_height_m` for a round bar.
     pub seen_height_m: f64,
-    /// Height of the object frame's origin over the table as the part rests.
+    /// Height of the object frame's origin over the table for the part at rest.
     pub rest_height_m: f64,
-    /// Which turns about z leave look and grasp of the part the same.
+    /// The turns about z that change neither the appearance nor the grasp of the part.
     pub symmetry: RotationalSymmetry,
     /// The convex hull of the part from above, counter-clockwise, in the object frame.
     pub footprint: Vec<Point2<f64>>,
@@ -82,7 +82,7 @@ pub struct ObjectSpec {
     files: Vec<Asset>,
 }
 
-/// How far a grasp lies beside the true one, seen from above.
+/// Offset of a grasp from the true one, seen from above.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GraspError {
     /// Distance of the tool centre points in x and y, in metres.
@@ -92,7 +92,7 @@ pub struct GraspError {
 }
 
 impl ObjectSpec {
-    /// The names of the parts that are compiled in: the paper's, then the held-out ones.
+    /// The names of the compiled-in parts: the paper's, then the held-out ones.
     pub fn names() -> impl Iterator<Item = &'static str> {
         EMBEDDED.iter().map(|(name, _)| *name)
     }
@@ -102,13 +102,13 @@ impl ObjectSpec {
         Self::names().take(NUM_PAPER_PARTS)
     }
 
-    /// The names of four parts of another kind: no constant may be fitted on them, and results on them are reported
-    /// apart from those on the paper's parts.
+    /// The names of four parts of another kind: no constant may be fitted on them, and their results are reported
+    /// separately from those of the paper's parts.
     pub fn held_out_names() -> impl Iterator<Item = &'static str> {
         Self::names().skip(NUM_PAPER_PARTS)
     }
 
-    /// One of the parts that are compiled in.
+    /// One of the compiled-in parts.
     ///
     /// # Errors
     /// [`SimulationError::UnknownName`] with the names that exist.
@@ -129,10 +129,10 @@ impl ObjectSpec {
         })
     }
 
-    /// A part of one's own, from its folder.
+    /// A user's own part, from its folder.
     ///
     /// # Errors
-    /// [`SimulationError::File`] when a file is missing, cannot be read or does not say what it must.
+    /// [`SimulationError::File`] if a file is missing, cannot be read or lacks required content.
     pub fn from_folder(folder: &Path) -> Result<Self> {
         Self::read(folder, |file| std::fs::read(folder.join(file)).map(Cow::Owned).map_err(|error| error.to_string()))
     }
@@ -179,7 +179,7 @@ impl ObjectSpec {
         })
     }
 
-    /// The pose in which the part rests on the table (z = 0) with its origin over (x, y) and turned by `yaw_rad`.
+    /// The pose of the part at rest on the table (z = 0) with its origin over (x, y), turned by `yaw_rad`.
     pub fn base_from_object(&self, x: f64, y: f64, yaw_rad: f64) -> Isometry3<f64> {
         Isometry3::from_parts(
             Translation3::new(x, y, self.rest_height_m),
@@ -192,8 +192,8 @@ impl ObjectSpec {
         [base_from_object * self.grasp_start, base_from_object * self.grasp_end]
     }
 
-    /// Where the tool centre point goes for a part at rest, and the direction of the marked line in the base frame
-    /// (radians about z from x); the jaws close across that direction.
+    /// The tool centre point for a part at rest, and the direction of the marked line in the base frame (radians
+    /// about z from x); the jaws close across that direction.
     pub fn grasp_in_base(&self, base_from_object: &Isometry3<f64>) -> (Point3<f64>, f64) {
         let [start, end] = self.marks_in_base(base_from_object);
         let middle = nalgebra::center(&start, &end);
@@ -201,7 +201,7 @@ impl ObjectSpec {
         (Point3::new(middle.x, middle.y, self.grasp_height_m), along.y.atan2(along.x))
     }
 
-    /// How far a grasp lies beside the marked one, for a part at rest; turns that the part's symmetry hides do not count.
+    /// Offset of a grasp from the marked one, for a part at rest, up to the part's symmetry.
     ///
     /// `base_from_tcp` has its x along the line across which the jaws close.
     pub fn grasp_error(&self, base_from_object: &Isometry3<f64>, base_from_tcp: &Isometry3<f64>) -> GraspError {
@@ -220,8 +220,8 @@ impl ObjectSpec {
         MjcfFragment { sections: self.mjcf.replace(BODY_TAG, &placed), files: self.files.clone() }
     }
 
-    /// One more body of the part, `instance_{index}`, in a scene that has [`ObjectSpec::fragment`] already: it shares that
-    /// one's meshes and materials.
+    /// One more body of the part, `instance_{index}`, in a scene that already contains [`ObjectSpec::fragment`]: it
+    /// shares the meshes and materials.
     pub(crate) fn instance_fragment(&self, index: usize, base_from_object: &Isometry3<f64>) -> MjcfFragment {
         const OPEN: &str = "<worldbody>";
         const CLOSE: &str = "</worldbody>";
@@ -238,7 +238,7 @@ impl ObjectSpec {
     }
 }
 
-/// What stands inside the `<mujoco>` element.
+/// The content of the `<mujoco>` element.
 fn sections_of(text: &str) -> std::result::Result<&str, String> {
     let inside = text
         .find("<mujoco")
@@ -306,7 +306,7 @@ mod tests {
         assert!(start.y < end.y && (start.z - spec.mark_height_m).abs() < 1e-12);
     }
 
-    /// How far a part reaches from its grasp in a direction of the object frame.
+    /// Extent of a part from its grasp in a direction of the object frame.
     fn reach_m(spec: &ObjectSpec, direction: f64) -> f64 {
         let (sin, cos) = direction.sin_cos();
         spec.footprint.iter().map(|p| p.x * cos + p.y * sin).fold(f64::NEG_INFINITY, f64::max)
@@ -316,14 +316,14 @@ mod tests {
     fn outlines_are_as_symmetric_as_declared() {
         for name in ObjectSpec::names() {
             let spec = ObjectSpec::by_name(name).unwrap();
-            // The widest difference that a turn makes to the outline.
+            // Largest change of the outline by a turn.
             let change_m = |turn: f64| {
                 (0..180)
                     .map(|degrees| f64::from(2 * degrees).to_radians())
                     .map(|angle| (reach_m(&spec, angle) - reach_m(&spec, angle + turn)).abs())
                     .fold(0.0, f64::max)
             };
-            // These turns stand for all others.
+            // These turns represent all others.
             for turn in [2.0, 3.0, 4.0].map(|parts| std::f64::consts::TAU / parts) {
                 let hidden = spec.symmetry.distance(Angle::from_radians(turn), Angle::ZERO) < 1e-9;
                 let change_m = change_m(turn);

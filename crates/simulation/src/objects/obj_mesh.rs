@@ -1,4 +1,4 @@
-//! Triangle meshes of a part as its OBJ files hold them: read, moved, written again.
+//! Triangle meshes of a part as in its OBJ files: read, moved, written again.
 
 use std::fmt::Write as _;
 
@@ -19,14 +19,14 @@ pub(crate) struct ObjMesh {
     pub(crate) positions: Vec<Point3<f64>>,
     texcoords: Vec<Point2<f64>>,
     normals: Vec<Vector3<f64>>,
-    /// Three corners a face, counter-clockwise seen from outside.
+    /// Three corners per face, counter-clockwise seen from outside.
     pub(crate) faces: Vec<[ObjCorner; 3]>,
 }
 
 impl ObjMesh {
-    /// Reads OBJ text of triangles: `v`, `vt`, `vn` and `f`; other lines are left out.
+    /// Reads OBJ text of triangles: `v`, `vt`, `vn` and `f`; other lines are ignored.
     ///
-    /// The error says which line could not be read.
+    /// The error names the unreadable line.
     pub(crate) fn parse(text: &str) -> Result<Self, String> {
         let mut mesh = Self { positions: Vec::new(), texcoords: Vec::new(), normals: Vec::new(), faces: Vec::new() };
         for (number, line) in text.lines().enumerate() {
@@ -57,7 +57,7 @@ impl ObjMesh {
         Ok(mesh)
     }
 
-    /// One corner of a face line; `None` where an index is not one of the lists'.
+    /// One corner of a face line; `None` if an index is outside the lists.
     fn corner(&self, word: &str) -> Option<ObjCorner> {
         let index = |text: &str, count: usize| -> Option<u32> {
             let number: usize = text.parse().ok()?;
@@ -75,7 +75,7 @@ impl ObjMesh {
     /// Writes the mesh as OBJ text.
     pub(crate) fn to_obj(&self) -> String {
         let mut text = String::new();
-        // Micrometres: coordinates that were scaled do not carry digits that mean nothing.
+        // Micrometres, so that scaled coordinates have no meaningless digits.
         let rounded = |value: f64| (value * 1e6).round() / 1e6 + 0.0;
         for p in &self.positions {
             let _ = writeln!(text, "v {} {} {}", rounded(p.x), rounded(p.y), rounded(p.z));
@@ -122,7 +122,7 @@ impl ObjMesh {
         self
     }
 
-    /// Moves every point; normals stay, so that the shading is right where the map turns little.
+    /// Moves every point; normals are kept, so that the shading is right if the map rotates little.
     pub(crate) fn mapped(mut self, map: impl Fn(usize, Point3<f64>) -> Point3<f64>) -> Self {
         for (idx, position) in self.positions.iter_mut().enumerate() {
             *position = map(idx, *position);
@@ -135,9 +135,9 @@ impl ObjMesh {
         face.map(|corner| self.positions[corner.position as usize])
     }
 
-    /// For each position, the number of the connected piece that it belongs to, from zero on, and how many there are.
+    /// For each position, the index of its connected piece, from zero, and the number of pieces.
     ///
-    /// Positions at the same place belong together, so that a seam of the texture divides nothing.
+    /// Positions at the same point belong together, so that a seam of the texture divides nothing.
     pub(crate) fn pieces(&self) -> (Vec<usize>, usize) {
         let mut parent: Vec<usize> = (0..self.positions.len()).collect();
         let mut first_at = std::collections::HashMap::new();
@@ -173,7 +173,7 @@ fn root(parent: &mut [usize], mut idx: usize) -> usize {
 
 fn join(parent: &mut [usize], a: usize, b: usize) {
     let (a, b) = (root(parent, a), root(parent, b));
-    // The smaller number leads, so that the order of the faces does not matter.
+    // The smaller index is the representative, so that the order of the faces does not matter.
     parent[a.max(b)] = a.min(b);
 }
 

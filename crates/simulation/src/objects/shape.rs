@@ -1,4 +1,4 @@
-//! The shape of a part as its MJCF and meshes give it.
+//! The shape of a part from its MJCF and meshes.
 
 use nalgebra::Point3;
 
@@ -8,7 +8,7 @@ use super::mjcf_tags::tags;
 use super::obj_mesh::ObjMesh;
 use crate::error::{Result, SimulationError};
 
-/// A mesh of a part that is seen.
+/// A visible mesh of a part.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct VisualMesh {
     /// Name of its file.
@@ -17,11 +17,11 @@ pub(super) struct VisualMesh {
 }
 
 impl ObjectSpec {
-    /// The meshes that are seen, in the object frame and in the order of the MJCF's geoms.
+    /// The visible meshes, in the object frame and in the order of the MJCF's geoms.
     ///
     /// # Errors
-    /// [`SimulationError::File`] for a part without meshes, for meshes that are no OBJ triangles, and for geoms that turn
-    /// or scale their mesh.
+    /// [`SimulationError::File`] for a part without meshes, for meshes that are not OBJ triangles, and for geoms that
+    /// rotate or scale their mesh.
     pub(super) fn visual_meshes(&self) -> Result<Vec<VisualMesh>> {
         let fail = |reason: String| SimulationError::File { path: format!("{}/object.xml", self.name).into(), reason };
         let tags = tags(&self.mjcf);
@@ -50,13 +50,13 @@ impl ObjectSpec {
     /// The part from above, in the object frame.
     ///
     /// # Errors
-    /// As `visual_meshes`.
+    /// As for `visual_meshes`.
     pub(crate) fn height_map(&self, cell_m: f64) -> Result<HeightMap> {
         Ok(HeightMap::new(&triangles(&self.visual_meshes()?), cell_m))
     }
 }
 
-/// All triangles, each with the number of its mesh.
+/// All triangles, each with the index of its mesh.
 pub(super) fn triangles(meshes: &[VisualMesh]) -> Vec<([Point3<f64>; 3], u32)> {
     meshes
         .iter()

@@ -1,4 +1,4 @@
-//! Other parts that lie about: their place on the table and their MJCF.
+//! Distractors: their position on the table and their MJCF.
 
 use nalgebra::{Isometry2, Isometry3, Point2, Point3, Translation3, UnitQuaternion, Vector3};
 use sdg_geometry::convex_hull;
@@ -11,9 +11,9 @@ use crate::shapes::footprint::placed;
 /// A distractor of one size and finish at one place.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Distractor {
-    /// What it is.
+    /// Its kind.
     pub kind: DistractorKind,
-    /// Where its frame stands in the base frame; it rests on the table.
+    /// The pose of its frame in the base frame; it rests on the table.
     pub base_from_distractor: Isometry3<f64>,
     /// Its convex outline from above, in the base frame, counter-clockwise.
     pub footprint: Vec<Point2<f64>>,
@@ -22,7 +22,7 @@ pub struct Distractor {
 }
 
 impl Distractor {
-    /// Makes a distractor; `seed` fixes its size and finish.
+    /// Makes a distractor; `seed` determines its size and finish.
     pub fn new(kind: DistractorKind, table_from_distractor: &Isometry2<f64>, seed: u64) -> Self {
         Self::scaled(kind, table_from_distractor, seed, 1.0)
     }

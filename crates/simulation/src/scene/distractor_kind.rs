@@ -1,4 +1,4 @@
-//! Which distractors there are.
+//! The kinds of distractors.
 
 /// Common workshop parts, some of which resemble shipped parts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

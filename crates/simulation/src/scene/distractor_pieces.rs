@@ -1,4 +1,4 @@
-//! Shapes and materials of distractors: the pieces that each kind consists of, its size and finish drawn from a seed.
+//! Shapes and materials of distractors: the pieces of each kind, with size and finish drawn from a seed.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -14,7 +14,7 @@ use crate::shapes::solids::{
 };
 use crate::shapes::texture::{Color, Texture};
 
-/// What a piece of a distractor is made of.
+/// The material of a piece of a distractor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Finish {
     color: Color,
@@ -151,7 +151,7 @@ fn pieces(kind: DistractorKind, seed: u64) -> Vec<Piece> {
         DistractorKind::Plate => {
             let (length, width) = (rng.random_range(0.04..0.10), rng.random_range(0.025..0.05));
             let hole: f64 = rng.random_range(0.002..0.005);
-            // A narrow plate's holes keep apart from each other.
+            // A narrow plate's holes keep a distance from each other.
             let (x, y) = (length / 2.0 - 0.009, (hole + 0.0015).max(width / 2.0 - 0.009));
             let mut holes: Vec<_> = [(x, y), (-x, y), (-x, -y), (x, -y)]
                 .iter()
@@ -291,7 +291,7 @@ fn pieces(kind: DistractorKind, seed: u64) -> Vec<Piece> {
     }
 }
 
-/// A round bar along a path, in metal with the bands that a round bar shows.
+/// A round bar along a path, in metal with the bands of a round bar.
 fn bar(path: &[Point3<f64>], radius: f64, finish: Finish, rng: &mut Pcg64Mcg) -> Vec<Piece> {
     let look = if rng.random_bool(0.8) { Look::RoundBar } else { finish.look };
     vec![Piece { mesh: sweep(path, radius, 18), finish: Finish { look, ..finish } }]
@@ -320,7 +320,7 @@ mod tests {
     #[test]
     fn no_edge_is_walked_twice_in_one_direction() {
         for kind in DistractorKind::ALL {
-            // The last ones make tubes with a corner that hardly turns, and a narrow plate with large holes.
+            // The last ones make tubes with nearly straight corners, and a narrow plate with large holes.
             for seed in (0..12).chain([453, 1383, 1453, 6896900381503141468]) {
                 for piece in pieces(kind, seed) {
                     let obj = piece.mesh.to_obj();

@@ -1,4 +1,4 @@
-//! How the workcell is lit.
+//! The lighting of the workcell.
 
 use nalgebra::{Point3, Vector3};
 use rand::Rng;
@@ -7,17 +7,17 @@ use rand_pcg::Pcg64Mcg;
 use crate::fragment::MjcfFragment;
 use crate::shapes::texture::Color;
 
-/// The middle of the table's part that the camera sees, which lamps are aimed at (metres, base frame).
+/// The centre of the table area that the camera sees, at which lamps are aimed (metres, base frame).
 const AIM: Point3<f64> = Point3::new(0.5, 0.0, 0.0);
 
-/// Radius around the aim within which shadows are drawn, in metres: what the wrist camera sees, and little more.
+/// Radius around the aim within which shadows are drawn, in metres: slightly more than the wrist camera's view.
 const SHADOW_RADIUS_M: f64 = 0.5;
 
-/// Part of a lamp's cone that its shadow map covers. The map has as many texels however much it covers: a wide lamp
-/// with a narrow map lights evenly and still draws shadows of a millimetre's sharpness.
+/// Share of a lamp's cone that its shadow map covers. The map has the same number of texels for any area: a wide
+/// lamp with a narrow map lights evenly and still draws shadows with a sharpness of a millimetre.
 const SHADOW_PART_OF_CONE: f64 = 0.35;
 
-/// The cone, as half of its angle in degrees, with which a lamp's shadows reach [`SHADOW_RADIUS_M`].
+/// The half angle of the cone, in degrees, for which a lamp's shadows reach [`SHADOW_RADIUS_M`].
 fn cutoff_deg(distance_m: f64) -> f64 {
     ((SHADOW_RADIUS_M / distance_m).atan().to_degrees() / SHADOW_PART_OF_CONE).min(75.0)
 }
@@ -25,13 +25,13 @@ fn cutoff_deg(distance_m: f64) -> f64 {
 /// A lamp above the table.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lamp {
-    /// Where it hangs, in metres in the base frame.
+    /// Its position, in metres in the base frame.
     pub position: Point3<f64>,
-    /// Where it points.
+    /// Its direction.
     pub target: Point3<f64>,
     /// Its colour times its strength, each channel from 0 to 1.
     pub diffuse: Color,
-    /// Strength of the highlights that it makes.
+    /// Strength of its highlights.
     pub specular: f64,
     /// Half of its cone's angle in degrees.
     pub cutoff_deg: f64,
@@ -42,16 +42,16 @@ pub struct Lamp {
 /// All light of a scene.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Lighting {
-    /// Light from everywhere.
+    /// Ambient light.
     pub ambient: Color,
     /// Light from the camera's own direction: the diffuse light of a bright hall.
     pub from_camera: Color,
-    /// Each aimed at a place of the table.
+    /// Each aimed at a point of the table.
     pub lamps: Vec<Lamp>,
 }
 
 impl Lighting {
-    /// The even light under which parts are shown to the system.
+    /// The even light of demonstrations.
     pub fn nominal() -> Self {
         let lamp = |x: f64, y: f64, strength: f64, casts_shadows: bool| {
             let position = Point3::new(x, y, 1.5);
@@ -71,14 +71,14 @@ impl Lighting {
         }
     }
 
-    /// One to three lamps anywhere above, of warm to cold white, strong or weak, and more or less light from around.
+    /// One to three lamps anywhere above, of warm to cold white, strong or weak, and a varying amount of ambient light.
     pub fn sample(rng: &mut Pcg64Mcg) -> Self {
         let tint = |rng: &mut Pcg64Mcg| {
             let warmth = rng.random_range(-1.0..1.0);
             [1.0 + 0.08 * warmth, 1.0, 1.0 - 0.10 * warmth]
         };
         let scaled = |color: Color, strength: f64| color.map(|channel| (channel * strength).clamp(0.0, 1.0));
-        // The light of lamps and surroundings together stays within what a camera's exposure would take in.
+        // The total light of lamps and surroundings stays within a camera's exposure range.
         let total = rng.random_range(0.62..1.10);
         let surrounding = rng.random_range(0.32..0.62);
         let num_lamps = rng.random_range(1..=3);
@@ -101,7 +101,7 @@ impl Lighting {
                     diffuse: scaled(tint(rng), total * (1.0 - surrounding) * share / sum / elevation.sin()),
                     specular: rng.random_range(0.2..0.9) * share,
                     cutoff_deg: cutoff_deg(distance),
-                    // Two shadows at most: a third cannot be told from them and costs another pass.
+                    // At most two shadows: a third cannot be distinguished from them and costs another pass.
                     casts_shadows: idx < 2,
                 }
             })

@@ -1,12 +1,12 @@
-//! What stands on the table and how it is lit, varied by seed.
+//! The objects on the table and their lighting, varied by seed.
 //!
 //! ```text
 //! seed ─> SceneVariation { object at a pose, Lighting, Table, distractors } ─> MjcfFragment ─> Workcell
 //!              shapes: solids ─> mesh            surfaces: texture
 //! ```
 //!
-//! The table's top is the plane z = 0 of the robot's base frame. Each aspect of a scene draws from a stream of its
-//! own: another number of distractors leaves the lamps as they were. The same seed gives the same scene to the bit.
+//! The table's top is the plane z = 0 of the robot's base frame. Each aspect of a scene has its own random stream:
+//! another number of distractors does not change the lamps. The same seed gives the same scene, bit for bit.
 
 mod distractor;
 mod distractor_kind;
@@ -31,18 +31,18 @@ pub use light::{Lamp, Lighting};
 pub use seen_part::SeenPart;
 pub use table::{Table, TableSurface};
 
-/// Within what a scene is varied.
+/// The ranges of a scene's variation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VariationConfig {
-    /// Where the object's grasp may lie, along the base's x, in metres.
+    /// Range of the object's grasp along the base's x, in metres.
     pub object_x_m: Range<f64>,
-    /// Where the object's grasp may lie, along the base's y, in metres.
+    /// Range of the object's grasp along the base's y, in metres.
     pub object_y_m: Range<f64>,
-    /// How many distractors there are.
+    /// Number of distractors.
     pub distractors: RangeInclusive<usize>,
-    /// Least distance between any two things on the table, in metres.
+    /// Minimum distance between any two objects on the table, in metres.
     pub clearance_m: f64,
-    /// Whether lamps, table and their colours change too, or stay nominal.
+    /// Whether lamps, table and their colours vary, too, or stay nominal.
     pub appearance: bool,
 }
 
@@ -58,16 +58,16 @@ impl Default for VariationConfig {
     }
 }
 
-/// The object at its place.
+/// The object with its pose.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlacedObject {
-    /// Which part.
+    /// The part.
     pub spec: ObjectSpec,
-    /// Where it rests, in the robot's base frame.
+    /// Its pose at rest, in the robot's base frame.
     pub base_from_object: Isometry3<f64>,
 }
 
-/// All that can change about a scene, apart from the robot.
+/// Everything in a scene that can vary, apart from the robot.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SceneVariation {
     /// The part to grasp; `None` for a table without it.
@@ -93,7 +93,7 @@ enum Stream {
 
 impl Stream {
     fn rng(self, seed: u64) -> Pcg64Mcg {
-        // SplitMix64's finaliser: neighbouring seeds and streams end up with nothing in common.
+        // SplitMix64's finaliser: neighbouring seeds and streams become unrelated.
         let mut mixed = seed.wrapping_add((self as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15));
         mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
         mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
@@ -102,7 +102,7 @@ impl Stream {
 }
 
 impl SceneVariation {
-    /// The scene in which parts are shown to the system: even light, light table, nothing else.
+    /// The scene of demonstrations: even light, light table, nothing else.
     pub fn nominal(object: Option<(&ObjectSpec, Isometry3<f64>)>) -> Self {
         Self {
             object: object.map(|(spec, base_from_object)| PlacedObject { spec: spec.clone(), base_from_object }),
@@ -113,7 +113,7 @@ impl SceneVariation {
         }
     }
 
-    /// A scene of its seed: the object, if given, at any place and turn; light, table and distractors at random.
+    /// The scene of a seed: the object, if given, at any place and turn; light, table and distractors at random.
     pub fn sample(object: Option<&ObjectSpec>, config: &VariationConfig, seed: u64) -> Self {
         let rng = &mut Stream::Object.rng(seed);
         let object = object.map(|spec| {
@@ -132,7 +132,7 @@ impl SceneVariation {
         Self { object, instances: Vec::new(), lighting, table, distractors }
     }
 
-    /// The scene as MJCF sections and the files that they name.
+    /// The scene as MJCF sections and their files.
     pub fn fragment(&self) -> MjcfFragment {
         let mut fragment = self.lighting.fragment();
         fragment.append(self.table.fragment());
@@ -155,7 +155,7 @@ impl PlacedObject {
         footprint::placed(&self.spec.footprint, &self.table_from_object())
     }
 
-    /// What the open gripper covers when it comes down on the marks.
+    /// The area of the open gripper when it comes down on the marks.
     pub fn gripper_footprint(&self) -> Vec<Point2<f64>> {
         let (centre, direction) = self.spec.grasp_in_base(&self.base_from_object);
         let table_from_gripper = Isometry2::new(centre.xy().coords, direction);
@@ -169,19 +169,19 @@ impl PlacedObject {
     }
 }
 
-/// Room for two fingers opened to 0.08 m and their thickness: x along the marks, y along which the jaws close.
+/// Room for two fingers opened to 0.08 m and their thickness: x along the marks, y along the jaws' motion.
 const GRIPPER_FOOTPRINT: [[f64; 2]; 4] = [[-0.016, -0.062], [0.016, -0.062], [0.016, 0.062], [-0.016, 0.062]];
 
-/// Attempts to find a free place for one distractor before the table counts as full.
+/// Number of attempts to find a free place for one distractor before the table counts as full.
 const PLACEMENT_TRIES: usize = 40;
 
-/// How far distractors spread beyond where the object may lie, in metres.
+/// Distance of distractors beyond the object's range, in metres.
 const DISTRACTOR_MARGIN_M: f64 = 0.05;
 
-/// At most `count` distractors of a seed whose middles lie between bounds in the base frame, in metres.
+/// At most `count` distractors of a seed with centres between bounds in the base frame, in metres.
 pub(crate) fn sample_distractors_between(x_m: Range<f64>, y_m: Range<f64>, count: usize, seed: u64) -> Vec<Distractor> {
     let within = |range: Range<f64>| range.start + DISTRACTOR_MARGIN_M..range.end - DISTRACTOR_MARGIN_M;
-    // A strip narrower than the margins keeps its middle.
+    // A strip narrower than the margins keeps its centre line.
     let ordered = |range: Range<f64>| if range.start < range.end { range } else { range.end..range.start + 1e-6 };
     let config = VariationConfig {
         object_x_m: within(x_m),
@@ -194,7 +194,7 @@ pub(crate) fn sample_distractors_between(x_m: Range<f64>, y_m: Range<f64>, count
     sample_distractors(Vec::new(), &config, &mut Stream::Distractors.rng(seed))
 }
 
-/// Distractors at random places that keep apart from each other and from what is `taken`.
+/// Distractors at random places that keep a distance from each other and from the areas in `taken`.
 pub(crate) fn sample_distractors(
     mut taken: Vec<Vec<Point2<f64>>>,
     config: &VariationConfig,

@@ -1,13 +1,13 @@
-//! A part of which a camera has seen the outline: drawn in plans, touched by nothing.
+//! A part whose outline a camera has seen: drawn in plans, without collisions.
 
 use nalgebra::{Isometry3, Point2};
 
 use crate::fragment::MjcfFragment;
 use crate::shapes::solids::extrude;
 
-/// Thinner than this, m, it would not show.
+/// Minimum visible thickness, m.
 const MIN_HEIGHT_M: f64 = 2e-3;
-/// Outlines of a smaller area, m², are drawn as nothing.
+/// Outlines of a smaller area, m², are not drawn.
 const MIN_AREA_M2: f64 = 1e-6;
 
 /// A part as a camera has seen it.
@@ -15,12 +15,12 @@ const MIN_AREA_M2: f64 = 1e-6;
 pub struct SeenPart {
     /// Its outline in the robot's base frame, m, in either direction of turn.
     pub outline_in_base: Vec<Point2<f64>>,
-    /// The z that it stands on and the z of its outline, m in the base frame.
+    /// The z of the surface under it and the z of its outline, m in the base frame.
     pub z_m: [f64; 2],
 }
 
 impl SeenPart {
-    /// The outline raised from the table, in a colour that no shipped part has.
+    /// The outline raised from the table, in a colour of no shipped part.
     pub(crate) fn fragment(&self) -> MjcfFragment {
         let mut fragment = MjcfFragment::default();
         let [bottom_m, top_m] = self.z_m;

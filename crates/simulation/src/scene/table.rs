@@ -6,13 +6,13 @@ use rand_pcg::Pcg64Mcg;
 use crate::fragment::MjcfFragment;
 use crate::shapes::texture::{Color, Noise, Texture};
 
-/// Metres of table that one repeat of the surface's picture covers.
+/// Metres of table per repeat of the surface's picture.
 const METRES_PER_REPEAT: f64 = 0.5;
 
-/// Texels along one side of that picture: about one a pixel of the wrist camera.
+/// Texels along one side of that picture: about one per pixel of the wrist camera.
 const TEXELS: u32 = 512;
 
-/// What the top is made of.
+/// The material of the top.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TableSurface {
     /// Smooth laminate of one colour.
@@ -50,7 +50,7 @@ impl TableSurface {
 /// A table top.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Table {
-    /// What it is made of.
+    /// Its material.
     pub surface: TableSurface,
     /// Its main colour.
     pub base: Color,
@@ -61,12 +61,12 @@ pub struct Table {
 }
 
 impl Table {
-    /// The light grey laminate on which parts are shown to the system.
+    /// The light grey laminate of demonstrations.
     pub fn nominal() -> Self {
         Self { surface: TableSurface::Plain, base: [0.66, 0.66, 0.64], accent: [0.6, 0.6, 0.58], seed: 1 }
     }
 
-    /// Any surface in a colour that such a surface has.
+    /// Any surface in a plausible colour for it.
     pub fn sample(rng: &mut Pcg64Mcg) -> Self {
         let surface = TableSurface::ALL[rng.random_range(0..TableSurface::ALL.len())];
         let grey = |rng: &mut Pcg64Mcg, low: f64, high: f64| {
@@ -130,7 +130,7 @@ impl Table {
             }
             TableSurface::CuttingMat => Texture::paint(TEXELS, |u, v| {
                 let line = |t: f64, lines: f64, width: f64| (t * lines).fract() < width;
-                // Fifty centimetres a repeat: fine lines each centimetre, bold ones each five.
+                // Fifty centimetres per repeat: fine lines every centimetre, bold ones every five.
                 let strength = if line(u, 10.0, 0.04) || line(v, 10.0, 0.04) {
                     0.65
                 } else if line(u, 50.0, 0.1) || line(v, 50.0, 0.1) {

@@ -1,4 +1,4 @@
-//! What a thing covers on the table: convex outlines seen from above, and whether two of them keep apart.
+//! The area of an object on the table: convex outlines seen from above, and whether two of them are separate.
 
 use nalgebra::{Isometry2, Point2, Vector2};
 
@@ -9,7 +9,7 @@ pub fn placed(outline: &[Point2<f64>], table_from_outline: &Isometry2<f64>) -> V
 
 /// The widest gap between two convex outlines along any of their edges' normals; negative when they overlap.
 ///
-/// It is the true distance for outlines that face each other with an edge, and less than it otherwise.
+/// It is the true distance for outlines that face each other with an edge, otherwise less.
 pub fn separation(a: &[Point2<f64>], b: &[Point2<f64>]) -> f64 {
     let along = |normal: &Vector2<f64>, points: &[Point2<f64>]| {
         points

@@ -1,18 +1,18 @@
 //! Closed triangle meshes that carry texture coordinates, made in code and written as OBJ text.
 //!
-//! Positions are stored without normals. [`TriangleMesh::to_obj`] derives one normal per face corner
-//! by averaging the neighbouring faces that meet it at less than [`CREASE_DEG`]: round surfaces come out
-//! smooth, edges stay sharp, and no builder has to think about shading.
+//! Positions are stored without normals. [`TriangleMesh::to_obj`] derives one normal per face corner by
+//! averaging the neighbouring faces that meet it at less than [`CREASE_DEG`]: round surfaces appear
+//! smooth, edges stay sharp, and builders need not handle shading.
 
 use std::collections::HashMap;
 use std::fmt::Write as _;
 
 use nalgebra::{Isometry3, Matrix3, Point2, Point3, Vector3};
 
-/// Faces that meet at more than this angle keep an edge between them when shaded.
+/// Faces that meet at more than this angle have a sharp edge between them when shaded.
 pub const CREASE_DEG: f64 = 38.0;
 
-/// Positions closer than this count as one point when neighbouring faces are looked for (metres).
+/// Positions closer than this count as one point when neighbouring faces are searched (metres).
 const WELD_M: f64 = 1e-7;
 
 /// A point of a mesh.
@@ -29,7 +29,7 @@ pub struct MeshVertex {
 pub struct TriangleMesh {
     /// The points; a seam of the texture holds the same position twice.
     pub vertices: Vec<MeshVertex>,
-    /// Three indices into `vertices` a face.
+    /// Three indices into `vertices` per face.
     pub faces: Vec<[u32; 3]>,
 }
 
@@ -52,7 +52,7 @@ impl TriangleMesh {
         index
     }
 
-    /// Adds a grid of points `rows × cols` and its two triangles a cell.
+    /// Adds a grid of points `rows × cols` and two triangles per cell.
     ///
     /// Counter-clockwise faces look towards (next column) × (next row).
     pub fn push_grid(&mut self, rows: usize, cols: usize, point: impl Fn(usize, usize) -> MeshVertex) {
@@ -89,7 +89,7 @@ impl TriangleMesh {
         self
     }
 
-    /// Lays the texture on from above: `(x, y) / metres_per_repeat`.
+    /// Projects the texture from above: `(x, y) / metres_per_repeat`.
     pub fn textured_from_above(mut self, metres_per_repeat: f64) -> Self {
         for vertex in &mut self.vertices {
             vertex.texcoord = Point2::from(vertex.position.coords.xy() / metres_per_repeat);
@@ -121,7 +121,7 @@ impl TriangleMesh {
         let mut volume = 0.0;
         let mut first = Vector3::zeros();
         let mut second = Matrix3::zeros();
-        // Covariance of the unit tetrahedron spanned by the three axes: 1/60 on, 1/120 off the diagonal.
+        // Covariance of the unit tetrahedron spanned by the three axes: 1/60 on the diagonal, 1/120 elsewhere.
         let canonical = Matrix3::from_fn(|row, col| if row == col { 1.0 / 60.0 } else { 1.0 / 120.0 });
         for &face in &self.faces {
             let [a, b, c] = self.corners(face);
@@ -216,7 +216,7 @@ impl TriangleMesh {
     }
 }
 
-/// Lines of text that get a number when first seen, counted from one as OBJ does.
+/// Lines of text that get an index at their first occurrence, counted from one as in OBJ.
 #[derive(Default)]
 struct Interned {
     lines: Vec<String>,

@@ -1,4 +1,4 @@
-//! What bodies are made of: meshes, solids, textures, and their outlines on the table.
+//! The geometry of bodies: meshes, solids, textures, and their outlines on the table.
 
 pub mod footprint;
 pub mod mesh;

@@ -1,6 +1,6 @@
 //! Solids from which parts are built: extrusions with chamfered edges, turned bodies, bent tubes, screw threads.
 //!
-//! Every function returns a closed mesh in metres, standing on z = 0 unless it says otherwise, with texture
+//! Every function returns a closed mesh in metres, standing on z = 0 unless stated otherwise, with texture
 //! coordinates in which 1 is one repeat of the texture.
 
 use std::f64::consts::{PI, TAU};
@@ -10,10 +10,10 @@ use nalgebra::{Isometry3, Point2, Point3, UnitQuaternion, Vector2, Vector3};
 
 use super::mesh::{MeshVertex, TriangleMesh};
 
-/// Metres of surface that one repeat of a texture covers, where a solid chooses.
+/// Default metres of surface per repeat of a texture.
 pub const METRES_PER_REPEAT: f64 = 0.05;
 
-/// Chords shorter than this (metres) would end on one point: OBJ text holds hundredths of a millimetre.
+/// Shorter chords (metres) would collapse to one point: OBJ text has hundredths of a millimetre.
 const MIN_CHORD_M: f64 = 2e-5;
 
 /// A circle of `count` points, counter-clockwise.
@@ -103,7 +103,7 @@ fn inset(outline: &[Point2<f64>], distance: f64) -> Vec<Point2<f64>> {
 /// The upper edges of outline and holes are broken by a chamfer of `chamfer` metres (zero: none).
 pub fn extrude(outline: &[Point2<f64>], holes: &[Vec<Point2<f64>>], height: f64, chamfer: f64) -> TriangleMesh {
     let mut rings = vec![outline.to_vec()];
-    // A hole walked clockwise has the material on its left, as the outline has.
+    // A hole in clockwise direction has the material on its left, like the outline.
     rings.extend(holes.iter().map(|hole| hole.iter().rev().copied().collect::<Vec<_>>()));
     let top_rings: Vec<Vec<Point2<f64>>> =
         rings.iter().map(|ring| if chamfer > 0.0 { inset(ring, chamfer) } else { ring.clone() }).collect();
@@ -157,8 +157,8 @@ pub fn box_solid(length: f64, width: f64, height: f64, chamfer: f64) -> Triangle
 
 /// Turns a profile of (radius, z) about the z axis.
 ///
-/// The profile runs counter-clockwise round the material in the (radius, z) half plane. It is closed by itself when
-/// it starts and ends on the axis, else its last point is joined to its first (a ring).
+/// The profile runs counter-clockwise around the material in the (radius, z) half plane. It is closed if it starts
+/// and ends on the axis, otherwise its last point is joined to its first (a ring).
 pub fn lathe(profile: &[(f64, f64)], segments: usize) -> TriangleMesh {
     let mut profile = profile.to_vec();
     let on_axis = profile.first().is_some_and(|p| p.0 == 0.0) && profile.last().is_some_and(|p| p.0 == 0.0);
@@ -200,11 +200,11 @@ pub fn cylinder(radius: f64, height: f64, chamfer: f64, segments: usize) -> Tria
     )
 }
 
-/// A hexagonal prism about the z axis whose corners are turned off at 30° at both ends, as nuts and heads have them.
+/// A hexagonal prism about the z axis whose corners are turned off at 30° at both ends, as on nuts and heads.
 pub fn hex_prism(across_flats: f64, height: f64, bore_radius: f64) -> TriangleMesh {
     let segments = 48;
     let apothem = across_flats / 2.0;
-    // Rim of the hexagon at a polar angle, and how far a 30° cone that starts at the flats takes its ends back.
+    // Rim of the hexagon at a polar angle, and the shortening of its ends by a 30° cone that starts at the flats.
     let rim = |angle: f64| apothem / ((angle + PI / 6.0).rem_euclid(PI / 3.0) - PI / 6.0).cos();
     let taken = |radius: f64| (radius - apothem * 0.98).max(0.0) * (PI / 6.0).tan();
     let mut mesh = TriangleMesh::default();
@@ -228,7 +228,7 @@ pub fn hex_prism(across_flats: f64, height: f64, bore_radius: f64) -> TriangleMe
     mesh
 }
 
-/// A screw thread about the z axis from z = 0 to `length`: a 60° ridge that climbs by `pitch` a turn.
+/// A screw thread about the z axis from z = 0 to `length`: a 60° ridge that rises by `pitch` per turn.
 pub fn thread(major_radius: f64, pitch: f64, length: f64, segments: usize) -> TriangleMesh {
     let depth = 0.54 * pitch;
     let rows = (length / pitch * 4.0).ceil() as usize + 1;
@@ -250,8 +250,8 @@ pub fn thread(major_radius: f64, pitch: f64, length: f64, segments: usize) -> Tr
     mesh
 }
 
-/// Rounds the corners of a polyline by arcs of `radius` metres; each arc gets `steps` chords. A corner that hardly turns
-/// stays as it is.
+/// Rounds the corners of a polyline by arcs of `radius` metres; each arc gets `steps` chords. A nearly straight corner
+/// is not changed.
 pub fn rounded_path(corners: &[Point3<f64>], radius: f64, steps: usize) -> Vec<Point3<f64>> {
     let mut path = vec![corners[0]];
     for window in corners.windows(3) {
@@ -276,7 +276,7 @@ pub fn rounded_path(corners: &[Point3<f64>], radius: f64, steps: usize) -> Vec<P
 }
 
 /// A round bar of `radius` metres along a path, flat at both ends, or closed in itself when the path lies in a plane
-/// and ends where it starts. Texture u runs round the bar (0 and 1 below, 0.5 on top).
+/// and ends where it starts. Texture u runs around the bar (0 and 1 below, 0.5 on top).
 pub fn sweep(path: &[Point3<f64>], radius: f64, segments: usize) -> TriangleMesh {
     let count = path.len();
     let closed = path[0] == path[count - 1];
@@ -288,7 +288,7 @@ pub fn sweep(path: &[Point3<f64>], radius: f64, segments: usize) -> TriangleMesh
         })
         .map(|tangent| tangent.normalize())
         .collect();
-    // Carried along by the smallest turn, so that the bar does not twist.
+    // Transported along the path with the smallest rotation, so that the bar does not twist.
     let mut up = vec![perpendicular(&tangents[0])];
     for pair in tangents.windows(2) {
         let turn = UnitQuaternion::rotation_between(&pair[0], &pair[1]).unwrap_or_else(UnitQuaternion::identity);
@@ -314,13 +314,13 @@ pub fn sweep(path: &[Point3<f64>], radius: f64, segments: usize) -> TriangleMesh
     mesh
 }
 
-/// The direction across `tangent` that points up as far as it can.
+/// The direction perpendicular to `tangent` that is closest to up.
 fn perpendicular(tangent: &Vector3<f64>) -> Vector3<f64> {
     let up = if tangent.z.abs() > 0.9 { Vector3::x() } else { Vector3::z() };
     (up - tangent * tangent.dot(&up)).normalize()
 }
 
-/// Turns a solid that stands along z so that z points along +x, and its former +y stays +y; its axis at `height`.
+/// Turns a solid that stands along z so that z points along +x, and its former +y stays +y; its axis is at `height`.
 pub fn lying_along_x(height: f64) -> Isometry3<f64> {
     Isometry3::from_parts(
         nalgebra::Translation3::new(0.0, 0.0, height),
@@ -333,7 +333,7 @@ mod tests {
     use super::*;
     use approx::assert_relative_eq;
 
-    /// Round solids are polygons of many sides: their volume falls short by this part at most.
+    /// Round solids are polygons of many sides: their volume is too small by at most this share.
     const FACET_TOLERANCE: f64 = 0.02;
 
     fn volume_is(mesh: &TriangleMesh, expected: f64) {

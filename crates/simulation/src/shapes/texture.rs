@@ -7,7 +7,7 @@ use rand_pcg::Pcg64Mcg;
 /// A colour, each channel from 0 to 1.
 pub type Color = [f64; 3];
 
-/// A square picture that can be laid side by side without a seam.
+/// A square picture that tiles without a seam.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Texture {
     /// The pixels.
@@ -15,7 +15,7 @@ pub struct Texture {
 }
 
 impl Texture {
-    /// Paints every texel; `colour` is given (u, v) from 0 to 1.
+    /// Paints every texel; `colour` gets (u, v) from 0 to 1.
     pub fn paint(size: u32, mut color: impl FnMut(f64, f64) -> Color) -> Self {
         let image = RgbImage::from_fn(size, size, |x, y| {
             let (u, v) = ((f64::from(x) + 0.5) / f64::from(size), (f64::from(y) + 0.5) / f64::from(size));
@@ -24,10 +24,10 @@ impl Texture {
         Self { image }
     }
 
-    /// The PNG that MuJoCo is given.
+    /// The PNG for MuJoCo.
     ///
     /// # Panics
-    /// Never for a picture in memory: the encoder fails only when its writer does.
+    /// Never for a picture in memory: the encoder fails only if its writer does.
     pub fn to_png(&self) -> Vec<u8> {
         use image::codecs::png::{CompressionType, FilterType, PngEncoder};
         let mut bytes = Vec::new();
@@ -37,7 +37,7 @@ impl Texture {
         bytes
     }
 
-    /// An even colour with fine grain, as painted or plastic surfaces have it.
+    /// An even colour with fine grain, as on painted or plastic surfaces.
     pub fn grained(size: u32, base: Color, strength: f64, seed: u64) -> Self {
         let mut rng = Pcg64Mcg::seed_from_u64(seed);
         let blotches = Noise::new(8, seed);
@@ -57,7 +57,7 @@ impl Texture {
         })
     }
 
-    /// A turned face: rings about the middle of the texture, and the two bright fans that rings of a tool give.
+    /// A turned face: rings about the centre of the texture, and the two bright fans of turning marks.
     pub fn turned(size: u32, base: Color, strength: f64, seed: u64) -> Self {
         let rings = Noise::new_stretched(1, 64, seed);
         Self::paint(size, |u, v| {
@@ -80,9 +80,9 @@ impl Texture {
         })
     }
 
-    /// A round bar seen from above, u once round it (0.5 on top): bright along the top, dark flanks, a lighter rim.
+    /// A round bar seen from above, with u around it (0.5 on top): bright along the top, dark flanks, a lighter rim.
     ///
-    /// The renderer has no reflections; a bar lying on a table shows these bands from wherever above one looks.
+    /// The renderer has no reflections; a bar on a table shows these bands from any direction above.
     pub fn round_bar(size: u32, base: Color, gloss: f64, seed: u64) -> Self {
         let lines = Noise::new_stretched(4, size as usize, seed);
         Self::paint(size, |u, v| {
@@ -106,7 +106,7 @@ impl Texture {
     }
 }
 
-/// Value noise on a lattice that wraps round: -1 to 1, smooth, the same for the same seed.
+/// Value noise on a periodic lattice: -1 to 1, smooth, deterministic for a seed.
 #[derive(Debug, Clone)]
 pub struct Noise {
     columns: usize,
@@ -120,7 +120,7 @@ impl Noise {
         Self::new_stretched(cells, cells, seed)
     }
 
-    /// A lattice of other numbers of columns (u) and rows (v): few columns make streaks along u.
+    /// A lattice with different numbers of columns (u) and rows (v): few columns make streaks along u.
     pub fn new_stretched(columns: usize, rows: usize, seed: u64) -> Self {
         let mut rng = Pcg64Mcg::seed_from_u64(seed);
         Self { columns, rows, values: (0..columns * rows).map(|_| rng.random_range(-1.0..1.0)).collect() }
@@ -147,7 +147,7 @@ impl Noise {
     }
 }
 
-/// `v.rem_euclid(1.0)`, to the bit, without the processor's slow remainder; `v` is far below 2^63.
+/// `v.rem_euclid(1.0)`, bit for bit, without the processor's slow remainder; `v` is far below 2^63.
 fn wrapped(v: f64) -> f64 {
     let rest = v - (v as i64) as f64;
     if rest < 0.0 { rest + 1.0 } else { rest }

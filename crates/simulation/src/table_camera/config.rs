@@ -1,4 +1,4 @@
-//! What a camera over the table shows, and how it is written in an address.
+//! The scene of a camera over the table, and its text form in an address.
 
 use std::ops::Range;
 use std::str::FromStr;
@@ -8,31 +8,31 @@ use sdg_robot::LOOK_HEIGHT_M;
 use crate::error::{Result, SimulationError};
 use crate::objects::{LookAlikeKind, ObjectSpec};
 
-/// What moves under the camera, and how. Its text is `PART?name=value&…`, as in `sim:pendulum?speed=50&fps=100&hide=2..3`.
+/// The motion under the camera. Its text is `PART?name=value&…`, as in `sim:pendulum?speed=50&fps=100&hide=2..3`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TableCameraConfig {
     /// Name of the part (text before `?`).
     pub part: String,
-    /// Speed over the table in metres a second (`speed`, in mm/s).
+    /// Speed over the table in metres per second (`speed`, in mm/s).
     pub speed_m_s: f64,
-    /// Rate of turning in radians a second; its direction changes (`turn`, in degrees a second).
+    /// Rate of turning in radians per second; its direction changes (`turn`, in degrees per second).
     pub turn_rad_s: f64,
-    /// Frames a second (`fps`).
+    /// Frames per second (`fps`).
     pub fps: f64,
     /// Seed of places, directions, light, table and noise (`seed`).
     pub seed: u64,
-    /// Length of the sequence in seconds; endless where `None` (`seconds`).
+    /// Length of the sequence in seconds; `None` for no end (`seconds`).
     pub duration_secs: Option<f64>,
-    /// How many of the part there are, 1 to 4 (`count`).
+    /// Number of instances of the part, 1 to 4 (`count`).
     pub count: usize,
-    /// Another part that lies beside (`beside`): a part's name, or a look-alike of this one, `mirrored`, `feature-moved` or a size as
-    /// `0.9`.
+    /// Another part beside it (`beside`): a part's name, or a look-alike of this one, `mirrored`, `feature-moved` or a
+    /// size as `0.9`.
     pub beside: Option<String>,
-    /// Other things beside it (`things`).
+    /// Distractors beside it (`things`).
     pub num_things: usize,
-    /// When the first part is off the table, in seconds; afterwards it lies elsewhere (`hide`, as `2..3`).
+    /// Interval in which the first part is off the table, in seconds; afterwards it lies elsewhere (`hide`, as `2..3`).
     pub hidden_secs: Option<Range<f64>>,
-    /// When a card lies over the first part, in seconds (`cover`, as `2..3`).
+    /// Interval in which a card lies over the first part, in seconds (`cover`, as `2..3`).
     pub covered_secs: Option<Range<f64>>,
     /// Standard deviation of the sensor's noise in grey values (`noise`).
     pub noise: f64,
@@ -43,7 +43,7 @@ pub struct TableCameraConfig {
 }
 
 impl TableCameraConfig {
-    /// One part that moves at 50 mm/s and turns at 30 degrees a second, seen from as high as the wrist camera looks from.
+    /// One part that moves at 50 mm/s and turns at 30 degrees per second, seen from the wrist camera's height.
     pub fn new(part: &str) -> Self {
         Self {
             part: part.to_owned(),
@@ -89,7 +89,7 @@ impl TableCameraConfig {
         Ok(())
     }
 
-    /// The part beside, if one is asked for.
+    /// The part beside it, if one is requested.
     pub(super) fn part_beside(&self, part: &ObjectSpec) -> Result<Option<ObjectSpec>> {
         let Some(beside) = &self.beside else { return Ok(None) };
         let kind = match beside.as_str() {
@@ -117,7 +117,8 @@ impl FromStr for TableCameraConfig {
     /// Reads `PART?name=value&…`.
     ///
     /// # Errors
-    /// [`SimulationError::UnknownName`] for an option that there is not, [`SimulationError::Configuration`] for a value out of range.
+    /// [`SimulationError::UnknownName`] for an option that does not exist, [`SimulationError::Configuration`] for a
+    /// value out of range.
     fn from_str(text: &str) -> Result<Self> {
         let (part, options) = text.split_once('?').unwrap_or((text, ""));
         let mut config = Self::new(part);

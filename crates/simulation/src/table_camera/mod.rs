@@ -1,12 +1,12 @@
-//! A camera that stands still over the table and shows parts that move: `sim:PART?speed=50&seed=1&fps=100&…`.
+//! A fixed camera over the table that shows moving parts: `sim:PART?speed=50&seed=1&fps=100&…`.
 //!
 //! ```text
 //! TableCameraConfig ─ scene by seed, a lane of the table for each part ─ Mover: place and yaw at each frame
 //!                                                                              │
 //!                                      Renderer ─ noise ─ TableView { picture, truth of every part }
 //! ```
-//! Frames are `1 / fps` of simulated time apart and are drawn as fast as the computer draws them. The same configuration gives the
-//! same frames to the bit. No robot stands in the scene.
+//! Frames are `1 / fps` of simulated time apart and are drawn as fast as the computer can. The same configuration gives
+//! the same frames, bit for bit. The scene contains no robot.
 
 mod config;
 mod motion;
@@ -34,15 +34,15 @@ use crate::render::{RenderConfig, Renderer};
 use crate::scene::PlacedObject;
 use crate::views::GraspTruth;
 
-/// How far above the table the card lies, in metres.
+/// Height of the card above the table, in metres.
 const CARD_HEIGHT_M: f64 = 0.05;
-/// Values of noise that are drawn once; every frame begins elsewhere in them.
+/// Number of noise values that are drawn once; every frame starts at another offset.
 const NUM_NOISE: usize = 1 << 16;
 
 /// A part on the table in one frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MovingTruth {
-    /// Where it is, and its grasp in the base frame and in pixels.
+    /// Its pose, and its grasp in the base frame and in pixels.
     pub grasp: GraspTruth,
     /// Whether the picture shows it: it is on the table and not under the card.
     pub is_shown: bool,
@@ -55,18 +55,18 @@ pub struct TableView {
     pub number: u64,
     /// Simulated time since the first frame.
     pub time: Duration,
-    /// As the camera delivers it, with noise.
+    /// The camera's picture, with noise.
     pub picture: RgbImage,
-    /// All of the part, in a fixed order; what lies beside is not among them.
+    /// All instances of the part, in a fixed order; the objects beside are not included.
     pub truths: Vec<MovingTruth>,
 }
 
-/// A part that moves.
+/// A moving part.
 struct Moving {
     joint: Id<Joint>,
     mover: Mover,
     spec: ObjectSpec,
-    /// Middle of its outline from above, in the object frame.
+    /// Centre of its outline from above, in the object frame.
     middle: Point2<f64>,
     is_away: bool,
 }
@@ -90,7 +90,7 @@ impl TableCamera {
     /// Builds the scene.
     ///
     /// # Errors
-    /// [`crate::SimulationError::UnknownName`] for a part that there is not; as [`Renderer::new`].
+    /// [`crate::SimulationError::UnknownName`] for a part that does not exist; as [`Renderer::new`].
     pub fn new(config: &TableCameraConfig) -> Result<Self> {
         let spec = ObjectSpec::by_name(&config.part)?;
         let beside = config.part_beside(&spec)?;
@@ -142,7 +142,7 @@ impl TableCamera {
         })
     }
 
-    /// The camera of an address without its `sim:`; frames count their times from now.
+    /// The camera of an address without its `sim:`; frame times count from now.
     ///
     /// # Errors
     /// As [`TableCameraConfig`]'s `from_str` and [`Self::new`].
@@ -153,7 +153,7 @@ impl TableCamera {
         Ok(made)
     }
 
-    /// What it was built from.
+    /// Its configuration.
     pub fn config(&self) -> &TableCameraConfig {
         &self.config
     }
@@ -215,7 +215,7 @@ impl TableCamera {
         if self.config.noise == 0.0 {
             return;
         }
-        // Every row begins elsewhere, so that no pattern repeats from row to row or from frame to frame.
+        // Every row starts at another offset, so that no pattern repeats between rows or frames.
         let row_len = 3 * picture.width() as usize;
         for row in picture.chunks_exact_mut(row_len) {
             let from = self.rng.random_range(0..NUM_NOISE);
@@ -246,7 +246,7 @@ impl Moving {
     }
 }
 
-/// A number of the normal distribution, by Box and Muller.
+/// A normally distributed number, by the method of Box and Muller.
 fn normal(rng: &mut Pcg64Mcg) -> f64 {
     let radius = (-2.0 * (1.0 - rng.random::<f64>()).ln()).sqrt();
     radius * (std::f64::consts::TAU * rng.random::<f64>()).cos()
@@ -284,7 +284,7 @@ mod tests {
                 let turned = (truth.direction_rad - last.direction_rad + 9.0).rem_euclid(std::f64::consts::TAU) - 9.0;
                 let turned = sdg_geometry::Angle::from_radians(turned).radians().abs();
                 assert!((turned - 1.5f64.to_radians()).abs() < 1e-6, "{turned}");
-                // The marks are beside the middle of the part, so turning moves them, too.
+                // The marks are beside the part's centre, so that turning moves them, too.
                 assert!((truth.tcp - last.tcp).norm() < 0.0025 + 0.06 * turned, "{number}");
             }
             last = Some(truth);
@@ -300,7 +300,7 @@ mod tests {
         assert_eq!(shown, [true, true, false, false, true, false, true, true]);
         let moved = (seen[4].truths[0].grasp.tcp - seen[1].truths[0].grasp.tcp).norm();
         assert!(moved > 0.02, "{moved}");
-        // The picture shows it where the truth says: the part is darker or brighter than the bare table.
+        // The picture shows it at the true place: the part is darker or brighter than the bare table.
         let at = |view: &TableView, of: &TableView| {
             let center = of.truths[0].grasp.line.center();
             view.picture.get_pixel(center.x as u32, center.y as u32).0

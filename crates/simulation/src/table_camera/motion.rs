@@ -1,4 +1,4 @@
-//! A thing that is moved over the table: straight for a while, then in another direction, always within its bounds.
+//! The motion of an object over the table: straight for a while, then in another direction, always within its bounds.
 
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -7,10 +7,10 @@ use nalgebra::{Point2, Vector2};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
-/// How long it goes on in one direction, in seconds.
+/// Duration of one direction, in seconds.
 const STRAIGHT_SECS: Range<f64> = 0.6..1.6;
 
-/// Where a thing may be, in the robot's base frame, in metres.
+/// The allowed range of an object, in the robot's base frame, in metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Bounds {
     pub(super) x_m: [f64; 2],
@@ -18,7 +18,7 @@ pub(super) struct Bounds {
 }
 
 impl Bounds {
-    /// As much smaller on every side; no smaller than its middle.
+    /// Smaller by this distance on every side; at least its centre.
     pub(super) fn shrunk(&self, by_m: f64) -> Self {
         let shrunk = |[low, high]: [f64; 2]| {
             let middle = 0.5 * (low + high);
@@ -33,7 +33,7 @@ impl Bounds {
     }
 }
 
-/// A thing in motion.
+/// A moving object.
 #[derive(Debug, Clone)]
 pub(super) struct Mover {
     bounds: Bounds,
@@ -74,7 +74,7 @@ impl Mover {
         self.straight_secs = self.rng.random_range(STRAIGHT_SECS);
     }
 
-    /// Lets time pass.
+    /// Advances the time.
     pub(super) fn advance(&mut self, secs: f64) {
         self.straight_secs -= secs;
         if self.straight_secs <= 0.0 {
@@ -90,7 +90,7 @@ impl Mover {
         }
     }
 
-    /// Puts it down somewhere else.
+    /// Puts it at another place.
     pub(super) fn put_elsewhere(&mut self) {
         self.place = self.bounds.any_place(&mut self.rng);
         self.yaw_rad = self.rng.random_range(-PI..PI);

@@ -1,7 +1,6 @@
-//! Pictures of scenes with the truth: as parts are shown to the system, at any place, along axes that make them harder, through other
-//! cameras.
+//! Pictures of scenes with the truth: demonstrations, random places, axes that make them harder, other cameras.
 //!
-//! A scene knows no camera and no robot; a view draws it through a workcell.
+//! A scene contains no camera and no robot; a view draws it through a workcell.
 
 mod axis;
 mod nominal;

@@ -1,4 +1,4 @@
-//! Pictures of the wrist camera with the truth about them: test images and demonstrations.
+//! Pictures of the wrist camera with their truth: test images and demonstrations.
 //!
 //! Both are taken by the same code, from the same look pose, as a grasp attempt's own pictures.
 
@@ -13,29 +13,29 @@ use crate::objects::ObjectSpec;
 use crate::scene::{PlacedObject, SceneVariation, VariationConfig};
 use crate::workcell::{Workcell, WorkcellConfig};
 
-/// Where the parts lie when they are shown to the system: x, y in metres and yaw in radians, in the base frame.
+/// Pose of the parts in demonstrations: x, y in metres and yaw in radians, in the base frame.
 ///
-/// Attempts draw their places from continuous ranges and do not hit it.
+/// Attempts draw their poses from continuous ranges and do not repeat it.
 pub const DEMONSTRATION_PLACE: (f64, f64, f64) = (0.5, 0.0, 0.9);
 
-/// Where the wrist camera looks from in an attempt: straight down on the middle of the table's part in reach.
+/// The wrist camera's pose in an attempt: looking vertically down at the centre of the reachable table area.
 pub fn base_from_look_camera() -> Isometry3<f64> {
     let [x, y] = LOOK_AT_M;
     camera_looking_down(x, y, LOOK_HEIGHT_M, 0.0)
 }
 
-/// Where a part truly is, and where its grasp therefore is in a picture.
+/// The true pose of a part, and its grasp in a picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GraspTruth {
     /// Pose of the object frame in the base frame.
     pub base_from_object: Isometry3<f64>,
-    /// Where the tool centre point goes, in the base frame.
+    /// The tool centre point, in the base frame.
     pub tcp: Point3<f64>,
     /// Direction of the marked line in the base frame, in radians about z from x.
     pub direction_rad: f64,
     /// The marked line in pixels.
     pub line: GraspLine,
-    /// The same as a planar grasp in pixels, its width that of the part between the jaws.
+    /// The same as a planar grasp in pixels; its width is the part's width between the jaws.
     pub planar: PlanarGrasp,
 }
 
@@ -57,10 +57,10 @@ impl GraspTruth {
     }
 }
 
-/// A picture with its scene and, where the part is on the table, the truth.
+/// A picture with its scene and, if the part is on the table, the truth.
 #[derive(Debug, Clone)]
 pub struct TestView {
-    /// What was drawn.
+    /// The drawn scene.
     pub scene: SceneVariation,
     /// The picture and its camera.
     pub view: CameraView,
@@ -84,9 +84,9 @@ fn test_view_drawn(config: WorkcellConfig) -> Result<TestView> {
     Ok(TestView { scene, view, truth })
 }
 
-/// Pictures at unseen poses with changed light, other tables and distractors, one a seed from `seed` on.
+/// Pictures at unseen poses with changed light, other tables and distractors, one per seed from `seed` on.
 ///
-/// With `present` false the part is left out and at least one distractor lies there.
+/// With `present` false the part is left out and at least one distractor is present.
 pub fn test_views(
     spec: &ObjectSpec,
     present: bool,
@@ -102,16 +102,16 @@ pub fn test_views(
     })
 }
 
-/// A part as it is shown to the system: one picture in even light, and what a careful person marks on it.
+/// A demonstration of a part: one picture in even light, and a careful person's marks on it.
 #[derive(Debug, Clone)]
 pub struct DemonstrationView {
     /// The picture and its camera.
     pub view: CameraView,
-    /// The marked line and where the part truly is.
+    /// The marked line and the part's true pose.
     pub truth: GraspTruth,
     /// The pixels that show the part.
     pub mask: Mask,
-    /// The outer outline that a person clicks.
+    /// The outer outline as a person clicks it.
     pub outline: Polygon,
 }
 
@@ -148,13 +148,13 @@ fn demonstration_view_drawn(config: &WorkcellConfig) -> Result<DemonstrationView
     Ok(DemonstrationView { view, truth, mask, outline })
 }
 
-/// Whether a point lies in the picture, `margin_px` from its rim at least.
+/// Whether a point lies in the picture, at least `margin_px` from its rim.
 pub fn in_picture(camera: &PosedCamera, point: &Point2<f64>, margin_px: f64) -> bool {
     let (width, height) = (f64::from(camera.intrinsics.width), f64::from(camera.intrinsics.height));
     (margin_px..=width - margin_px).contains(&point.x) && (margin_px..=height - margin_px).contains(&point.y)
 }
 
-/// Least distance of a part that is shown whole to the picture's border, in pixels.
+/// Minimum distance of a completely visible part from the picture's border, in pixels.
 const RIM_PX: f64 = 8.0;
 
 /// Whether a part's outline, on the table and at the height of its marks, lies in the picture.
@@ -171,13 +171,13 @@ mod tests {
     use super::*;
     use crate::render::RenderConfig;
 
-    /// Pixels between a mark's projection and the part's drawn middle: marks lie on the axis of what is drawn.
+    /// Pixels between a mark's projection and the part's drawn centre: marks lie on the axis of the drawn part.
     const MARK_TOLERANCE_PX: f64 = 1.5;
 
-    /// Pixels by which a careful person's outline runs beside the true one on average.
+    /// Average distance in pixels of a careful person's outline from the true one.
     const MEAN_OUTLINE_OFFSET_PX: f64 = 0.4;
 
-    /// Without shadows and smooth edges: what is checked here is where things are.
+    /// Without shadows and antialiasing, because only positions are checked here.
     fn drawn_fast(scene: SceneVariation) -> WorkcellConfig {
         let wrist_render = RenderConfig { shadow_size: 0, samples: 0, ..RenderConfig::default() };
         WorkcellConfig { wrist_render, ..WorkcellConfig::new(scene) }
@@ -190,8 +190,8 @@ mod tests {
             let shown = demonstration_view_drawn(&drawn_fast(demonstration_scene(&spec))).unwrap();
             let line = shown.truth.line;
             let across = nalgebra::Vector2::new(-(line.end - line.start).y, (line.end - line.start).x).normalize();
-            // From the grasp's centre to the part's outer edge on either side, in tenths of a pixel; the centre itself
-            // may be open, as a bearing's is.
+            // From the grasp's centre to the part's outer edge on both sides, in tenths of a pixel; the centre itself
+            // may be open, as in a bearing.
             let reach = |side: f64| {
                 (0..400)
                     .rev()
@@ -209,7 +209,7 @@ mod tests {
             let bounds = shown.outline.bounds();
             let length = (bounds.x2 - bounds.x1).hypot(bounds.y2 - bounds.y1);
             assert!((60.0..230.0).contains(&length), "{name}: {length} px");
-            // Area between the clicked and the true outline over the outline's length: how far it is off on average.
+            // Area between the clicked and the true outline over the outline's length: its average error.
             let (clicked, shown_filled) = (shown.outline.rasterize(640, 480), filled(&shown.mask));
             let differing = (0..480u32)
                 .flat_map(|y| (0..640u32).map(move |x| (x, y)))
@@ -222,7 +222,7 @@ mod tests {
         }
     }
 
-    /// The mask with its holes: what is not reached from the picture's corner.
+    /// The mask with its holes: the pixels that are not reached from the picture's corner.
     fn filled(mask: &Mask) -> Mask {
         let mut outside = Mask::empty(mask.width(), mask.height());
         let mut open = vec![(0u32, 0u32)];

@@ -1,9 +1,9 @@
-//! Cameras beside the robot's own, each with a lens, a resolution and a place of its own over the table.
+//! Cameras other than the robot's own, each with its own lens, resolution and pose over the table.
 //!
 //! ```text
 //! (part, camera, number, seed) ─ ordinary scene, the arm turned away ─ camera at a height and tilt ─ picture with distortion
 //! ```
-//! They are to the wrist camera what a user's second camera is to the one that took the photo.
+//! Their relation to the wrist camera is that of a user's second camera to the one that took the photo.
 
 use std::f64::consts::PI;
 
@@ -24,14 +24,14 @@ use crate::render::{RenderConfig, Renderer};
 use crate::scene::{PlacedObject, SceneVariation, VariationConfig, pose_attributes};
 use crate::workcell::{WorkcellConfig, build_model};
 
-/// A camera model and where it may hang.
+/// A camera model and its possible poses.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OtherCamera {
     /// The name in tables.
     pub name: &'static str,
     /// Resolution, focal length, axis and lens.
     pub intrinsics: PinholeCamera,
-    /// Distances to the place on the table that it looks at, in metres.
+    /// Distances to the point on the table at which it looks, in metres.
     pub distances_m: [f64; 2],
 }
 
@@ -80,14 +80,14 @@ pub const OTHER_CAMERAS: [OtherCamera; 3] = [
 
 /// Tilts from straight down, in degrees.
 const TILTS_DEG: [f64; 2] = [0.0, 25.0];
-/// How far beside the part the camera looks, in metres.
+/// Distance of the camera's view from the part, in metres.
 const MAX_LOOK_OFFSET_M: f64 = 0.05;
-/// Places that are tried until the whole part is in the picture.
+/// Number of poses tried until the whole part is in the picture.
 const MAX_TRIES: usize = 40;
 /// The first joint's angle at which the arm points away from the table, in radians.
 const TURNED_AWAY_RAD: f64 = 2.7;
 
-/// What lies on the table.
+/// The object on the table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum OnTable {
     /// The part.
@@ -101,7 +101,7 @@ pub enum OnTable {
 pub struct OtherView {
     /// The picture and its camera.
     pub view: CameraView,
-    /// `None` where something else lies in the part's place.
+    /// `None` if something else lies in the part's place.
     pub truth: Option<GraspTruth>,
     /// Height of the camera over the table, in metres.
     pub height_m: f64,
@@ -112,7 +112,7 @@ pub struct OtherView {
 /// Draws picture `number` of a part by a camera: distance and tilt run through their ranges with the number, `of` numbers in all.
 ///
 /// # Errors
-/// As [`crate::Workcell::new`]; [`SimulationError::Configuration`] where no place shows the whole part.
+/// As for [`crate::Workcell::new`]; [`SimulationError::Configuration`] if no pose shows the whole part.
 pub fn other_view(
     spec: &ObjectSpec,
     on_table: OnTable,
@@ -129,7 +129,7 @@ pub fn other_view(
     let scene = SceneVariation::sample(Some(&shown), &VariationConfig::default(), scene_seed);
     let part = scene.object.clone().ok_or_else(|| no_place(camera, &spec.name))?;
     let within = |[low, high]: [f64; 2], share: f64| low + share.clamp(0.0, 1.0) * (high - low);
-    // Distance and tilt run through their ranges in other orders, so that they vary apart from each other.
+    // Distance and tilt run through their ranges in different orders, so that they vary independently.
     let share = |k: u64| (k % of) as f64 / of.max(1) as f64;
     let tilt_deg = within(TILTS_DEG, share(number) + rng.random_range(0.0..1.0 / of.max(1) as f64));
     let distance_m = within(camera.distances_m, share(7 * number + 3) + rng.random_range(0.0..1.0 / of.max(1) as f64));
@@ -149,10 +149,11 @@ pub fn other_view(
     Ok(OtherView { view: CameraView { image, camera: posed }, truth, height_m, tilt_deg })
 }
 
-/// A picture of a scene by a camera that stands still beside the robot, whose arm is turned away.
+/// A picture of a scene by a fixed camera beside the robot, whose arm is turned away.
 ///
 /// # Errors
-/// As [`crate::Workcell::new`]; [`SimulationError::Configuration`] for a lens that does not reach its picture's corners.
+/// As for [`crate::Workcell::new`]; [`SimulationError::Configuration`] for a lens that does not reach its picture's
+/// corners.
 fn draw(scene: SceneVariation, camera: &PosedCamera) -> Result<image::RgbImage> {
     let frustum = Frustum::around(&camera.intrinsics)?;
     // MuJoCo's cameras look along -z with y up.
@@ -215,7 +216,7 @@ mod tests {
             assert!((0.35..0.95).contains(&first.height_m), "{}", first.height_m);
             let empty = SceneVariation { object: None, ..scene_of(&spec, camera) };
             let without = draw(empty, &first.view.camera).unwrap();
-            // The middle of what the part changed lies within the part's size of its marks.
+            // The centre of the pixels that the part changed lies within the part's size of its marks.
             let changed: Vec<Vector3<f64>> = first
                 .view
                 .image

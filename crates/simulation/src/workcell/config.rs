@@ -8,7 +8,7 @@ use crate::attempt_errors::AttemptErrors;
 use crate::render::RenderConfig;
 use crate::scene::{SceneVariation, SeenPart};
 
-/// What a workcell is made of.
+/// The contents of a workcell.
 #[derive(Debug, Clone)]
 pub struct WorkcellConfig {
     /// Part, light, table and distractors.
@@ -17,13 +17,13 @@ pub struct WorkcellConfig {
     pub wrist_render: RenderConfig,
     /// Errors of the workcell during attempts.
     pub errors: AttemptErrors,
-    /// The camera's size, focal length and lens, where they are not those of [`PinholeCamera::WRIST`].
+    /// The camera's size, focal length and lens, if they differ from [`PinholeCamera::WRIST`].
     pub wrist_camera: Option<PinholeCamera>,
-    /// A part that a camera has seen, to be drawn and not to be touched.
+    /// A part that a camera has seen, which is drawn but has no collisions.
     pub seen_part: Option<SeenPart>,
-    /// Where the camera is, if not in the MJCF's place on the hand.
+    /// The camera's pose, if it differs from the MJCF's on the hand.
     pub camera_pose: Option<CameraPose>,
-    /// What stands in the cell besides the table.
+    /// Obstacles in the cell besides the table.
     pub obstacles: Vec<Obstacle>,
 }
 

@@ -24,7 +24,7 @@ pub use config::WorkcellConfig;
 use model::CAMERA_IN_BASE;
 pub(crate) use model::build_model;
 
-/// The part to grasp, as MuJoCo knows it.
+/// The part to grasp, as in MuJoCo's model.
 #[derive(Debug, Clone, Copy)]
 struct PartIds {
     body: Id<Body>,
@@ -39,20 +39,20 @@ pub struct Workcell {
     part: Option<PartIds>,
     wrist_renderer: Renderer,
     scene_camera: Id<Camera>,
-    /// The camera that perception is shown.
+    /// The camera of perception.
     camera: Id<Camera>,
     pub(crate) controller: ArmController,
     pub(crate) gripper: Gripper,
     reference: ArmReference,
     recorder: Option<Recorder>,
     tcp_from_camera: Isometry3<f64>,
-    /// What the hand was asked last.
+    /// The last command of the hand.
     pub(crate) hand_command: Option<HandCommand>,
     /// Whether the arm has stopped itself.
     pub(crate) is_in_reflex: bool,
-    /// What the controller was told that the hand carries.
+    /// The load that was given to the controller.
     pub(crate) load: Load,
-    /// The vertical force on the hand, and the largest since it was asked for, N.
+    /// The vertical force on the hand, and its maximum since the last call, N.
     pub(crate) felt_n: f64,
     pub(crate) peak_felt_n: f64,
 }
@@ -61,7 +61,7 @@ impl Workcell {
     /// Builds the scene, its physics and the wrist camera's renderer.
     ///
     /// # Errors
-    /// `Model` where MuJoCo refuses the scene, `Rendering` without OpenGL, `Library` for the wrong
+    /// `Model` if MuJoCo refuses the scene, `Rendering` without OpenGL, `Library` for the wrong
     /// libmujoco.
     pub fn new(config: &WorkcellConfig) -> Result<Self> {
         let model = build_model(config, "")?;
@@ -111,16 +111,16 @@ impl Workcell {
         Ok(workcell)
     }
 
-    /// What the workcell was built from.
+    /// Its configuration.
     pub fn config(&self) -> &WorkcellConfig {
         &self.config
     }
 
-    /// Puts everything back to the start: part and distractors at their places, the arm at rest at
-    /// `q` with its hand open.
+    /// Resets everything to the start: part and distractors at their places, the arm at rest at `q`
+    /// with its hand open.
     ///
     /// # Errors
-    /// [`SimulationError::Unstable`] where the scene itself is impossible.
+    /// [`SimulationError::Unstable`] if the scene itself is impossible.
     pub fn reset(&mut self, q: &sdg_kinematics::JointVector) -> Result<()> {
         self.data.reset();
         self.panda_ids.set_position(&mut self.data, q);
@@ -133,7 +133,7 @@ impl Workcell {
         self.data.forward()
     }
 
-    /// Puts everything where another simulation of the same configuration has it ([`Data::qpos`]), at rest.
+    /// Puts everything at its position in another simulation of the same configuration ([`Data::qpos`]), at rest.
     ///
     /// # Errors
     /// [`SimulationError::Configuration`] for positions of another scene.
@@ -151,7 +151,7 @@ impl Workcell {
         self.data.forward()
     }
 
-    /// Physics as they stand.
+    /// The present state of the physics.
     pub fn data(&self) -> &Data {
         &self.data
     }
@@ -161,7 +161,7 @@ impl Workcell {
         &self.panda_ids
     }
 
-    /// Where the part is, in the base frame; `None` in a scene without it.
+    /// The part's pose, in the base frame; `None` in a scene without it.
     pub fn base_from_object(&self) -> Option<Isometry3<f64>> {
         self.part.map(|part| self.data.world_from_body(part.body))
     }
@@ -171,7 +171,7 @@ impl Workcell {
         self.part.map(|part| lowest_point_m(&self.data, part.body))
     }
 
-    /// Which fingers (left, right) touch the part.
+    /// The fingers (left, right) that touch the part.
     pub fn fingers_on_object(&self) -> [bool; 2] {
         let mut touching = [false; 2];
         let Some(part) = self.part else { return touching };
@@ -192,17 +192,17 @@ impl Workcell {
         self.panda_ids.finger_position_m(&self.data).iter().sum()
     }
 
-    /// Where the wrist camera (optical frame) is on the hand.
+    /// The wrist camera's pose (optical frame) on the hand.
     pub fn tcp_from_camera(&self) -> Isometry3<f64> {
         self.tcp_from_camera
     }
 
-    /// The tool centre point's pose for the wrist camera to be at a pose (optical frame).
+    /// The tool centre point's pose that puts the wrist camera at a pose (optical frame).
     pub fn base_from_tcp_for_camera(&self, base_from_camera: &Isometry3<f64>) -> Isometry3<f64> {
         base_from_camera * self.tcp_from_camera.inverse()
     }
 
-    /// Lets one control period pass, the arm following the reference.
+    /// Advances one control period, with the arm following the reference.
     pub(crate) fn tick(&mut self) -> Result<()> {
         self.data.step1()?;
         self.controller.apply(&mut self.data, &self.panda_ids, &self.reference);
@@ -211,7 +211,7 @@ impl Workcell {
         self.look_on()
     }
 
-    /// What is noted of every period: what the hand feels, and pictures.
+    /// Recorded in every period: the force on the hand, and pictures.
     pub(crate) fn look_on(&mut self) -> Result<()> {
         self.feel();
         match &mut self.recorder {
@@ -230,7 +230,7 @@ impl Workcell {
         self.reference.position
     }
 
-    /// What touches the arm, in words.
+    /// The object that touches the arm, in words.
     pub(crate) fn describe_arm_contacts(&self) -> String {
         let model = self.data.model();
         let name_of = |body: Id<Body>| model.name(body).unwrap_or_else(|| "the table".into());

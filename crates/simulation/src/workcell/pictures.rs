@@ -1,4 +1,4 @@
-//! The workcell's pictures: through its camera and from outside, at once or while time passes.
+//! The workcell's pictures: through its camera and from outside, at one instant or over time.
 
 use image::RgbImage;
 use nalgebra::Isometry3;
@@ -14,12 +14,12 @@ use crate::record::{RecordConfig, Recorder};
 use crate::render::{RenderConfig, Renderer, Segmentation};
 
 impl Workcell {
-    /// What the wrist camera sees now.
+    /// The wrist camera's present picture.
     ///
     /// # Errors
     /// As [`Renderer::image`].
     pub fn wrist_view(&mut self) -> Result<CameraView> {
-        // A step leaves positions one period behind the joints.
+        // After a step, body positions are one period behind the joints.
         self.data.forward()?;
         let drawn = CameraView::capture(&mut self.wrist_renderer, &mut self.data, self.camera)?;
         match self.config.wrist_camera {
@@ -31,7 +31,7 @@ impl Workcell {
         }
     }
 
-    /// Which geom each pixel of the wrist camera's picture shows now.
+    /// The geom that each pixel of the wrist camera's present picture shows.
     ///
     /// # Errors
     /// As [`Renderer::segmentation`].
@@ -39,7 +39,7 @@ impl Workcell {
         self.wrist_renderer.segmentation(&mut self.data, self.camera)
     }
 
-    /// Puts the arm, without moving through time, where its wrist camera is at a pose, and takes a
+    /// Moves the arm, without advancing time, so that its wrist camera is at a pose, and takes a
     /// picture: for demonstrations and test images.
     ///
     /// # Errors
@@ -64,7 +64,7 @@ impl Workcell {
         self.data.forward()
     }
 
-    /// A picture of the whole workcell from outside, as it is.
+    /// A picture of the whole workcell from outside, in its present state.
     ///
     /// # Errors
     /// As [`Renderer::new`].
@@ -73,7 +73,8 @@ impl Workcell {
         renderer.image(&mut self.data, self.scene_camera)
     }
 
-    /// A picture of the whole workcell from outside with the arm somewhere else, fingers at an opening (m): for plans.
+    /// A picture of the whole workcell from outside with the arm in another configuration, fingers at an opening (m):
+    /// for plans.
     ///
     /// # Errors
     /// As [`Workcell::scene_image`].
@@ -89,7 +90,7 @@ impl Workcell {
         renderer.image(&mut self.data, self.scene_camera)
     }
 
-    /// Takes pictures from outside from now on, while time passes.
+    /// Starts a recording from outside over time.
     ///
     /// # Errors
     /// As [`Renderer::new`].
@@ -98,7 +99,7 @@ impl Workcell {
         Ok(())
     }
 
-    /// Ends the recording and hands out its pictures.
+    /// Ends the recording and returns its pictures.
     pub fn stop_recording(&mut self) -> Vec<RgbImage> {
         self.recorder.take().map(Recorder::into_frames).unwrap_or_default()
     }

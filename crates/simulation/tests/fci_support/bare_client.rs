@@ -1,4 +1,4 @@
-//! A client of bare sockets, which can be cut off at any moment.
+//! A client of bare sockets, which can be disconnected at any moment.
 
 use std::io::Write;
 use std::net::{SocketAddr, TcpStream, UdpSocket};
@@ -11,15 +11,15 @@ use sdg_fci::wire::{
     RobotCommand, RobotMode, RobotState, STATE_SIZE_V5, Status, Version,
 };
 
-/// Joint 1 turns at this speed, rad/s, when a fault comes.
+/// Speed of joint 1, rad/s, when a fault occurs.
 pub const SPEED: f64 = 0.5;
-/// Turns joint 1 faster and faster up to [`SPEED`], one millisecond after another.
+/// Accelerates joint 1 up to [`SPEED`], millisecond by millisecond.
 pub fn velocity_after(ms: u64) -> [f64; 7] {
     let ramp = (ms as f64 / 200.0).min(1.0);
     [SPEED * 0.5 * (1.0 - (std::f64::consts::PI * ramp).cos()), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
 }
 
-/// A client of bare sockets, which can be cut off at any moment.
+/// A client of bare sockets, which can be disconnected at any moment.
 pub struct BareClient {
     stream: TcpStream,
     udp: UdpSocket,
@@ -49,7 +49,7 @@ impl BareClient {
         (RobotState::decode(&buffer[..length], Version::V5).unwrap(), from)
     }
 
-    /// Starts a joint velocity motion and answers so many states of it.
+    /// Starts a joint velocity motion and answers this many states of it.
     pub fn turn(&mut self, num_states: u64) {
         let any = Deviation { translation: 1.0, rotation: 1.0, elbow: 1.0 };
         let response = self.execute(&Request::Move(MoveRequest {

@@ -1,4 +1,4 @@
-//! A simulated Panda on the network, and a twin of its workcell that tells the truth about it.
+//! A simulated Panda on the network, and a copy of its workcell that gives the truth about it.
 
 #![allow(clippy::unwrap_used)]
 #![allow(dead_code, reason = "each test file and the example use some of it")]
@@ -32,7 +32,7 @@ pub fn connect(server: &Server) -> sdg_robot::Result<FrankaArm> {
     FrankaArm::connect(&address, Scheduling::Ordinary)
 }
 
-/// The same workcell in this process, put where the served one is before it is asked.
+/// The same workcell in this process, set to the state of the served one before each query.
 pub struct Twin {
     pub cell: Workcell,
     pub positions: SharedPositions,
@@ -43,7 +43,7 @@ impl Twin {
         self.cell.set_positions(&self.positions.get()).unwrap();
     }
 
-    /// Whether the part hangs in the air: what is up there at rest is held, whatever touches it.
+    /// Whether the part hangs in the air: a part at rest up there is held, regardless of contacts.
     pub fn is_lifted(&mut self) -> bool {
         self.sync();
         self.cell.object_height_m().is_some_and(|height_m| height_m >= AttemptConfig::default().success_height_m)
@@ -69,7 +69,7 @@ pub fn cell(part: &str, seed: u64) -> Workcell {
     cell
 }
 
-/// A motion of two seconds from where the arm is.
+/// A motion of two seconds from the arm's position.
 pub fn some_motion(arm: &mut impl Arm) -> Trajectory {
     let start = arm.state().unwrap().q_commanded;
     let end = start + JointVector::from([0.4, 0.0, 0.0, 0.0, 0.0, 0.0, 0.3]);

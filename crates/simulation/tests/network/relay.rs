@@ -1,4 +1,4 @@
-//! A line between a robot and its client that passes everything on, but for the states and commands that a test changes.
+//! A relay between a robot and its client that forwards everything except the states and commands that a test changes.
 
 use std::io::Write;
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream, UdpSocket};
@@ -10,17 +10,17 @@ use sdg_fci::server::Server;
 use sdg_fci::wire::{HEADER_SIZE, Header, HeaderKind, Request, RobotMode, RobotState, STATE_SIZE_V5, Version};
 use sdg_robot::{FrankaArm, RobotAddress, Scheduling};
 
-/// What the line makes of a state of a moving arm: the datagrams that arrive in its place. The number counts those states.
+/// The relay's output for a state of a moving arm: the datagrams that arrive instead. The number counts those states.
 pub type ChangeState = Box<dyn FnMut(u64, &RobotState) -> Vec<Vec<u8>> + Send>;
-/// Whether a command of a moving arm gets through; the number counts them.
+/// Whether a command of a moving arm is forwarded; the number counts them.
 pub type PassCommand = Box<dyn FnMut(u64) -> bool + Send>;
 
-/// The datagram of a state as it is.
+/// The unchanged datagram of a state.
 pub fn unchanged(state: &RobotState) -> Vec<u8> {
     state.encode(Version::V5)
 }
 
-/// Connects an arm to a server through a line; the hand is reached directly.
+/// Connects an arm to a server through a relay; the hand is reached directly.
 pub fn connect(server: &Server, change: ChangeState, pass: PassCommand) -> sdg_robot::Result<FrankaArm> {
     let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
     let port = listener.local_addr().unwrap().port();
@@ -37,7 +37,7 @@ fn relay(listener: &TcpListener, robot: SocketAddr, change: ChangeState, pass: P
     client.set_nodelay(true).unwrap();
     server.set_nodelay(true).unwrap();
     let [to_client, to_server] = [(); 2].map(|()| Arc::new(UdpSocket::bind((Ipv4Addr::LOCALHOST, 0)).unwrap()));
-    // Where the client listens, and where the robot sends from.
+    // The client's listening address, and the robot's sending address.
     let (client_port, robot_udp) = (Arc::new(Mutex::new(0)), Arc::new(Mutex::new(None)));
 
     let (states, sends, port, source) = (to_server.clone(), to_client.clone(), client_port.clone(), robot_udp.clone());
@@ -87,7 +87,7 @@ fn pass_states(
         };
         let client = SocketAddr::from((Ipv4Addr::LOCALHOST, *client_port.lock().unwrap()));
         for datagram in datagrams {
-            // A client that has gone gets nothing.
+            // A disconnected client gets nothing.
             let _ = sends.send_to(&datagram, client);
         }
     }

@@ -1,4 +1,4 @@
-//! Grasps and placing with true poses, in this process and over the network, and the truth about where parts end.
+//! Grasps and placing with true poses, in this process and over the network, and the true final poses of the parts.
 
 #![allow(clippy::unwrap_used)]
 #![allow(dead_code, reason = "the test and the example use some of it each")]
@@ -18,10 +18,10 @@ use sdg_simulation::{
     AttemptErrors, PandaPlant, RenderConfig, SharedPositions, Workcell, WorkcellConfig, marked_grasp, part_shape,
 };
 
-/// What each joint's gears take of torques.
+/// Torque friction of each joint's gears.
 pub const FRICTION_NM: f64 = 1.0;
 
-/// Where the arm is.
+/// The location of the arm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Where {
     /// In this process.
@@ -30,7 +30,7 @@ pub enum Where {
     Lockstep,
 }
 
-/// A tray for parts as long as the spring clip, beside where parts lie.
+/// A tray for parts as long as the spring clip, beside the parts.
 pub fn tray() -> Place {
     tray_of([0.10, 0.055])
 }
@@ -46,7 +46,7 @@ pub fn tray_of(pitch_m: [f64; 2]) -> Place {
     }
 }
 
-/// A scene of a seed with the part beside the tray, and parts that lie already.
+/// A scene of a seed with the part beside the tray, and parts that are already placed.
 pub fn cell(spec: &ObjectSpec, seed: u64, lying: &[Isometry3<f64>]) -> Workcell {
     let config = VariationConfig {
         appearance: false,
@@ -65,7 +65,7 @@ pub fn cell(spec: &ObjectSpec, seed: u64, lying: &[Isometry3<f64>]) -> Workcell 
     cell
 }
 
-/// Perception that knows the truth, but for the table's height.
+/// Perception that knows the truth, except the table's height.
 struct Told<F> {
     finder: F,
     lower_m: f64,
@@ -98,12 +98,12 @@ pub fn config(spec: &ObjectSpec) -> GraspConfig {
     GraspConfig { load, part_radius_m, part: Some(part_shape(spec).unwrap()), ..GraspConfig::default() }
 }
 
-/// How a part was placed, and where everything is afterwards.
+/// The result of placing a part, and the final poses.
 pub struct Placing {
     pub report: sdg_robot::Result<PlacingReport>,
-    /// Where the part really lies.
+    /// The true pose of the part.
     pub base_from_object: Isometry3<f64>,
-    /// By how much any of the parts that lay already has moved, m.
+    /// Largest movement of the already placed parts, m.
     pub moved_m: f64,
 }
 
@@ -112,7 +112,7 @@ pub fn place(cell: Workcell, at: Where, goal: &PlaceGoal, config: &GraspConfig, 
     let limits = Workcell::safety_limits();
     let lying: Vec<Isometry3<f64>> =
         cell.config().scene.instances.iter().map(|instance| instance.base_from_object).collect();
-    // What lies in the scene is known, too.
+    // The parts in the scene are known, too.
     let known = |instance: &PlacedObject| LyingPart {
         base_from_part: marked_grasp(&instance.spec, &instance.base_from_object).base_from_tcp,
         shape: part_shape(&instance.spec).unwrap(),
@@ -130,8 +130,8 @@ pub fn place(cell: Workcell, at: Where, goal: &PlaceGoal, config: &GraspConfig, 
     }
 }
 
-/// Grasps the part of a cell on a table that is told lower than it is; softly or in joint positions. With the largest vertical force on the
-/// hand until it closed, N, where that is known.
+/// Grasps the part of a cell from a table whose given height is too low; compliantly or in joint positions. Also
+/// returns the largest vertical force on the hand until it closed, N, if it is known.
 pub fn grasp_on_other_table(
     cell: Workcell,
     at: Where,
@@ -198,7 +198,7 @@ impl<A: CompliantArm> Sequence for With<'_, A> {
     }
 }
 
-/// Runs something with a cell's arm, here or over the network; the cell as it is afterwards.
+/// Runs a function with a cell's arm, here or over the network; returns the final state of the cell.
 fn run<T>(
     mut cell: Workcell,
     at: Where,
@@ -236,7 +236,7 @@ fn serve(cell: &Workcell) -> (Server, SharedPositions) {
     (Server::start(plant, &config).unwrap(), positions)
 }
 
-/// How far a part really lies beside its goal: m and rad, without turns that cannot be seen.
+/// The true offset of a part from its goal: m and rad, up to its symmetry.
 pub fn beside(spec: &ObjectSpec, base_from_object: &Isometry3<f64>, goal: &PlaceGoal) -> (f64, f64) {
     let error = spec.grasp_error(base_from_object, &goal.base_from_part(0.0, 0.0));
     (error.distance_m, error.angle_rad)

@@ -1,4 +1,4 @@
-//! The batches of a detector: samples resized for the network, with the truth about each.
+//! The batches of a detector: samples resized for the network, with their truth.
 
 use sdg_demonstration::{Sample, SampleObject};
 use sdg_detection::config::{ImageTransformConfig, ResizeRule};
@@ -8,30 +8,30 @@ use sdg_geometry::Polygon;
 use crate::error::TrainingError;
 use crate::prefetch::BatchRequest;
 
-/// Where samples come from: each a function of its index alone.
+/// The source of samples: each a function of its index alone.
 #[derive(Clone, Copy)]
 pub struct SampleSource<'a> {
-    /// Whole frames, as the detector will see them.
+    /// Whole frames, as in detection.
     pub frames: &'a (dyn Fn(u64) -> Sample + Sync),
-    /// Windows of frames at the same scale, with most of the part in each; see [`crate::WindowPhase`].
+    /// Windows of frames at the same scale, each with most of the part; see [`crate::WindowPhase`].
     pub windows: &'a (dyn Fn(u64) -> Sample + Sync),
 }
 
-/// What the samples of a step are.
+/// The kind of samples of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum View {
     Frame,
     Window,
 }
 
-/// How many samples a step learns from, and of what view.
+/// The number of samples of a step, and their view.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct BatchKind {
     pub(crate) view: View,
     pub(crate) size: usize,
 }
 
-/// The images of one step and what is in them.
+/// The images of one step and their truth.
 pub(crate) struct Batch {
     pub(crate) images: Vec<TransformedImage>,
     pub(crate) targets: Vec<Target>,
@@ -52,7 +52,7 @@ pub(super) fn prepare(
         };
         let transform = match view {
             View::Frame => ImageTransform::new(transform),
-            // A window has its scale already: it is not enlarged to the size of a frame.
+            // A window already has its scale: it is not enlarged to the size of a frame.
             View::Window => ImageTransform::new(&ImageTransformConfig {
                 resize: ResizeRule::FitWithin { width_px: sample.image.width(), height_px: sample.image.height() },
                 ..transform.clone()
@@ -64,7 +64,7 @@ pub(super) fn prepare(
     Ok(batch)
 }
 
-/// The first windows of a source and what is in them.
+/// The first windows of a source and their truth.
 ///
 /// # Errors
 /// A window that the network refuses.
@@ -88,7 +88,7 @@ fn target(sample: &Sample) -> Target {
     }
 }
 
-/// The outline, or the box where none was drawn.
+/// The outline, or the box if none was drawn.
 fn outline(object: &SampleObject) -> Polygon {
     object.outline.clone().unwrap_or_else(|| Polygon::from_box(&object.bbox))
 }

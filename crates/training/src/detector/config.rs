@@ -12,66 +12,67 @@ use crate::schedule::OneCycle;
 /// How a detector is trained.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TrainingConfig {
-    /// Optimiser steps, unless early stop or the time budget ends the run before.
+    /// Optimiser steps, unless early stop or the time budget ends the run earlier.
     pub steps: usize,
-    /// Images a step.
+    /// Images per step.
     pub batch_size: usize,
     /// The first part of the run, on windows of frames; `None` for whole frames from the start.
     pub windows: Option<WindowPhase>,
-    /// What the gradients are made into.
+    /// The optimiser.
     pub optimizer: Optimizer,
     /// Learning rate over the run.
     pub schedule: OneCycle,
     /// Weight decay; decoupled from the gradients in AdamW.
     pub weight_decay: f64,
-    /// The gradient's norm is cut to this.
+    /// Maximum norm of the gradient; larger gradients are scaled down.
     pub max_gradient_norm: f32,
-    /// When and on how much to validate.
+    /// When and on how many samples to validate.
     pub validation: ValidationConfig,
     /// When a run is good enough to end before its last step.
     pub early_stop: Option<EarlyStop>,
-    /// Wall-clock time for the whole run. The learning rate then follows whichever is further on, steps or time, so
-    /// that a run cut short still ends with a low one. Runs that it cuts short depend on the machine's speed.
+    /// Wall-clock time for the whole run. The learning rate then follows the larger progress of steps and time, so
+    /// that a shortened run also ends with a low one. Runs shortened by it depend on the machine's speed.
     pub time_budget: Option<Duration>,
-    /// Decides the samples, their order and every random choice of the losses.
+    /// Seed of the samples, their order and every random choice of the losses.
     pub seed: u64,
 }
 
-/// The part of a run that learns from windows: small pictures just around the part, at the scale of whole frames.
+/// The part of a run that learns from windows: small pictures around the part, at the scale of whole frames.
 ///
-/// The detector is convolutional, so what it learns in a window holds in the frame, and a window costs a fraction of
-/// one: in the same time it sees several times as many turns, lights and tables. The frames at the end teach what lies
-/// far from any part. (Rod end, 120 steps: 21 of 35 held-back parts found with windows, none with frames.)
+/// The detector is convolutional, so that features learnt in a window are valid in the frame, and a window takes a
+/// fraction of a frame's time: in the same time it sees several times as many turns, lights and tables. The frames at
+/// the end teach the areas far from any part. (Rod end, 120 steps: 21 of 35 held-back parts found with windows, none
+/// with frames.)
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct WindowPhase {
     /// Share of the run, in [0, 1).
     pub share: f64,
-    /// Windows a step.
+    /// Windows per step.
     pub batch_size: usize,
 }
 
-/// When and on how much to validate.
+/// When and on how many samples to validate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ValidationConfig {
     /// Steps between validations.
     pub every: usize,
-    /// No validation before this step: the network has not learnt to say anything yet.
+    /// No validation before this step, because the network's output is not useful yet.
     pub first: usize,
     /// Held-back samples, with and without the part.
     pub samples: usize,
 }
 
-/// What is good enough. When a validation reaches it, the learning rate is brought down within `cool_down` steps and
-/// the run ends.
+/// The criteria for early stop. When a validation meets them, the learning rate is reduced within `cool_down` steps
+/// and the run ends.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct EarlyStop {
-    /// Share of parts found near enough to grasp.
+    /// Share of parts found close enough for a grasp.
     pub hit_rate: f64,
     /// Median error, in demonstration pixels.
     pub median_error_px: f64,
     /// Median error, in degrees.
     pub median_error_degrees: f64,
-    /// False alarms over negatives; their number is rounded up, since of five negatives one says little.
+    /// False alarms over negatives; their number is rounded up, since one of five negatives is weak evidence.
     pub false_alarm_rate: f64,
     /// Steps from the validation that was good enough to the end.
     pub cool_down: usize,
@@ -88,7 +89,8 @@ impl EarlyStop {
 }
 
 impl TrainingConfig {
-    /// The default for the `edge` network from nothing on two cores: one and a half to three minutes from one photo.
+    /// The default for the `edge` network from random values on two cores: one and a half to three minutes from one
+    /// photo.
     pub fn edge(seed: u64) -> Self {
         Self {
             steps: 300,
@@ -111,7 +113,7 @@ impl TrainingConfig {
         }
     }
 
-    /// Refuses settings that no run can have.
+    /// Refuses invalid settings.
     pub(crate) fn check(&self) -> Result<(), TrainingError> {
         let refuse = |setting, expected, found: String| Err(TrainingError::BadSetting { setting, expected, found });
         if self.steps == 0 {

@@ -1,4 +1,4 @@
-//! Teaching a detector: from samples to the best of the validated checkpoints.
+//! Training a detector: from samples to the best of the validated checkpoints.
 
 mod batch;
 mod config;

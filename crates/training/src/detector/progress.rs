@@ -19,15 +19,15 @@ pub struct LossValues {
     pub cls: f64,
     /// Deltas of proposals.
     pub box_reg: f64,
-    /// Places of keypoints; zero for a detector without.
+    /// Positions of keypoints; zero for a detector without keypoints.
     pub keypoint: f64,
-    /// Masks; zero for a detector without.
+    /// Masks; zero for a detector without masks.
     #[serde(default)]
     pub mask: f64,
 }
 
 impl LossValues {
-    /// Their sum: what the step descends.
+    /// Their sum, which is minimised.
     pub fn total(&self) -> f64 {
         self.rpn_cls + self.rpn_loc + self.cls + self.box_reg + self.keypoint + self.mask
     }
@@ -42,7 +42,7 @@ impl LossFigures for LossValues {
 }
 
 impl From<&Losses> for LossValues {
-    /// Reads the losses, which waits for the device.
+    /// Reads the losses, waiting for the device.
     fn from(losses: &Losses) -> Self {
         let value = |loss: &Tensor<1>| f64::from(loss.clone().into_scalar::<f32>());
         Self {
@@ -61,7 +61,7 @@ impl From<&Losses> for LossValues {
 pub struct StepRecord {
     /// From zero.
     pub step: usize,
-    /// Samples that it learnt from.
+    /// Number of its samples.
     pub samples: usize,
     /// Learning rate of this step.
     pub learning_rate: f64,
@@ -76,7 +76,7 @@ pub struct ValidationRecord {
     pub steps_done: usize,
     /// Since the start of the run.
     pub elapsed_secs: f64,
-    /// What the validation measured.
+    /// The validation's measurements.
     pub validation: Validation,
 }
 
@@ -87,7 +87,7 @@ pub enum TrainingEvent {
     Step {
         /// The step.
         record: StepRecord,
-        /// Steps that the run will have, as known now.
+        /// Number of steps of the run, as known now.
         planned_steps: usize,
         /// Since the start of the run.
         elapsed_secs: f64,
@@ -96,16 +96,16 @@ pub enum TrainingEvent {
     Validated(ValidationRecord),
 }
 
-/// The whole run in figures.
+/// The figures of a whole run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct History {
     /// Every step.
     pub steps: Vec<StepRecord>,
     /// Every validation.
     pub validations: Vec<ValidationRecord>,
-    /// The validation of the detector that was kept.
+    /// The validation of the kept detector.
     pub best: ValidationRecord,
-    /// Why it ended.
+    /// The reason for its end.
     pub ending: Ending,
     /// Wall-clock time of the run.
     pub elapsed_secs: f64,

@@ -1,4 +1,4 @@
-//! The detector's run: samples to losses, the best of the validated checkpoints.
+//! The detector's run: from samples to losses to the best of the validated checkpoints.
 
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -27,10 +27,11 @@ pub struct Trained {
 /// Trains `detector` on the samples that `source` gives by their index.
 ///
 /// `examine` runs the present detector on the held-back samples and returns the outcome of each; `observe` gets
-/// every step and every validation and may end the run, which then keeps the best checkpoint so far.
+/// every step and every validation and may stop the run, which then keeps the best checkpoint so far.
 ///
 /// # Errors
-/// A bad setting, a loss that is not finite, a network that refuses a batch, or an end before the first validation.
+/// An invalid setting, a loss that is not finite, a batch that the network refuses, or an end before the first
+/// validation.
 pub fn train(
     detector: GeneralizedRcnn,
     config: &TrainingConfig,
@@ -109,7 +110,7 @@ impl Task for DetectorTask<'_> {
         let validation = Validation::from_outcomes(&(self.examine)(&detector)?);
         let record = ValidationRecord { steps_done, elapsed_secs: start.elapsed().as_secs_f64(), validation };
         self.validations.push(record);
-        // Of equals the later one: its learning rate was lower.
+        // Of equal validations the later one: its learning rate was lower.
         if self.best.as_ref().is_none_or(|(_, best)| validation.merit() >= best.validation.merit()) {
             self.best = Some((detector, record));
         }
@@ -119,7 +120,7 @@ impl Task for DetectorTask<'_> {
     }
 }
 
-/// A seed of its own for every step, far from those of its neighbours.
+/// A separate seed for every step, far from those of its neighbours.
 pub fn step_seed(seed: u64, step: usize) -> u64 {
     seed.wrapping_add((step as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15))
 }

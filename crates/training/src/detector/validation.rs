@@ -1,26 +1,26 @@
-//! How well a detector does on samples it was not trained on, in pixels of the demonstration and degrees.
+//! The accuracy of a detector on samples on which it was not trained, in pixels of the demonstration and degrees.
 //!
-//! A pixel error says little when the training image is half the photo's size, so errors are given in pixels **of the
-//! demonstration**: there, millimetres a pixel are a constant of the camera's height.
+//! A pixel error is ambiguous when the training image is half the photo's size, so that errors are given in pixels
+//! **of the demonstration**: there, the millimetres per pixel depend only on the camera's height.
 
 use sdg_geometry::{Angle, PlanarGrasp, median, percentile};
 use serde::{Deserialize, Serialize};
 
-/// A detection farther from the truth than this is not the part, in demonstration pixels. With the paper's camera (550 px
-/// focal length, 0.6 m above the table) that is 10 mm; with others it is another length.
+/// A detection farther from the truth than this is not the part, in demonstration pixels. With the paper's camera (550
+/// px focal length, 0.6 m above the table) that is 10 mm; with other cameras it is another length.
 pub const HIT_PX: f64 = 9.2;
 /// Largest error of the angle of a hit, in degrees.
 pub const HIT_DEGREES: f64 = 10.0;
-/// False alarms are counted at the score that so many percent of the hits do not exceed: a score means nothing before it is
-/// calibrated, and the calibrated threshold refuses about as many.
+/// False alarms are counted at the score that this percentage of the hits do not exceed: a score has no meaning before
+/// it is calibrated, and the calibrated threshold refuses about as many.
 const REFUSED_PERCENT: f64 = 10.0;
-/// The score from which they are counted where nothing was hit.
+/// The score from which they are counted if there was no hit.
 const NO_HIT_SCORE: f64 = 0.5;
 
-/// What the detector said of one held-back sample.
+/// The detector's result for one held-back sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Outcome {
-    /// The part was there and was detected.
+    /// The part was present and was detected.
     Found {
         /// Distance between the grasp's centre and the truth, in demonstration pixels.
         error_px: f64,
@@ -29,9 +29,9 @@ pub enum Outcome {
         /// The detector's score.
         score: f64,
     },
-    /// The part was there and was not detected.
+    /// The part was present and was not detected.
     Missed,
-    /// The part was not there; the score of the best detection all the same, zero for none.
+    /// The part was absent; the score of the best detection, zero for none.
     Absent {
         /// The detector's score.
         score: f64,
@@ -48,7 +48,7 @@ impl Outcome {
         }
     }
 
-    /// Whether a found part is near enough to the truth to grasp.
+    /// Whether a found part is close enough to the truth for a grasp.
     pub fn is_hit(&self) -> bool {
         matches!(self, Self::Found { error_px, error_degrees, .. }
             if *error_px <= HIT_PX && *error_degrees <= HIT_DEGREES)
@@ -60,7 +60,7 @@ impl Outcome {
 pub struct Validation {
     /// Samples with the part.
     pub positives: usize,
-    /// Of those, found within [`HIT_PX`] and [`HIT_DEGREES`].
+    /// Number of these found within [`HIT_PX`] and [`HIT_DEGREES`].
     pub hits: usize,
     /// Median error of all found, in demonstration pixels; infinite when nothing was found.
     pub median_error_px: f64,
@@ -68,12 +68,12 @@ pub struct Validation {
     pub median_error_degrees: f64,
     /// Samples without the part.
     pub negatives: usize,
-    /// Of those, with a detection scored as high as nine in ten hits.
+    /// Number of these with a detection scored as high as nine in ten hits.
     pub false_alarms: usize,
 }
 
 impl Validation {
-    /// Sums up outcomes.
+    /// Summarises outcomes.
     pub fn from_outcomes(outcomes: &[Outcome]) -> Self {
         let (mut errors_px, mut errors_degrees) = (Vec::new(), Vec::new());
         let hit_scores = outcomes.iter().filter_map(|outcome| match outcome {
@@ -109,14 +109,14 @@ impl Validation {
         made
     }
 
-    /// Share of the parts found near enough to grasp, in `[0, 1]`; zero without positives.
+    /// Share of the parts found close enough for a grasp, in `[0, 1]`; zero without positives.
     pub fn hit_rate(&self) -> f64 {
         if self.positives == 0 { 0.0 } else { self.hits as f64 / self.positives as f64 }
     }
 
-    /// One figure to compare checkpoints by, higher is better: hits, less imprecision, less a little for false alarms,
-    /// which the demonstration refuses later anyway. (With more weight on them, networks of a third of the run were
-    /// kept, whose scores were all low.)
+    /// One figure for comparing checkpoints, higher is better: hits, minus imprecision, minus a small penalty for
+    /// false alarms, which the demonstration refuses later anyway. (With a larger penalty, networks from a third of
+    /// the run were kept, whose scores were all low.)
     pub fn merit(&self) -> f64 {
         let false_alarm_rate = self.false_alarms as f64 / self.negatives.max(1) as f64;
         let imprecision = (self.median_error_px / HIT_PX).min(1.0) + (self.median_error_degrees / HIT_DEGREES).min(1.0);

@@ -17,7 +17,7 @@ pub struct AugmentedCrops {
     seed: u64,
 }
 
-/// Streams of one seed that never meet.
+/// Separate streams of one seed.
 #[derive(Clone, Copy)]
 enum Stream {
     Training = 0x6f72_6965,
@@ -25,7 +25,7 @@ enum Stream {
 }
 
 impl AugmentedCrops {
-    /// Prepares the demonstrations for crops of `size_px` pixels a side.
+    /// Prepares the demonstrations for crops of `size_px` pixels per side.
     ///
     /// # Errors
     /// No demonstration, or one that lacks a grasp line or does not lie on its image.
@@ -42,7 +42,7 @@ impl AugmentedCrops {
         Ok(Self { augmenter, style: style.clone(), size_px, seed })
     }
 
-    /// The crops of a scene of the training stream; none where the part is not to be seen.
+    /// The crops of a scene of the training stream; none if the part is not visible.
     pub fn scene(&self, scene_idx: u64) -> Vec<LabelledCrop> {
         let scene_idx = self.style.distinct_scenes.map_or(scene_idx, |distinct| scene_idx % distinct);
         let mut rng = self.rng(Stream::Training, scene_idx);
@@ -50,7 +50,7 @@ impl AugmentedCrops {
         (0..self.style.crops_per_scene).filter_map(|_| self.crop(&sample, &mut rng)).collect()
     }
 
-    /// A crop of a scene that [`scene`](Self::scene) never shows; `None` where the part is not to be seen.
+    /// A crop of a scene that [`scene`](Self::scene) never returns; `None` if the part is not visible.
     pub fn held_out(&self, scene_idx: u64) -> Option<LabelledCrop> {
         self.crop(&self.augmenter.held_out(scene_idx), &mut self.rng(Stream::HeldOut, scene_idx))
     }
@@ -77,7 +77,7 @@ mod tests {
     use sdg_demonstration::Annotation;
     use sdg_geometry::{BoundingBox, GraspLine, Polygon};
 
-    /// Between the marked line and the one measured on a small, noisy crop.
+    /// Tolerance between the marked line and the one measured on a small, noisy crop.
     const DIRECTION_TOLERANCE_DEGREES: f64 = 8.0;
 
     /// A bar from red to green on dark grey, its grasp line from the red end to the green one.
@@ -97,7 +97,7 @@ mod tests {
         Demonstration { image, annotation }
     }
 
-    /// From the mean place of what is red to that of what is green.
+    /// From the mean position of the red pixels to that of the green ones.
     fn measured_direction(crop: &RgbImage) -> Angle {
         let center = |wanted: usize, other: usize| {
             let (mut x_sum, mut y_sum, mut weight_sum) = (0.0, 0.0, 0.0);
@@ -117,7 +117,7 @@ mod tests {
     #[test]
     fn the_label_is_what_the_crop_shows() {
         let mut style = OrientationTraining::edge(1).crops;
-        // Only the part on its own table: no other red or green about.
+        // Only the part on its own table: no other red or green in the picture.
         if let sdg_demonstration::AugmentationStyle::Scenes(scenes) = &mut style.augmentation.style {
             scenes.photo_background_share = 1.0;
             scenes.max_distractors = 1;
@@ -130,7 +130,7 @@ mod tests {
             .map(|one| measured_direction(&one.crop).distance(one.angle).to_degrees())
             .collect();
         assert_eq!(errors.len(), 48);
-        // A distractor may be red, too, or a cast may hide the colours: not in most scenes.
+        // A distractor may be red, too, or a colour cast may hide the colours, but not in most scenes.
         errors.sort_by(f64::total_cmp);
         assert!(errors[36] < DIRECTION_TOLERANCE_DEGREES, "{errors:?}");
     }

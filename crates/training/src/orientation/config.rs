@@ -12,47 +12,47 @@ use crate::schedule::OneCycle;
 /// How the orientation CNN is trained.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OrientationTraining {
-    /// Optimiser steps, unless early stop or the time budget ends the run before.
+    /// Optimiser steps, unless early stop or the time budget ends the run earlier.
     pub steps: usize,
-    /// Crops a step.
+    /// Crops per step.
     pub batch_size: usize,
     /// Learning rate over the run.
     pub schedule: OneCycle,
     /// AdamW's decoupled weight decay.
     pub weight_decay: f64,
-    /// The gradient's norm is cut to this.
+    /// Maximum norm of the gradient; larger gradients are scaled down.
     pub max_gradient_norm: f32,
-    /// What the network is to answer for an angle.
+    /// The network's target for an angle.
     pub labels: Labels,
-    /// Where crops come from.
+    /// The source of crops.
     pub crops: CropStyle,
-    /// Held-back crops that a validation looks at.
+    /// Number of held-back crops of a validation.
     pub validation_crops: usize,
     /// When a run is good enough to end before its last step.
     pub early_stop: Option<EarlyStop>,
     /// Wall-clock time for the whole run; see [`crate::TrainingConfig::time_budget`].
     pub time_budget: Option<Duration>,
-    /// Decides the crops and their order.
+    /// Seed of the crops and their order.
     pub seed: u64,
 }
 
-/// Where crops come from.
+/// The source of crops.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CropStyle {
-    /// The scenes. Every scene needs the part.
+    /// The scenes. Every scene must contain the part.
     pub augmentation: AugmentationConfig,
     /// Crops of each scene; divides the batch size.
     pub crops_per_scene: usize,
-    /// Whether windows are turned at random. Needs an outline: without one windows stay straight.
+    /// Whether windows are turned at random. Needs an outline; without one windows are not turned.
     pub turned: bool,
-    /// How far boxes are off.
+    /// The errors of boxes.
     pub jitter: BoxJitter,
-    /// Scenes before the first comes round again; `None` for new ones for ever.
+    /// Number of scenes before they repeat; `None` for unlimited new ones.
     pub distinct_scenes: Option<u64>,
 }
 
-/// What is good enough. When a validation reaches it, the learning rate is brought down within `cool_down` steps and
-/// the run ends.
+/// The criteria for early stop. When a validation meets them, the learning rate is reduced within `cool_down` steps
+/// and the run ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EarlyStop {
     /// Steps between validations.
@@ -101,7 +101,7 @@ impl OrientationTraining {
     /// The paper's: 5000 crops, batch 32, 15 epochs, categorical cross-entropy on whole degrees.
     ///
     /// # Source
-    /// Paper, section IV-A and Table II; optimiser and learning rate are not given and are ours.
+    /// Paper, section IV-A and Table II; optimiser and learning rate are not given there and are our choice.
     pub fn paper(seed: u64) -> Self {
         const CROPS: usize = 5000;
         const EPOCHS: usize = 15;
@@ -123,7 +123,7 @@ impl OrientationTraining {
         }
     }
 
-    /// Refuses settings that no run can have.
+    /// Refuses invalid settings.
     pub(super) fn validate(&self) -> Result<(), OrientationError> {
         check_setting(self.steps > 0, "steps", "at least 1", self.steps)?;
         check_setting(

@@ -4,14 +4,14 @@ use rand::Rng;
 use sdg_geometry::BoundingBox;
 use sdg_orientation::{OrientationError, check_setting};
 
-/// How far a box may be off, uniformly drawn for each axis.
+/// The error range of a box, uniformly distributed for each axis.
 ///
-/// 6 % of position and 12 % of size on both axes overlap the truth by 0.65 and more.
+/// With 6 % of position and 12 % of size on both axes, the overlap with the truth is at least 0.65.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BoxJitter {
-    /// Greatest shift of the centre, as a share of the box's width and height.
+    /// Largest shift of the centre, as a share of the box's width and height.
     pub position: f64,
-    /// Greatest change of width and height: factors between e^-size and e^size.
+    /// Largest change of width and height: factors between e^-size and e^size.
     pub size: f64,
 }
 

@@ -1,4 +1,4 @@
-//! A crop whose angle is known: what the orientation CNN learns from and is measured on.
+//! A crop with a known angle, for training and measuring the orientation CNN.
 
 use image::RgbImage;
 use nalgebra::{Point2, Rotation2};
@@ -19,8 +19,8 @@ pub struct LabelledCrop {
 }
 
 impl LabelledCrop {
-    /// The crop of an object by a window turned by `turn`, around a box that is a little off; `None` where the object is not
-    /// to be seen. Windows are turned about objects with an outline alone.
+    /// The crop of an object by a window turned by `turn`, around a box with a small error; `None` if the object is not
+    /// visible. Windows are turned only about objects with an outline.
     pub fn of(
         object: &SampleObject,
         image: &RgbImage,
@@ -43,12 +43,12 @@ fn image_from_turned(turn: Angle) -> Rotation2<f64> {
     Rotation2::new(turn.radians())
 }
 
-/// The part's tight box as it would be on the image turned back by `turn`; `None` without extent.
+/// The part's tight box in the image turned back by `turn`; `None` without extent.
 fn box_in_turned_frame(object: &SampleObject, turn: Angle, image: &RgbImage) -> Option<BoundingBox> {
     let Some(outline) = object.outline.as_ref().filter(|_| turn != Angle::ZERO) else {
         return Some(object.bbox);
     };
-    // Nothing is seen beyond the image's border.
+    // Nothing is visible beyond the image's border.
     let seen = outline.clip(f64::from(image.width()), f64::from(image.height()));
     let turned_from_image = image_from_turned(turn).inverse();
     BoundingBox::around(seen.vertices.iter().map(|vertex: &Point2<f64>| turned_from_image * vertex))

@@ -1,11 +1,11 @@
-//! How far angles are off.
+//! Errors of angles.
 
 use sdg_geometry::median;
 use sdg_orientation::{OrientationCnn, OrientationError};
 
 use super::labelled_crop::LabelledCrop;
 
-/// An angle farther from the truth than this spoils the grasp.
+/// Largest angle error of a good grasp.
 pub const HIT_DEGREES: f64 = 10.0;
 
 /// Errors of a network on some crops, in degrees, within the part's symmetry.
@@ -21,7 +21,7 @@ impl AngleErrors {
         Self { sorted: degrees }
     }
 
-    /// Shows the network crops whose truth is known.
+    /// Evaluates the network on crops with known truth.
     ///
     /// # Errors
     /// A crop of another size than the network's input.
@@ -36,7 +36,7 @@ impl AngleErrors {
         Ok(Self::new(crops.into_iter().map(error).collect::<Result<_, _>>()?))
     }
 
-    /// How many crops.
+    /// Number of crops.
     pub fn count(&self) -> usize {
         self.sorted.len()
     }

@@ -1,7 +1,7 @@
-//! What teaching starts from, instead of from nothing: a trunk that was pretrained, and what makes the angle classes of a
-//! part's own crops.
+//! Pretrained initial parameters for training: a trunk, and a network that computes the angle classes from a part's own
+//! crops.
 //!
-//! Every class is scored by the mean of the features of the crops near its angle, see [`ClassImprint`].
+//! The score of every class uses the mean of the features of the crops near its angle, see [`ClassImprint`].
 
 use burn::module::Module;
 use burn::tensor::{Tensor, TensorData};
@@ -14,23 +14,23 @@ use sdg_orientation::{Labels, OrientationCnn, crop_batch};
 use super::labelled_crop::LabelledCrop;
 use crate::error::TrainingError;
 
-/// Crops near a class, in classes: the standard deviation of the bell by which they count.
+/// The standard deviation, in classes, of the bell by which crops near a class are weighted.
 const BELL: Labels = Labels::VonMises { sigma_classes: 4.0 };
 
-/// Crops that go through the network at a time.
+/// Number of crops evaluated at a time.
 const BATCH: usize = 64;
 
 /// Parameters by their names.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct OrientationStart {
-    /// The network's, but for its classes.
+    /// The network's, except its classes.
     pub parameters: StateDict,
     /// Parameters of the [`ClassImprint`], by their names.
     pub imprint: StateDict,
 }
 
 impl OrientationStart {
-    /// The network with these parameters, and classes made from a part's crops.
+    /// The network with these parameters, and classes computed from a part's crops.
     ///
     /// # Errors
     /// [`TrainingError::Start`] for parameters of another network.
@@ -119,7 +119,7 @@ mod tests {
 
     #[test]
     fn classes_of_crops_read_the_angle_before_anything_is_taught() {
-        // Even features that nobody taught differ from turn to turn.
+        // Even features of an untrained network differ from turn to turn.
         let crops: Vec<LabelledCrop> = (0..240).map(|i| crop(1.5 * f64::from(i))).collect();
         let fresh = config().init(&burn::tensor::Device::flex(), 9).unwrap();
         let untaught = fresh.predict(&crops[10].crop).unwrap();

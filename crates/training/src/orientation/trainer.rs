@@ -1,4 +1,4 @@
-//! The orientation CNN's run: crops to cross-entropy.
+//! The orientation CNN's run: from crops to cross-entropy.
 
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -20,7 +20,7 @@ use crate::pace::Ending;
 use crate::prefetch::{BatchRequest, Batches, with_batches};
 use crate::run::{LossFigures, RunSettings, Step, Task, Validated, ValidationSteps, run};
 
-/// What happens during a run.
+/// Events of a run.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum OrientationEvent {
@@ -28,14 +28,14 @@ pub enum OrientationEvent {
     Step {
         /// From zero.
         step: usize,
-        /// Steps that the run will have, as known now.
+        /// Number of steps of the run, as known now.
         planned_steps: usize,
-        /// Cross-entropy before the update, in nats a crop.
+        /// Cross-entropy before the update, in nats per crop.
         loss: f64,
         /// Since the start of the run.
         elapsed_secs: f64,
     },
-    /// The network was shown the held-back crops.
+    /// The network was evaluated on the held-back crops.
     Validated {
         /// Steps done before.
         steps_done: usize,
@@ -46,31 +46,31 @@ pub enum OrientationEvent {
     },
 }
 
-/// A taught network, without gradients, and the run that made it.
+/// A trained network, without gradients, and the run that made it.
 #[derive(Debug, Clone)]
 pub struct TrainedOrientation {
     /// The network after the last step.
     pub network: OrientationCnn,
-    /// How far it is off on held-back crops.
+    /// Its errors on held-back crops.
     pub errors: AngleErrors,
     /// Steps made.
     pub steps: usize,
-    /// Why the run ended.
+    /// The reason for the run's end.
     pub ending: Ending,
-    /// How long it took, validation included.
+    /// Its duration, validation included.
     pub elapsed_secs: f64,
 }
 
-/// Crops that classes are made from where a network starts from pretrained parameters.
+/// Number of crops from which classes are computed if a network starts from pretrained parameters.
 const NUM_CLASS_CROPS: usize = 960;
 
-/// Teaches a network from demonstrations, from nothing or from pretrained parameters.
+/// Trains a network from demonstrations, from random values or from pretrained parameters.
 ///
-/// `observe` is called after every step and every validation and may end the run; the network is then returned as it is, and
-/// its errors say whether it is of any use.
+/// `observe` is called after every step and every validation and may stop the run; the network is then returned as it
+/// is, and its errors show whether it is useful.
 ///
 /// # Errors
-/// A setting that cannot be, a demonstration without a grasp line, a loss that is not finite.
+/// An invalid setting, a demonstration without a grasp line, a loss that is not finite.
 pub fn teach(
     demonstrations: &[Demonstration],
     network: &OrientationConfig,
@@ -114,7 +114,7 @@ pub fn train(
         schedule: training.schedule,
         validations: training.early_stop.map(|stop| ValidationSteps { first: stop.every, every: stop.every }),
     };
-    // A scene gives as many crops as show the part, so that a batch depends on those before.
+    // The number of crops of a scene depends on the part's visibility, so that a batch depends on those before.
     let mut crops = (0..).flat_map(scene);
     let prepare = |_: BatchRequest<()>| Ok(crops.by_ref().take(training.batch_size).collect());
     with_batches(prepare, |batches| {
@@ -122,7 +122,7 @@ pub fn train(
         let ended = run(&mut task, network, optimizer, &settings, start)?;
         let errors = match task.last.take() {
             Some((steps_done, errors)) if steps_done == ended.steps => errors,
-            // Interrupted: whether the network is of any use is not known yet.
+            // Interrupted: whether the network is useful is not known yet.
             _ => task.measure(&ended.network, ended.steps, start)?.0,
         };
         let elapsed_secs = start.elapsed().as_secs_f64();
@@ -159,7 +159,7 @@ impl OrientationTask<'_> {
     }
 }
 
-/// Cross-entropy, in nats a crop.
+/// Cross-entropy, in nats per crop.
 #[derive(Clone, Copy)]
 struct CrossEntropy(f64);
 

@@ -46,7 +46,7 @@ unsafe fn filter_line_adjoint<L: Lanes>(u: [L; 6]) -> [L; 3] {
 /// `G g Gᵀ` of a panel of weights `[channels, 9, 32]`, rows `width` floats long, to `target` at every frequency.
 ///
 /// # Safety
-/// `target` is good for `channels · width` floats at each frequency, which stand `step` apart.
+/// `target` has room for `channels · width` floats at each frequency, which are `step` apart.
 pub(super) unsafe fn filter_transform(
     isa: Isa,
     gathered: &[f32],
@@ -113,7 +113,7 @@ unsafe fn filter_lanes<L: Lanes>(
 /// `Gᵀ ū G` of sixteen filters and all channels: `[channels, 9, 16]` from `[36, channels, M]`.
 ///
 /// # Safety
-/// `source` is good for reading sixteen floats at every frequency and channel.
+/// `source` has sixteen readable floats at every frequency and channel.
 pub(super) unsafe fn filter_transform_adjoint(
     isa: Isa,
     source: *const f32,

@@ -1,4 +1,4 @@
-//! How maps are cut into tiles, and where their transformed values stand.
+//! The division of maps into tiles, and the positions of their transformed values.
 
 use crate::scratch::Scratch;
 use crate::simd::lanes::LANES;
@@ -10,7 +10,7 @@ pub(super) const INPUT_TILE: usize = 6;
 /// Products of a tile and channel.
 pub(super) const FREQUENCIES: usize = INPUT_TILE * INPUT_TILE;
 
-/// The tiles of all output maps in a row: tile t covers pixels from (4·ty, 4·tx) of image n.
+/// The tiles of all output maps in sequence: tile t covers pixels from (4·ty, 4·tx) of image n.
 #[derive(Clone, Copy)]
 pub(super) struct Tiling {
     pub(super) num_images: usize,
@@ -38,8 +38,8 @@ impl Tiling {
 
 /// Transformed values of some tiles, `[36, tiles, C]`.
 ///
-/// A line of floats stands between frequencies: without it, powers of two would put a tile's 36 values into one
-/// set of the cache.
+/// A line of floats separates frequencies: otherwise powers of two would put a tile's 36 values into one set of
+/// the cache.
 pub(super) struct Frequencies {
     pub(super) values: Scratch,
     pub(super) step: usize,

@@ -82,12 +82,12 @@ unsafe fn output_transform_adjoint_1d<L: Lanes>(y: [L; 4]) -> [L; 6] {
     }
 }
 
-// No closures below: a closure has none of the instructions that its function has switched on.
+// No closures below: a closure lacks the instructions that are enabled for its function.
 
 /// `Bᵀ d B` of the input tiles of some output tiles, zeros outside the maps: `[36, tiles, C]`.
 ///
 /// # Safety
-/// `target` is good for all tiles of every frequency, which stand `step` apart.
+/// `target` has room for all tiles of every frequency, which are `step` apart.
 pub(super) unsafe fn input_transform(
     isa: Isa,
     source: Maps<'_>,
@@ -224,7 +224,7 @@ unsafe fn output_transform_adjoint_lanes<L: Lanes>(
     }
 }
 
-/// Where a tile's pixels stand; those outside the maps keep what they have.
+/// The positions of a tile's pixels; entries outside the maps are not changed.
 #[inline(always)]
 fn point_at_pixels<const SIDE: usize>(
     pixels: &mut [[*const f32; SIDE]; SIDE],
@@ -258,7 +258,7 @@ unsafe fn store_frequencies<L: Lanes>(middle: [[L; INPUT_TILE]; INPUT_TILE], tar
     }
 }
 
-/// Where finished tiles go.
+/// The target of finished tiles.
 pub(super) struct OutputPlace<'a> {
     pub(super) tiling: Tiling,
     pub(super) size: [usize; 2],
@@ -267,10 +267,10 @@ pub(super) struct OutputPlace<'a> {
     pub(super) output: Raw,
 }
 
-/// `Aᵀ m A` and the epilogue, written to the output; `finite` becomes false where a sum is not finite.
+/// `Aᵀ m A` and the epilogue, written to the output; `finite` becomes false if a sum is not finite.
 ///
 /// # Safety
-/// Nothing else touches these tiles of the output.
+/// Nothing else accesses these tiles of the output.
 pub(super) unsafe fn output_transform(
     isa: Isa,
     products: &[f32],

@@ -1,4 +1,4 @@
-//! The weight's gradient in the frequencies: sums over tiles instead of pixels, then back to 3×3.
+//! The weight's gradient in the frequency domain: sums over tiles instead of pixels, then back to 3×3.
 
 use super::filter_transform::filter_transform_adjoint;
 use super::tiling::{FREQUENCIES, Frequencies, Tiling};
@@ -11,17 +11,17 @@ use crate::scratch::Scratch;
 use crate::simd::lanes::LANES;
 use crate::simd::{Isa, transpose};
 
-/// Most floats of a gradient in the frequencies that every chunk of tiles has for itself, 36 · 64 · 64 and some.
+/// Maximum size of a gradient in the frequency domain for which every chunk of tiles has its own sums, 36 · 64 · 64
+/// floats and some.
 const OWN_GRADIENT: usize = 160 << 10;
-/// Chunks of tiles, each summed by itself.
+/// Chunks of tiles, each summed separately.
 const CHUNKS: usize = 8;
-/// Tiles transformed before they are multiplied, where a chunk works alone.
+/// Number of tiles transformed before they are multiplied, if a chunk works alone.
 const BLOCK_TILES: usize = 96;
-/// Floats that the transformed values of a block take, where all threads work on it together: 12 MB.
+/// Floats of the transformed values of a block, if all threads work on it together: 12 MB.
 const BLOCK_FLOATS: usize = 3 << 20;
 
-/// The gradient with respect to the weight, `[Co, Ci, 3, 3]`, from maps that stand channels last; none where a sum is
-/// not finite.
+/// The gradient with respect to the weight, `[Co, Ci, 3, 3]`, from channels-last maps; none if a sum is not finite.
 pub(in crate::conv) fn weight_gradient(
     isa: Isa,
     x: Maps<'_>,
@@ -89,7 +89,7 @@ struct Sums<'a> {
 }
 
 impl Sums<'_> {
-    /// From one frequency's `[Ci, Co]` to the next.
+    /// Step from one frequency's `[Ci, Co]` to the next.
     fn step(&self) -> usize {
         self.x.channels * self.output_grad.channels
     }
@@ -97,13 +97,13 @@ impl Sums<'_> {
     /// Sums over `tiles`, a block at a time, into `[36, Ci, Co]` from `at` on.
     ///
     /// # Safety
-    /// Nothing else touches these sums.
+    /// Nothing else accesses these sums.
     unsafe fn add(&self, tiles: std::ops::Range<usize>, block: usize, at: usize, sums: Raw, shared_out: bool) {
         let (rows, columns) = (self.x.channels, self.output_grad.channels);
         let most = block.min(tiles.len());
         let mut transformed_input = Frequencies::new(most, rows);
         let mut transformed_gradient = Frequencies::new(most, columns);
-        // Rows of a product that are worked off together, so that small products are shared out too.
+        // Number of rows of a product that are processed together, so that small products are also distributed.
         let row_groups = if shared_out { (rows / 96).max(1) } else { 1 };
         let mut start = tiles.start;
         while start < tiles.end {

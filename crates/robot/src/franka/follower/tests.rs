@@ -1,4 +1,5 @@
-//! A robot that loses commands, as a Panda does: constant acceleration without them, and an end to the motion beyond a limit.
+//! A robot that loses commands, as a Panda does: constant acceleration without them, and it ends the motion beyond a
+//! limit.
 
 use super::*;
 use crate::safety::{CheckedMotion, SafetyLimits};
@@ -6,7 +7,7 @@ use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use sdg_kinematics::{JointLimits, NUM_JOINTS, Trajectory, ready_pose};
 
-/// The pace of rehearsals, the fastest that there is.
+/// The pace of rehearsals, the fastest available.
 fn motion() -> CheckedMotion {
     let end = ready_pose() + JointVector::from([0.8, 0.2, -0.3, 0.3, 0.4, -0.2, 0.9]);
     let limits = JointLimits::panda().scaled(0.6, 0.4, 0.2).unwrap();
@@ -25,7 +26,7 @@ impl SimulatedRobot {
         Self { state, max_shares: [0.0; 3] }
     }
 
-    /// A cycle with a command that came in time, or without.
+    /// A cycle with a command that arrived in time, or without one.
     fn cycle(&mut self, command: Option<&JointVector>) {
         let state = &mut self.state;
         for idx in 0..NUM_JOINTS {
@@ -50,7 +51,7 @@ impl SimulatedRobot {
     }
 }
 
-/// Plays a motion; `is_lost` says which commands do not arrive, `is_unseen` which states.
+/// Plays a motion; `is_lost` selects the commands that do not arrive, `is_unseen` the states.
 fn play(
     follower: &mut Follower<'_>,
     robot: &mut SimulatedRobot,
@@ -95,7 +96,7 @@ fn without_losses_the_commands_are_the_trajectory_itself() {
     }
     assert_eq!(follower.num_corrections(), 0);
     assert_ends_at(&robot, &motion);
-    // It ends a few cycles after its end: the robot's reference is at rest by then.
+    // It finishes a few cycles after its end, when the robot's reference is at rest.
     let num_cycles = (motion.duration_secs() / PERIOD_SECS).ceil() as u64;
     assert!((num_cycles..num_cycles + 5).contains(&robot.state.message_id), "{}", robot.state.message_id);
 }
@@ -140,13 +141,13 @@ fn a_line_that_loses_a_third_of_the_commands_keeps_to_the_limits() {
         assert!(robot.is_within_limits(), "seed {seed}: {:?}", robot.max_shares);
         assert_ends_at(&robot, &motion);
     }
-    // Where the acceleration is constant, the robot goes on as commanded, and nothing has to be corrected.
+    // At constant acceleration the robot continues as commanded, and nothing has to be corrected.
     assert!(num_corrections > 500, "{num_corrections}");
 }
 
 #[test]
 fn a_start_beside_the_trajectorys_is_led_onto_it() {
-    // As far as a motion may begin beside the controller's reference.
+    // The largest distance of a motion's start from the controller's reference.
     let motion = motion();
     let mut follower = Follower::new(Playback::new(&motion), Version::V5);
     let mut robot = SimulatedRobot::at(motion.start() + JointVector::from_element(1e-3));

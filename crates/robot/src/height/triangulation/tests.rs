@@ -44,7 +44,7 @@ fn sigma_is_that_of_the_places_over_the_baseline() {
     let [one, other] = pair(0.0, 0.0);
     let found = triangulate(&one, &other, 0.0).unwrap();
     assert!((found.sigma_m - 0.707_107e-3).abs() < 1e-8, "{found:?}");
-    // Edges that may lie 1 mm deeper or higher than the marks add theirs.
+    // Edges that may be 1 mm deeper or higher than the marks add their share.
     let found = triangulate(&one, &other, 0.001).unwrap();
     assert!((found.sigma_m - 0.707_107e-3_f64.hypot(1e-3)).abs() < 1e-8, "{found:?}");
     // A longer baseline is more exact.
@@ -56,22 +56,22 @@ fn sigma_is_that_of_the_places_over_the_baseline() {
 fn pictures_that_tell_no_height_are_refused() {
     let at = |x_m: f64, z_m: f64| shown([x_m, z_m], 0.5, 0.0, 0.0);
     let refused = |one: &Sighting, other: &Sighting| triangulate(one, other, 0.0).unwrap_err().to_string();
-    // Twice from one place, and from two that are too near.
+    // Twice from one place, and from two places that are too close.
     let why = refused(&at(0.5, 0.3), &at(0.5, 0.3));
     assert_eq!(why, "expected two pictures from places at least 80 mm apart sideways, found 0.0 mm");
     assert!(refused(&at(0.5, 0.3), &at(0.579, 0.3)).ends_with("found 79.0 mm"));
     assert!(triangulate(&at(0.46, 0.3), &at(0.541, 0.3), 0.0).is_ok());
-    // A metre above each other sideways is nothing.
+    // A vertical distance of one metre is not a sideways distance.
     assert!(refused(&at(0.5, 0.3), &at(0.5, 0.9)).contains("at least 80 mm apart"));
     // From afar lines of sight are parallel.
     assert!(refused(&at(0.45, 1.2), &at(0.55, 1.2)).starts_with("expected lines of sight whose slopes differ"));
-    // They cross a metre high, over the cameras: the camera was moved by less than the part seems to.
+    // They cross at a height of one metre, above the cameras: the camera moved less than the part appears to.
     let (mut one, mut other) = (at(0.44, 0.3), at(0.56, 0.3));
     (one.middle_m.x, other.middle_m.x) = (0.40, 0.60);
     assert!(refused(&one, &other).contains("found lines of sight that cross at"));
     // And a plane above the camera.
     assert!(refused(&shown([0.44, 0.3], 0.5, 0.0, 0.29), &at(0.56, 0.3)).contains("below the camera"));
-    // Two parts: the lines pass each other by 12 mm.
+    // Two parts: the distance of the lines is 12 mm.
     let mut beside = at(0.56, 0.3);
     beside.middle_m.y += 0.012;
     assert!(refused(&at(0.44, 0.3), &beside).contains("within 4.0 mm, found 11.9 mm: two parts"));

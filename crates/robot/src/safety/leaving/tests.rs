@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use sdg_kinematics::{ArmGeometry, CartesianLimits, IkOptions, JointLimits, LineOptions, ready_pose};
 
 const AT_M: [f64; 2] = [0.45, 0.10];
-/// The finger tips reach 4 mm below the tcp, and 1 mm is to be left: from here on the hand is lower than allowed.
+/// The finger tips extend 4 mm below the tcp, and 1 mm must remain: below this height the hand is lower than allowed.
 const LOWEST_ALLOWED_M: f64 = 0.005;
 
 fn limits() -> SafetyLimits {
@@ -31,7 +31,7 @@ fn line(start: &JointVector, to: &Isometry3<f64>) -> Trajectory {
     Trajectory::along_path(path, &JointLimits::panda(), &slow).unwrap()
 }
 
-/// Whether a straight motion from one place of the tcp to another is allowed after a way down to `lowest_m`.
+/// Whether a straight motion from one tcp position to another is allowed after a descent to `lowest_m`.
 fn check(felt: Option<&FeltBelow>, from: [f64; 3], to: [f64; 3]) -> Result<(), Violation> {
     let start = at(from[0], from[1], from[2]);
     let motion = line(&start, &tcp(to[0], to[1], to[2]));
@@ -44,7 +44,7 @@ fn the_hand_goes_straight_up_from_where_it_felt_something() {
     for lowest_m in [LOWEST_ALLOWED_M - 0.001, LOWEST_ALLOWED_M - 0.009] {
         let felt = felt(lowest_m);
         check(Some(&felt), [x, y, lowest_m], [x, y, 0.10]).unwrap();
-        // Once it is as high as allowed it may go anywhere.
+        // Once it is as high as allowed it may move anywhere.
         check(Some(&felt), [x, y, LOWEST_ALLOWED_M + 0.001], [x + 0.1, y, 0.10]).unwrap();
         let error = check(None, [x, y, lowest_m], [x, y, 0.10]).unwrap_err();
         assert!(matches!(error, Violation::Table { .. } | Violation::Workspace { .. }), "{error}");
@@ -59,12 +59,12 @@ fn neither_sideways_nor_down_nor_from_elsewhere_nor_deeper_than_was_felt() {
         let error = check(Some(&felt), [x, y, lowest_m], to).unwrap_err();
         assert!(matches!(error, Violation::Leaving { .. }), "{to:?}: {error}");
     }
-    // 7 mm beside the way down, and 3 mm deeper than was felt.
+    // 7 mm beside the descent, and 3 mm deeper than the contact.
     for from in [[x + 0.007, y, lowest_m], [x, y, lowest_m - 0.003]] {
         let error = check(Some(&felt), from, [from[0], from[1], 0.10]).unwrap_err();
         assert!(matches!(error, Violation::Table { .. } | Violation::Workspace { .. }), "{from:?}: {error}");
     }
-    // More than the way down was allowed.
+    // More than was allowed for the descent.
     let deep = FeltBelow::new(&Vector3::new(x, y, 0.03), LOWEST_ALLOWED_M - 0.020, 0.010);
     assert!(check(Some(&deep), [x, y, LOWEST_ALLOWED_M - 0.015], [x, y, 0.10]).is_err());
 }
@@ -76,7 +76,7 @@ fn a_motion_down_to_where_something_was_felt_is_refused() {
     let panda = ArmGeometry::panda();
     let up = panda.inverse(&tcp(x, y, 0.05), &start, &IkOptions::default()).unwrap().q;
     let slow = JointLimits::panda().scaled(0.1, 0.1, 0.1).unwrap();
-    // A motion down from above: its start is not below, so that nothing is lowered for it.
+    // A motion down from above: its start is not below the limits, so that nothing is lowered for it.
     let down = Trajectory::point_to_point(&up, &end, &slow).unwrap();
     let error = limits().starting_at(&up, Some(&felt(lowest_m))).check(down).unwrap_err();
     assert!(matches!(error, Violation::Table { .. } | Violation::Workspace { .. }), "{error}");

@@ -24,7 +24,7 @@ fn a_motion_within_every_limit_is_handed_on_as_it_is() {
     assert_eq!(checked.sample(0.3), trajectory.sample(0.3));
 }
 
-/// Planned for exactly the limits it passes; with any of them one percent lower it does not.
+/// Planned for exactly the limits that it satisfies; with any of them one percent lower it violates them.
 #[test]
 fn just_inside_passes_and_just_outside_is_refused() {
     let trajectory = point_to_point([0.4, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], [0.3, 0.2, 0.05]);
@@ -53,7 +53,7 @@ fn the_tcp_has_limits_of_its_own() {
     let trajectory = straight_down(0.20);
     let planned = CartesianLimits::panda().scaled(0.2, 0.1, 0.05).unwrap();
     let limits = |cartesian| SafetyLimits { cartesian, ..SafetyLimits::default() };
-    // The path is a straight line between waypoints only: differences of 1 ms see its third derivative jump.
+    // The path is a straight line only between waypoints: at differences of 1 ms its third derivative jumps.
     let mut roomy = planned;
     roomy.jerk_m_s3 = 6500.0;
     limits(roomy).check(trajectory.clone()).unwrap();
@@ -81,7 +81,7 @@ fn the_tcp_has_limits_of_its_own() {
 #[test]
 fn table_and_workspace_stop_a_motion_before_it_begins() {
     let limits = SafetyLimits::default();
-    // The finger tips reach 4 mm beyond the tcp and keep 1 mm: a tcp at 6 mm is allowed, one at 4 mm is not.
+    // The finger tips extend 4 mm beyond the tcp and must keep 1 mm: a tcp at 6 mm is allowed, one at 4 mm is not.
     limits.check(straight_down(0.006)).unwrap();
     let found = limits.check(straight_down(0.004)).unwrap_err();
     assert!(matches!(found, Violation::Table { part: "finger tips", .. }), "{found}");
@@ -124,7 +124,8 @@ fn an_fr3_may_not_do_all_that_a_panda_may() {
         let end = ready_pose() + JointVector::from(change);
         Trajectory::point_to_point(&ready_pose(), &end, &JointLimits::panda().scaled(scale, scale, 0.1).unwrap())
     };
-    // Joint 6 from 1.571 to 0.5 rad: an FR3's ends at 0.541, and must be slow before it; a Panda's ends at -0.018.
+    // Joint 6 from 1.571 to 0.5 rad: an FR3's range ends at 0.541, and it must be slow before; a Panda's ends at
+    // -0.018.
     let bent = to([0.0, 0.0, 0.0, 0.0, 0.0, -1.07, 0.0], 0.2).unwrap();
     SafetyLimits::default().check(bent.clone()).unwrap();
     let refused = SafetyLimits::fr3().check(bent).unwrap_err();
@@ -134,14 +135,14 @@ fn an_fr3_may_not_do_all_that_a_panda_may() {
     SafetyLimits::default().check(hard.clone()).unwrap();
     let refused = SafetyLimits::fr3().check(hard).unwrap_err();
     assert!(matches!(refused, Violation::Joint { quantity: "acceleration", joint: 7, .. }), "{refused}");
-    // As near to the end of joint 1 as it goes, slowly and fast.
+    // At the very end of joint 1's range, slowly and fast.
     let near_the_end = |scale| to([2.74, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], scale).unwrap();
     SafetyLimits::fr3().check(near_the_end(0.1)).unwrap();
     let refused = SafetyLimits::fr3().check(near_the_end(0.6)).unwrap_err();
     assert!(matches!(refused, Violation::Joint { quantity: "velocity", joint: 1, max, .. } if max < 2.0), "{refused}");
 }
 
-/// What the geometry says of an arm is what its robot holds its client to.
+/// The geometry of an arm has the limits that its robot applies to its client.
 #[test]
 fn geometry_and_protocol_have_the_same_limits() {
     for (limits, velocity_m_s) in [(SafetyLimits::default(), 2.0), (SafetyLimits::fr3(), 3.0)] {

@@ -1,4 +1,4 @@
-//! The sequence with an arm that moves nothing and a part that is shown in some pictures and not in others.
+//! The sequence with an arm that does not move and a part that is visible in some pictures only.
 
 use nalgebra::UnitQuaternion;
 use sdg_kinematics::{ArmGeometry, ready_pose};
@@ -14,11 +14,11 @@ use crate::safety::SafetyLimits;
 use crate::sequence::{GraspConfig, GraspOutcome, GraspReport, grasp};
 use crate::watch::Watch;
 
-/// A part whose looks say another height than it has: by its lines of sight it lies where `known` does.
+/// A part whose looks give another height than its own: by its lines of sight it lies at `known`.
 struct Shown {
     known: KnownTarget,
     seen: GraspTarget,
-    /// Which of the pictures for the height show it; the last holds for all further ones.
+    /// The pictures for the height that show it; the last entry applies to all further ones.
     shows: Vec<bool>,
     num_sights: usize,
     sees_surface: bool,
@@ -45,7 +45,7 @@ impl PartFinder<PlannedArm> for Shown {
     }
 }
 
-/// Marks 16 mm and grasp 9 mm over what the part lies on.
+/// Marks 16 mm and grasp 9 mm over the surface under the part.
 const HEIGHTS_M: [f64; 2] = [0.016, 0.009];
 
 fn tcp_from_camera() -> Isometry3<f64> {
@@ -61,14 +61,15 @@ fn config(told: Option<ToldHeight>) -> GraspConfig {
     GraspConfig { height: Some(height), ..GraspConfig::default() }
 }
 
-/// A part on something `higher_m` over the table.
+/// A part on an object `higher_m` over the table.
 fn part(higher_m: f64) -> GraspTarget {
     let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
     let base_from_tcp = Isometry3::from_parts(Vector3::new(0.5, 0.05, higher_m + HEIGHTS_M[1]).into(), down);
     GraspTarget { base_from_tcp, jaw_width_m: 0.02, score: 0.9 }
 }
 
-/// Grasps a part that lies 20 mm higher than the table and is seen 5 mm higher than it lies; the camera's places for the height.
+/// Grasps a part that lies 20 mm higher than the table and is seen 5 mm higher than that; returns the camera's
+/// positions for the height.
 fn grasped(config: &GraspConfig, shows: &[bool], sees_surface: bool) -> (GraspReport, Vec<Vector3<f64>>, usize) {
     let mut arm = PlannedArm::new(ArmGeometry::panda(), ready_pose(), 0.08);
     let mut robot = Robot::new(&mut arm, SafetyLimits::default(), Watch::default());
@@ -105,7 +106,7 @@ fn where_nothing_is_seen_of_the_surface_the_other_direction_is_tried() {
     let (report, places, num_sights) = grasped(&config(None), &[], false);
     assert_eq!((&report.outcome, num_sights, places.len()), (&GraspOutcome::Held, 4, 4));
     let measured = report.height.unwrap().measured.unwrap();
-    // By the part itself, whose relief is not known.
+    // From the part itself, whose relief is not known.
     assert!((measured.height_m - 0.036).abs() < 1e-6 && measured.sigma_m > 2e-3, "{measured:?}");
 }
 
@@ -113,12 +114,12 @@ fn where_nothing_is_seen_of_the_surface_the_other_direction_is_tried() {
 fn a_picture_that_does_not_show_the_part_is_the_reason() {
     let (report, _, num_sights) = grasped(&config(None), &[true, false], true);
     let GraspOutcome::Failed { step: GraspStep::Detect, why } = report.outcome else { panic!("{report:?}") };
-    assert!(why.ends_with("none was told: the second picture does not show the part"), "{why}");
+    assert!(why.ends_with("none was given: the second picture does not show the part"), "{why}");
     assert_eq!(num_sights, 5);
     let (report, ..) = grasped(&config(None), &[false], true);
     let GraspOutcome::Failed { why, .. } = report.outcome else { panic!("{report:?}") };
     assert!(why.ends_with("the first picture does not show the part"), "{why}");
-    // A third picture, nearer to the part, is as good as the second; and one along the marked line.
+    // A third picture, closer to the part, is as good as the second; so is one along the marked line.
     for shows in [&[true, false, true][..], &[false, true, true], &[true, false, false, true]] {
         let (report, places, num_sights) = grasped(&config(None), shows, true);
         assert_eq!((report.outcome, num_sights), (GraspOutcome::Held, shows.len()));
@@ -140,7 +141,7 @@ fn a_told_height_is_used_where_there_is_no_other_and_refused_where_it_contradict
 
     let (report, ..) = grasped(&config(told(0.030)), &[], true);
     let GraspOutcome::Failed { step: GraspStep::Detect, why } = report.outcome else { panic!("{report:?}") };
-    assert!(why.starts_with("expected marks at the told height of 30.0 ± 1.0 mm, measured 36.0"), "{why}");
+    assert!(why.starts_with("expected marks at the given height of 30.0 ± 1.0 mm, measured 36.0"), "{why}");
     let (report, ..) = grasped(&config(told(0.0355)), &[], true);
     assert_eq!(report.height.unwrap().settled.unwrap().source, HeightSource::Measured);
 }

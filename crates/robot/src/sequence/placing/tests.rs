@@ -10,7 +10,8 @@ use crate::watch::Watch;
 use sdg_kinematics::collision::{Obstacle, Shape};
 use sdg_kinematics::{ArmGeometry, ready_pose};
 
-/// A planned arm whose part slides by so much in its own frame when the hand closes on it, and stays where it is let go.
+/// A planned arm whose part slides by this distance in its own frame when the hand closes on it, and stays where it is
+/// released.
 struct Cell {
     arm: PlannedArm,
     base_from_part: Isometry3<f64>,
@@ -142,7 +143,7 @@ fn a_part_lies_where_it_was_to_lie() {
         let error = beside(&goal.base_from_part(0.02, 0.0), &cell.base_from_part, RotationalSymmetry::None);
         assert!(error.distance_m() < 1e-4 && error.angle_rad.abs() < 1e-4, "{error:?}");
         assert!((cell.base_from_part.translation.z - 0.02).abs() < 1e-4, "{}", cell.base_from_part);
-        // Told while it is held, and taken back.
+        // The load is reported while the part is held, and reset.
         assert_eq!(cell.loads_kg, [0.3, 0.0]);
     }
 }
@@ -156,7 +157,7 @@ fn a_part_that_slides_in_the_hand_is_taken_again_and_lies_right() {
     assert_eq!(report.outcome, PlacingOutcome::Placed, "{report:?}");
     assert_eq!(report.errors.len(), 2);
     assert!(report.errors[0].distance_m() > 0.004 && report.errors[1].distance_m() < 2e-4, "{report:?}");
-    // Where it is not taken again it lies beside its place, and that is said.
+    // Without another grasp it lies beside its place, which is reported.
     let mut once = super::tests::cell(slide);
     let never = PlacingConfig { max_corrections: 0, ..PlacingConfig::default() };
     let PlacingOutcome::Failed { step: GraspStep::Check, why } = run(&mut once, &config(), &goal, &never).outcome
@@ -195,7 +196,7 @@ fn a_place_out_of_reach_is_said_before_the_part_is_carried() {
     let far = Place { at_m: [0.9, -0.6], ..tray() };
     let report = run(&mut cell, &config(), &far.goal(1).unwrap(), &PlacingConfig::default());
     let PlacingOutcome::Failed { step: GraspStep::Carry, why } = &report.outcome else { panic!("{report:?}") };
-    assert!(why.contains("no way to \"tray, cell 1\"") && why.contains("out of reach"), "{why}");
+    assert!(why.contains("no path to \"tray, cell 1\"") && why.contains("out of reach"), "{why}");
 }
 
 #[test]
@@ -232,7 +233,7 @@ fn the_whole_sequence_goes_around_what_stands_in_the_cell() {
             assert!(checker.is_free(&q), "{}", model.nearest(&q));
         }
     }
-    // A place inside of it is refused with its name.
+    // A place inside an obstacle is refused with its name.
     let inside = Place { at_m: [0.5, -0.1], ..tray() };
     let report =
         run(&mut super::tests::cell(Isometry3::identity()), &surrounded, &inside.goal(1).unwrap(), &Default::default());
@@ -265,7 +266,7 @@ fn a_tray_without_room_is_refused_before_anything_moves() {
     let error = ended.unwrap_err();
     assert!(!error.latches() && error.to_string().contains("expected a pitch of 80 x 47 mm"), "{error}");
     assert!(cell.arm.actions().is_empty());
-    // Without its outline: once it was found, and before it is taken.
+    // Without its outline: after it was found, and before it is taken.
     let report = run(&mut cell, &config(), &narrow, &placing);
     let PlacingOutcome::Failed { step: GraspStep::Detect, why } = &report.outcome else { panic!("{report:?}") };
     assert!(why.contains("the part is 20 mm wide between the fingers"), "{why}");

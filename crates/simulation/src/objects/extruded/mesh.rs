@@ -1,4 +1,4 @@
-//! A polygon drawn up to a height: its spans, and its triangles as OBJ.
+//! A polygon extruded to a height: its spans, and its triangles as OBJ.
 
 use std::fmt::Write as _;
 
@@ -8,19 +8,19 @@ use nalgebra::{Point2, Point3, Vector2};
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Strip {
     pub(super) x: [f64; 2],
-    /// Low and high end at either x.
+    /// Low and high end at both x.
     pub(super) low: [f64; 2],
     pub(super) high: [f64; 2],
 }
 
-/// The spans of a polygon between neighbouring ones of `cuts`, which are sorted values of x.
+/// The spans of a polygon between neighbouring `cuts`, which are sorted values of x.
 pub(super) fn strips(corners: &[Point2<f64>], cuts: &[f64]) -> Vec<Strip> {
     let edges: Vec<_> = (0..corners.len()).map(|i| (corners[i], corners[(i + 1) % corners.len()])).collect();
     // The ends of all spans at x, from the lowest, by the edges that cross there.
     let crossing = |x: f64, at: [f64; 2]| {
         let over = |(a, b): &&(Point2<f64>, Point2<f64>)| (a.x < x) != (b.x < x);
         let y = |a: &Point2<f64>, b: &Point2<f64>, at: f64| {
-            // Beside the edge's own ends it goes on level: strips may be wider than an edge.
+            // Beyond the edge's own ends it continues level, because strips may be wider than an edge.
             a.y + (b.y - a.y) * ((at - a.x) / (b.x - a.x)).clamp(0.0, 1.0)
         };
         let mut ends: Vec<_> = edges.iter().filter(over).map(|(a, b)| (y(a, b, x), at.map(|at| y(a, b, at)))).collect();
@@ -37,8 +37,9 @@ pub(super) fn strips(corners: &[Point2<f64>], cuts: &[f64]) -> Vec<Strip> {
     found
 }
 
-/// What is seen, as OBJ: two triangles above and below each slab between neighbouring corners, two for each wall, up to `top`, in
-/// metres. `texcoord` says where the texture, counted from its lower left corner, shows a place; walls show what lies `inset_m` inside the outline.
+/// The visible body, as OBJ: two triangles above and below each slab between neighbouring corners, two for each wall,
+/// up to `top`, in metres. `texcoord` gives the texture position of a point, from the lower left corner; walls show the
+/// texture `inset_m` inside the outline.
 pub(super) fn mesh(
     corners: &[Point2<f64>],
     top: f64,
@@ -72,7 +73,7 @@ pub(super) fn mesh(
     obj.text
 }
 
-/// OBJ text that grows.
+/// OBJ text under construction.
 #[derive(Default)]
 struct Obj {
     text: String,
@@ -81,7 +82,7 @@ struct Obj {
 }
 
 impl Obj {
-    /// Two triangles; corners counter-clockwise seen from outside, each with its place in the texture.
+    /// Two triangles; corners counter-clockwise seen from outside, each with its texture position.
     fn quad(&mut self, corners: [(Point3<f64>, [f64; 2]); 4], normal: [f64; 3]) {
         for (p, [u, v]) in corners {
             let _ = write!(self.text, "v {:.6} {:.6} {:.6}\nvt {u:.6} {v:.6}\n", p.x, p.y, p.z);

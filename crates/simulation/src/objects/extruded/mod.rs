@@ -1,11 +1,11 @@
-//! A part of one's own: its outline in a photo, drawn up to its height, with the photo on top.
+//! A user's own part: its outline in a photo, extruded to its height, with the photo on top.
 //!
 //! ```text
-//! outline ─┬─ slabs between neighbouring corners ─ triangles, textured by the photo ── what is seen
-//!          └─ strips across the marked line ─ boxes ── what is touched, and what it weighs
+//! outline ─┬─ slabs between neighbouring corners ─ triangles, textured by the photo ── appearance
+//!          └─ strips across the marked line ─ boxes ── contacts and mass
 //! ```
-//! Boxes and no convex hull: the jaws close on a waist between two wide ends as well. What the photo does not show is made up: walls
-//! are upright, and as dense everywhere.
+//! Boxes instead of a convex hull, so that the jaws can also close on a waist between two wide ends. Properties that
+//! the photo does not show are assumed: walls are vertical, and the density is uniform.
 
 mod mesh;
 
@@ -23,25 +23,27 @@ use crate::error::{Result, SimulationError};
 use crate::model::Asset;
 use crate::panda::FINGERTIP_BEYOND_TCP_M;
 
-/// The lowest tool centre point: the finger tips then keep 2 mm from the table. As the lowest of the shipped parts.
+/// The lowest tool centre point: the finger tips then keep 2 mm from the table. Equal to the lowest of the shipped
+/// parts.
 const MIN_GRASP_HEIGHT_M: f64 = FINGERTIP_BEYOND_TCP_M + 0.002;
-/// What of a part may stand above the tool centre point: more would touch the palm.
+/// Largest height of a part above the tool centre point: more would touch the palm.
 const MAX_ABOVE_TCP_M: f64 = 0.03;
-/// Boxes that the part's length is cut into. Chosen by hand: the jaws' pads, 2 cm wide, meet several of them.
+/// Number of boxes along the part's length. Chosen by hand: the jaws' pads, 2 cm wide, meet several of them.
 const NUM_STRIPS: usize = 40;
-/// Narrower boxes give no contact. Chosen by hand.
+/// Minimum width of a box; narrower ones give no contact. Chosen by hand.
 const MIN_BOX_M: f64 = 1e-4;
-/// More of the photo is not seen from where the camera looks.
+/// Maximum size of the texture: the camera would not resolve a larger one.
 const MAX_TEXTURE_PX: u32 = 1024;
-/// The walls have the photo's colour so far inside the outline, in pixels: on the line itself it is half the table's.
+/// Distance inside the outline from which the walls take the photo's colour, in pixels: on the line itself half of the
+/// colour is the table's.
 const WALL_INSET_PX: f64 = 2.0;
 
-/// What an extruded part is made from; places in pixels of `photo`, which looks straight down.
+/// The data of an extruded part; positions in pixels of `photo`, which looks vertically down.
 #[derive(Debug, Clone)]
 pub struct Extrusion<'a> {
     /// Name at the command line.
     pub name: &'a str,
-    /// The photo, or what was cut out of it.
+    /// The photo, or a crop of it.
     pub photo: &'a RgbImage,
     /// The part's outline.
     pub outline: &'a Polygon,
@@ -49,7 +51,7 @@ pub struct Extrusion<'a> {
     pub grasp: GraspLine,
     /// The part's width between the jaws, in pixels.
     pub jaw_width_px: f64,
-    /// What a pixel covers, in metres.
+    /// Size of a pixel, in metres.
     pub metres_per_pixel: f64,
     /// Height over the table, in metres: from 0.003 to 0.12.
     pub height_m: f64,
@@ -57,7 +59,7 @@ pub struct Extrusion<'a> {
     pub mass_kg: f64,
     /// Coefficient of sliding friction.
     pub friction: f64,
-    /// Which turns of the part cannot be seen.
+    /// The part's symmetry.
     pub symmetry: RotationalSymmetry,
 }
 
@@ -67,7 +69,8 @@ impl Extrusion<'_> {
         self.outline.area() * self.metres_per_pixel.powi(2) * self.height_m
     }
 
-    /// Checks what a simulated hand and table can do with it; the error names the value, what was expected and what was found.
+    /// Checks whether a simulated hand and table can handle it; the error names the value, the expected and the found
+    /// value.
     fn check(&self) -> std::result::Result<(), String> {
         let ranges = [
             ("height in m", self.height_m, 0.003, 0.12),
@@ -90,7 +93,8 @@ impl Extrusion<'_> {
         bounds.width().max(bounds.height()) * self.metres_per_pixel
     }
 
-    /// From pixels to the object frame: x along the marked line, y to the left of it seen from above, origin in the area's middle.
+    /// From pixels to the object frame: x along the marked line, y to the left of it seen from above, origin in the
+    /// area's centre.
     fn to_object(&self) -> impl Fn(&Point2<f64>) -> Point2<f64> {
         let center = self.outline.centroid();
         let along = (self.grasp.end - self.grasp.start).normalize();
@@ -102,7 +106,7 @@ impl Extrusion<'_> {
 }
 
 impl Extrusion<'_> {
-    /// What is seen, as OBJ.
+    /// The visible body, as OBJ.
     fn mesh(&self, corners: &[Point2<f64>]) -> String {
         let [width, height] = [self.photo.width(), self.photo.height()].map(f64::from);
         let along = (self.grasp.end - self.grasp.start).normalize();
@@ -117,10 +121,10 @@ impl Extrusion<'_> {
 }
 
 impl ObjectSpec {
-    /// The body over an outline, with the photo on it; see [`Extrusion`] for what it is made from.
+    /// The body over an outline, with the photo on it; see [`Extrusion`] for its data.
     ///
     /// # Errors
-    /// [`SimulationError::Asset`] for numbers that no hand or table can do with.
+    /// [`SimulationError::Asset`] for values that the hand or table cannot handle.
     pub fn extruded(extrusion: &Extrusion<'_>) -> Result<Self> {
         let fail = |reason: String| SimulationError::Asset { name: extrusion.name.to_owned(), reason };
         extrusion.check().map_err(fail)?;
@@ -168,13 +172,13 @@ fn texture_of(photo: &RgbImage) -> RgbImage {
     imageops::resize(photo, scaled(photo.width()), scaled(photo.height()), FilterType::Triangle)
 }
 
-/// What is touched and what it weighs: the boxes of the strips, as dense everywhere.
+/// Collision shapes and mass: the boxes of the strips, with uniform density.
 fn mjcf(extrusion: &Extrusion<'_>, corners: &[Point2<f64>]) -> String {
     let Extrusion { height_m, mass_kg, friction, .. } = *extrusion;
     let ends = corners.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], c| [low.min(c.x), high.max(c.x)]);
     let cuts: Vec<f64> =
         (0..=NUM_STRIPS).map(|k| ends[0] + (ends[1] - ends[0]) * k as f64 / NUM_STRIPS as f64).collect();
-    // Center and size of each box, in the table's plane.
+    // Centre and size of each box, in the table's plane.
     let boxes: Vec<(Vector2<f64>, Vector2<f64>)> = strips(corners, &cuts)
         .into_iter()
         .map(|Strip { x, low, high }| {

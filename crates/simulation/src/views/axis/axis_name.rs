@@ -5,31 +5,31 @@ use std::str::FromStr;
 
 use crate::error::{Result, SimulationError};
 
-/// What is harder than in an ordinary picture.
+/// The property that is harder than in an ordinary picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Axis {
-    /// The camera is 0.75 to 1.3 times as high as usual.
+    /// The camera is at 0.75 to 1.3 times its usual height.
     Height,
     /// The camera is tilted by 5 to 20 degrees about a random axis in the table and looks at the part.
     Tilt,
-    /// Another thing lies over 10 to 40 percent of what is seen of the part.
+    /// Another object lies over 10 to 40 percent of the part's visible area.
     Covered,
     /// Little light: a dark picture with photon and read noise.
     Dark,
     /// Motion blur in the even pictures, defocus in the odd ones.
     Blur,
-    /// Light of another colour than the camera is balanced for.
+    /// Light of another colour than the camera's white balance.
     Tint,
-    /// Ten to fifteen other things, pushed against the part and each other.
+    /// Ten to fifteen distractors, pushed against the part and each other.
     Clutter,
-    /// Three of the part.
+    /// Three instances of the part.
     Instances,
-    /// A part that resembles the part, and not the part.
+    /// A part that resembles the part but is another one.
     LookAlikes,
 }
 
 impl Axis {
-    /// All axes, in the order in which they are reported.
+    /// All axes, in reporting order.
     pub const ALL: [Self; 9] = [
         Self::Height,
         Self::Tilt,

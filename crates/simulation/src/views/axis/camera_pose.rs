@@ -1,4 +1,4 @@
-//! The camera higher, lower or tilted, the part always whole in the picture.
+//! The camera higher, lower or tilted, with the part always completely in the picture.
 
 use std::f64::consts::PI;
 
@@ -13,19 +13,19 @@ use crate::scene::PlacedObject;
 use crate::views::shows_whole;
 use crate::workcell::{Workcell, WorkcellConfig};
 
-/// Heights of the camera over the usual one.
+/// Heights of the camera relative to the usual one.
 const HEIGHT_FACTORS: std::ops::Range<f64> = 0.75..1.3;
 
-/// Tilts of the camera in degrees; less is an ordinary picture.
+/// Tilts of the camera in degrees; below this range it is an ordinary picture.
 const TILTS_DEG: std::ops::Range<f64> = 5.0..20.0;
 
-/// How far beside the part a tilted camera looks, in metres.
+/// Distance of a tilted camera's view from the part, in metres.
 const MAX_LOOK_OFFSET_M: f64 = 0.06;
 
 /// Directions of tilt that are tried until the arm reaches the camera's pose and the part is in the picture.
 const MAX_TRIES: usize = 40;
 
-/// The picture from another height, straight down, as near to the usual place as shows the whole part.
+/// The picture from another height, looking vertically down, as close to the usual place as shows the whole part.
 pub(super) fn draw_from_another_height(request: &mut Request<'_>) -> Result<Drawn> {
     let scene = request.ordinary_scene();
     let mut cell = Workcell::new(&WorkcellConfig::new(scene.clone()))?;
@@ -34,7 +34,7 @@ pub(super) fn draw_from_another_height(request: &mut Request<'_>) -> Result<Draw
     let height_m = LOOK_HEIGHT_M * factor;
     let part = part_in(&cell)?;
     let above = part.base_from_object.translation.vector;
-    // From the usual place to straight above the part.
+    // From the usual place to vertically above the part.
     let places = (0..=10).map(|step| {
         let share = f64::from(step) / 10.0;
         camera_looking_down(x + share * (above.x - x), y + share * (above.y - y), height_m, 0.0)
@@ -49,7 +49,7 @@ pub(super) fn draw_from_another_height(request: &mut Request<'_>) -> Result<Draw
     })
 }
 
-/// The picture of a tilted camera at the usual distance that looks at the part or somewhat beside it.
+/// The picture of a tilted camera at the usual distance that looks at the part or slightly beside it.
 pub(super) fn draw_tilted(request: &mut Request<'_>) -> Result<Drawn> {
     let scene = request.ordinary_scene();
     let mut cell = Workcell::new(&WorkcellConfig::new(scene.clone()))?;
@@ -82,7 +82,7 @@ fn part_in(cell: &Workcell) -> Result<PlacedObject> {
     })
 }
 
-/// The picture of the first place that the arm reaches and that shows the whole part.
+/// The picture from the first pose that the arm reaches and that shows the whole part.
 fn first_view(
     cell: &mut Workcell,
     part: &PlacedObject,

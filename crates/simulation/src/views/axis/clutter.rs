@@ -1,4 +1,4 @@
-//! Other things pushed against the part from all sides.
+//! Distractors pushed against the part from all sides.
 
 use std::f64::consts::{PI, TAU};
 
@@ -12,27 +12,27 @@ use crate::scene::{Distractor, DistractorKind, SceneVariation, VariationConfig};
 use crate::views::base_from_look_camera;
 use crate::workcell::{Workcell, WorkcellConfig};
 
-/// How many things there are.
+/// Number of distractors.
 const NUM_THINGS: std::ops::RangeInclusive<usize> = 10..=15;
 
-/// How many of them touch the part, where there is room for so many; the others touch these.
+/// Number of them that touch the part, if there is room; the others touch these.
 const NUM_TOUCHING: usize = 7;
 
-/// Directions that are tried for a thing to touch the part.
+/// Directions tried for a distractor to touch the part.
 const MAX_TRIES: usize = 8;
 
-/// Side of a cell of the views from above, in metres: two things touch where their cells are neighbours.
+/// Side of a cell of the views from above, in metres: two objects touch if their cells are neighbours.
 const CELL_M: f64 = 0.001;
 
-/// How far from the part a thing starts, in metres.
+/// Start distance of a distractor from the part, in metres.
 const START_M: f64 = 0.32;
 
-/// The part of the table that is watched: its corner in metres and its cells.
+/// The monitored area of the table: its corner in metres and its cells.
 const CORNER: Point2<f64> = Point2::new(-0.1, -0.7);
 const WIDTH: usize = 1200;
 const HEIGHT: usize = 1400;
 
-/// What covers a cell of the table.
+/// The content of a cell of the table.
 #[derive(Clone, Copy, PartialEq)]
 enum Cell {
     Free,
@@ -52,7 +52,7 @@ impl Ground {
         inside.then(|| cell.y as usize * WIDTH + cell.x as usize)
     }
 
-    /// What a thing at a place would stand on: the part before other things, these before nothing.
+    /// The object under a distractor at a place: the part has priority over distractors, and these over nothing.
     fn under(&self, points: &[Point2<f64>], table_from_thing: &Isometry2<f64>) -> Cell {
         let mut found = Cell::Free;
         for point in points {
@@ -66,7 +66,7 @@ impl Ground {
     }
 
     fn mark(&mut self, points: &[Point2<f64>], table_from_thing: &Isometry2<f64>, as_cell: Cell) {
-        // A turned raster leaves gaps between its points: each marks its neighbours as well.
+        // A turned raster leaves gaps between its points: each also marks its neighbours.
         for point in points {
             for (dx, dy) in [(0.0, 0.0), (0.5, 0.0), (0.0, 0.5), (0.5, 0.5)] {
                 let at = table_from_thing * (point + Vector2::new(dx - 0.25, dy - 0.25) * CELL_M);
@@ -78,7 +78,7 @@ impl Ground {
     }
 }
 
-/// A scene with the part in the middle of many other things.
+/// A scene with the part in the middle of many distractors.
 pub(super) fn draw_cluttered(request: &mut Request<'_>) -> Result<Drawn> {
     let config = VariationConfig { distractors: 0..=0, ..VariationConfig::default() };
     let mut scene = SceneVariation::sample(Some(request.spec), &config, request.scene_seed);
@@ -132,7 +132,8 @@ pub(super) fn draw_cluttered(request: &mut Request<'_>) -> Result<Drawn> {
     Ok(Drawn { cell, scene, view, parameter })
 }
 
-/// Pushes a thing from afar towards a place until it touches something: where it stands then, and what it touches.
+/// Pushes a distractor from a distance towards a place until it touches something; returns its position then, and the
+/// touched object.
 fn pushed(
     ground: &Ground,
     points: &[Point2<f64>],

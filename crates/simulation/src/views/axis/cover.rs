@@ -1,4 +1,4 @@
-//! Another thing laid over the part, as far as a wanted share of what shows of the part is covered.
+//! Another object laid over the part until the wanted share of the part's visible area is covered.
 
 use std::f64::consts::PI;
 
@@ -15,12 +15,12 @@ use crate::shapes::footprint;
 use crate::views::base_from_look_camera;
 use crate::workcell::{Workcell, WorkcellConfig};
 
-/// How much of the part's pixels is covered.
+/// Covered share of the part's pixels.
 const COVERED_SHARES: std::ops::Range<f64> = 0.10..0.40;
-/// How far the measured share may be from the wanted one: half of a stratum and the raster's own steps.
+/// Tolerance of the measured share: half of a stratum and the raster's own steps.
 const SHARE_TOLERANCE: f64 = 0.02;
 
-/// What can lie over another part: flat or long things.
+/// Distractors that can lie over another part: flat or long ones.
 const KINDS: [DistractorKind; 10] = [
     DistractorKind::Plate,
     DistractorKind::Flange,
@@ -34,26 +34,26 @@ const KINDS: [DistractorKind; 10] = [
     DistractorKind::Bearing,
 ];
 
-/// Covers that are tried until one covers enough.
+/// Number of covers tried until one covers enough.
 const MAX_COVERS: u32 = 60;
-/// First step from the estimated place, in metres.
+/// First step from the estimated position, in metres.
 const FIRST_STEP_M: f64 = 0.003;
-/// Pictures that are measured to find a cover's place.
+/// Number of pictures used to find a cover's position.
 const MAX_MEASUREMENTS: usize = 8;
 /// Side of a cell of the views from above, in metres.
 const CELL_M: f64 = 0.001;
-/// Air between the cover and the part under it, so that no surfaces fall into one, in metres.
+/// Gap between the cover and the part under it, so that no surfaces coincide, in metres.
 const AIR_M: f64 = 0.0003;
-/// Least distance of the other things to the cover from above, in metres.
+/// Minimum distance of the distractors from the cover as seen from above, in metres.
 const CLEARANCE_M: f64 = 0.01;
 
-/// A cover on its way over the part.
+/// A cover on its path over the part.
 struct Slide {
     cover: Distractor,
     part: PlacedObject,
     part_map: HeightMap,
     cover_map: HeightMap,
-    /// Where the cover's middle is at the end of its way, in the base frame, and where it comes from.
+    /// The position of the cover's centre at the end of its path, in the base frame, and its direction.
     end: Point2<f64>,
     camera: Vector3<f64>,
     cover_middle_m: f64,
@@ -99,7 +99,7 @@ impl Slide {
             .reduce(f64::max)
     }
 
-    /// Share of the part that the cover hides from the camera, the cover taken for a flat thing at half of its height.
+    /// Share of the part that the cover hides from the camera; the cover is approximated as flat at half of its height.
     fn estimated_share(&self, distance_m: f64) -> f64 {
         let table_from_cover = self.table_from_cover(distance_m);
         let bottom_m = self.top_m(&table_from_cover).unwrap_or(0.0) + AIR_M;
@@ -108,7 +108,7 @@ impl Slide {
         for (at, z, _) in self.part_map.filled() {
             total += 1;
             let at = (table_from_part * at).coords.push(z + self.part.spec.rest_height_m);
-            // Where the ray from the part to the camera passes the cover's height.
+            // The point where the ray from the part to the camera passes the cover's height.
             let rise = (bottom_m + self.cover_middle_m - at.z).max(0.0) / (self.camera.z - at.z);
             let passed = at + (self.camera - at) * rise;
             covered += i32::from(self.cover_map.at(&(cover_from_table * Point2::from(passed.xy()))).is_some());
@@ -116,7 +116,7 @@ impl Slide {
         f64::from(covered) / f64::from(total.max(1))
     }
 
-    /// Where the cover lies at a distance from the end of its way.
+    /// The pose of the cover at a distance from the end of its path.
     fn pose(&self, distance_m: f64) -> Isometry3<f64> {
         let table_from_cover = self.table_from_cover(distance_m);
         let mut placed = self.cover.moved_to(&table_from_cover);
@@ -126,7 +126,7 @@ impl Slide {
         placed.base_from_distractor
     }
 
-    /// The distance at which the cover first hides the wanted share on its way; `None` where it never does.
+    /// The distance at which the cover first hides the wanted share on its path; `None` if it never does.
     fn distance_for(&self, wanted: f64) -> Option<f64> {
         let on_the_way = |step: f64, from: f64, num_steps: u32| {
             (0..=num_steps)
@@ -138,7 +138,7 @@ impl Slide {
     }
 }
 
-/// An ordinary scene with a thing over the part.
+/// An ordinary scene with an object over the part.
 pub(super) fn draw_covered(request: &mut Request<'_>) -> Result<Drawn> {
     let wanted = request.between(COVERED_SHARES);
     let part_map = request.spec.height_map(CELL_M)?;
@@ -150,7 +150,7 @@ pub(super) fn draw_covered(request: &mut Request<'_>) -> Result<Drawn> {
     };
     let part = ordinary.object.clone().ok_or_else(none)?;
     for number in 0..MAX_COVERS {
-        // Where usual things are too small for the part, larger ones are tried.
+        // If the usual distractors are too small for the part, larger ones are tried.
         let scale = 1.0 + f64::from(number) / f64::from(MAX_COVERS);
         let slide = Slide::new(&part, &part_map, scale, &mut request.rng);
         let Some(estimate) = slide.distance_for(wanted) else { continue };
@@ -161,7 +161,7 @@ pub(super) fn draw_covered(request: &mut Request<'_>) -> Result<Drawn> {
         scene.distractors.push(cover);
         let index = scene.distractors.len() - 1;
         let mut cell = Workcell::new(&WorkcellConfig::new(scene.clone()))?;
-        // The arm's place; the picture itself is drawn once the cover lies.
+        // The arm's pose; the picture itself is drawn once the cover is in place.
         cell.reach_camera_pose(&base_from_look_camera())?;
         let Some((distance_m, share)) = lay_over(&mut cell, &slide, index, estimate, wanted)? else { continue };
         let mut cover = slide.cover.moved_to(&slide.table_from_cover(distance_m));
@@ -176,7 +176,8 @@ pub(super) fn draw_covered(request: &mut Request<'_>) -> Result<Drawn> {
     Err(none())
 }
 
-/// Moves the cover until it hides the wanted share in the camera's own picture; the place and the share, if found.
+/// Moves the cover until it hides the wanted share in the camera's own picture; returns the position and the share, if
+/// found.
 fn lay_over(
     cell: &mut Workcell,
     slide: &Slide,
@@ -199,7 +200,7 @@ fn lay_over(
         }
         if share > wanted {
             near_m = distance_m;
-            // The first steps keep near the estimate, which is seldom far off.
+            // The first steps stay near the estimate, which is usually close.
             distance_m = (distance_m + FIRST_STEP_M).min(0.5 * (distance_m + far_m));
         } else {
             far_m = distance_m;

@@ -1,7 +1,7 @@
-//! What light, lens and sensor do to a picture after it was drawn: darkness with noise, blur, a colour cast.
+//! Effects of light, lens and sensor on a drawn picture: darkness with noise, blur, a colour cast.
 //!
-//! All of it happens to light, not to the values of pixels: a picture is taken back to linear light, changed there, and
-//! written with sRGB's curve again.
+//! All of them apply to light, not to pixel values: a picture is converted to linear light, changed there, and
+//! converted back with sRGB's curve.
 
 use std::f64::consts::{PI, TAU};
 
@@ -11,28 +11,28 @@ use rand_pcg::Pcg64Mcg;
 
 use super::request::{AxisParameter, Request};
 
-/// Light that reaches the sensor, as a share of the usual: the ends of the range, equally likely by ratio.
+/// Light at the sensor, as a share of the usual: the ends of the range, uniform in ratio.
 const EXPOSURES: [f64; 2] = [0.25, 0.02];
-/// Electrons that white gives at the usual exposure, as in a small camera's pixel.
+/// Electrons of white at the usual exposure, as in a small camera's pixel.
 const ELECTRONS_AT_WHITE: f64 = 6000.0;
-/// Standard deviation of what reading a pixel adds, in electrons.
+/// Standard deviation of the read noise of a pixel, in electrons.
 const READ_NOISE_ELECTRONS: f64 = 5.0;
-/// The camera's own amplification: it brings white back to this share, as far as the largest gain goes.
+/// The camera's own amplification: it restores white to this share, up to the largest gain.
 const WHITE_AIMED_AT: f64 = 1.0 / 3.0;
 const MAX_GAIN: f64 = 4.0;
 
 /// Length of motion blur, and diameter of the disc of defocus, in pixels.
 const MOTION_PX: std::ops::Range<f64> = 3.0..12.0;
 const DEFOCUS_PX: std::ops::Range<f64> = 2.5..8.0;
-/// Points over which a blur's kernel is spread: enough that none shows at the longest blur.
+/// Number of points of a blur's kernel: enough that single points are invisible at the longest blur.
 const BLUR_POINTS: usize = 64;
 
-/// Logarithm of the largest ratio by which a colour cast changes red against blue.
+/// Logarithm of the largest ratio by which a colour cast changes red relative to blue.
 const CAST_LOG_RATIOS: std::ops::Range<f64> = 0.15..0.9;
-/// Share of that by which green changes against both.
+/// Share of that by which green changes relative to both.
 const GREEN_SHARE: f64 = 0.35;
 
-/// Linear light of a picture, row by row, three channels a pixel.
+/// Linear light of a picture, row by row, three channels per pixel.
 struct Light {
     width: usize,
     height: usize,
@@ -60,7 +60,7 @@ impl Light {
     }
 }
 
-/// Little light: fewer electrons, with their shot noise, the noise of reading them, and as much gain as the camera has.
+/// Little light: fewer electrons, with their shot noise, read noise, and the camera's available gain.
 pub(super) fn darken(image: &mut RgbImage, request: &mut Request<'_>) -> AxisParameter {
     let [most, least] = EXPOSURES.map(f64::ln);
     let exposure = (most + request.level * (least - most)).exp();
@@ -107,7 +107,7 @@ pub(super) fn blur(image: &mut RgbImage, request: &mut Request<'_>) -> AxisParam
     AxisParameter { value, unit: "px", description }
 }
 
-/// Weights of whole pixels around the middle: each point gives its share to the four pixels around it.
+/// Weights of whole pixels around the middle: each point is distributed over the four pixels around it.
 fn kernel(points: &[(f64, f64)]) -> Vec<(i64, i64, f32)> {
     let mut weights = std::collections::BTreeMap::new();
     for &(x, y) in points {
@@ -122,7 +122,7 @@ fn kernel(points: &[(f64, f64)]) -> Vec<(i64, i64, f32)> {
     weights.into_iter().filter(|(_, weight)| *weight > 0.0).map(|((x, y), weight)| (x, y, weight as f32)).collect()
 }
 
-/// The light spread by a kernel; at the rim the last row or column goes on.
+/// The light spread by a kernel; beyond the rim the last row or column is repeated.
 fn convolved(light: &Light, kernel: &[(i64, i64, f32)]) -> Vec<f32> {
     let Light { width, height, values } = light;
     let row_len = 3 * width;
@@ -149,7 +149,7 @@ fn convolved(light: &Light, kernel: &[(i64, i64, f32)]) -> Vec<f32> {
     spread
 }
 
-/// Lamps of another colour than the camera is balanced for: the three channels amplified differently.
+/// Lamps of another colour than the camera's white balance: the three channels are amplified differently.
 pub(super) fn tint(image: &mut RgbImage, request: &mut Request<'_>) -> AxisParameter {
     let strength = request.between(CAST_LOG_RATIOS);
     let rng = &mut request.rng;
@@ -192,7 +192,8 @@ impl Normal {
     }
 }
 
-/// A count with a mean: Knuth's product of uniform numbers for few, the normal distribution's for many.
+/// A Poisson count with a mean: Knuth's product of uniform numbers for small means, the normal distribution for large
+/// ones.
 fn poisson(mean: f64, rng: &mut Pcg64Mcg, normal: &mut Normal) -> f64 {
     if mean > 12.0 {
         return (mean + mean.sqrt() * normal.sample(rng)).round().max(0.0);

@@ -1,4 +1,4 @@
-//! Three of the part on one table.
+//! Three instances of the part on one table.
 
 use std::f64::consts::PI;
 
@@ -12,14 +12,14 @@ use crate::shapes::footprint;
 use crate::views::base_from_look_camera;
 use crate::workcell::{Workcell, WorkcellConfig};
 
-/// How many of the part there are.
+/// Number of instances of the part.
 const NUM_INSTANCES: usize = 3;
 
-/// Places that are tried for one instance, and how often all begin anew.
+/// Number of places tried for one instance, and number of restarts.
 const TRIES_PER_INSTANCE: usize = 60;
 const MAX_ROUNDS: usize = 60;
 
-/// An ordinary scene with two more of the part and up to three other things.
+/// An ordinary scene with two more instances of the part and up to three distractors.
 pub(super) fn draw_three(request: &mut Request<'_>) -> Result<Drawn> {
     let config = VariationConfig { distractors: 0..=3, ..VariationConfig::default() };
     let mut scene = SceneVariation::sample(Some(request.spec), &config, request.scene_seed);
@@ -43,7 +43,7 @@ pub(super) fn draw_three(request: &mut Request<'_>) -> Result<Drawn> {
     Ok(Drawn { cell, scene, view, parameter })
 }
 
-/// Instances at random places that keep apart; `None` where one found no room.
+/// Instances at random places with a distance between them; `None` if one found no room.
 fn placed_apart(request: &mut Request<'_>, config: &VariationConfig) -> Option<Vec<PlacedObject>> {
     let rng = &mut request.rng;
     let mut taken: Vec<Vec<Point2<f64>>> = Vec::new();

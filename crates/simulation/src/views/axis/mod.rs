@@ -1,14 +1,14 @@
-//! Pictures in which one thing is harder than in an ordinary scene: the axes along which models are measured.
+//! Pictures with one harder property than an ordinary scene: the axes along which models are measured.
 //!
 //! ```text
 //! (part, axis, number, seed) ─> ordinary random scene ─> changed along the axis ─> picture, truths, how much it was changed
 //!                               SceneVariation::sample    camera, things, image
 //! ```
 //!
-//! An axis has [`PICTURES_PER_AXIS`] pictures. The number of a picture is its **stratum**: what the axis changes runs from
-//! its mildest in picture 0 to its hardest in the last one, within each stratum at random, so that 20 pictures cover the
-//! whole range evenly. The same part, axis, number and seed give the same picture to the bit. All pictures are the wrist
-//! camera's with the arm holding it, as in an attempt.
+//! An axis has [`PICTURES_PER_AXIS`] pictures. The number of a picture is its **stratum**: the axis's parameter runs
+//! from its mildest value in picture 0 to its hardest in the last one, at random within each stratum, so that 20
+//! pictures cover the whole range evenly. The same part, axis, number and seed give the same picture, bit for bit. All
+//! pictures are the wrist camera's with the arm holding it, as in an attempt.
 
 mod axis_name;
 mod camera_pose;
@@ -38,25 +38,25 @@ use crate::workcell::{Workcell, WorkcellConfig};
 pub struct AxisView {
     /// The axis along which the picture is harder.
     pub axis: Axis,
-    /// Which of the axis' pictures it is.
+    /// The index among the axis' pictures.
     pub number: u64,
-    /// What was drawn.
+    /// The drawn scene.
     pub scene: SceneVariation,
     /// The picture and its camera.
     pub view: CameraView,
-    /// All instances of the part; none among the look-alikes.
+    /// All instances of the part; none for look-alikes.
     pub truths: Vec<InstanceTruth>,
-    /// How much the axis changed.
+    /// The amount of change along the axis.
     pub parameter: AxisParameter,
-    /// In what the part on the table differs from the part that is asked for; only among the look-alikes.
+    /// The difference of the part on the table from the requested part; only for look-alikes.
     pub look_alike: Option<LookAlikeKind>,
 }
 
 /// Draws picture `number` of an axis.
 ///
 /// # Errors
-/// As [`Workcell::new`]; [`SimulationError::Configuration`] where no place of camera or cover gives the picture that the
-/// axis asks for.
+/// As [`Workcell::new`]; [`SimulationError::Configuration`] if no pose of camera or cover gives the picture that the
+/// axis requires.
 pub fn axis_view(spec: &ObjectSpec, axis: Axis, number: u64, seed: u64) -> Result<AxisView> {
     let mut request = Request::new(spec, axis, number, seed);
     if axis == Axis::LookAlikes {
@@ -84,7 +84,7 @@ pub fn axis_view(spec: &ObjectSpec, axis: Axis, number: u64, seed: u64) -> Resul
     Ok(AxisView { axis, number, scene, view, truths, parameter, look_alike: None })
 }
 
-/// An ordinary picture with a look-alike in the part's place; the kinds take turns.
+/// An ordinary picture with a look-alike in the part's place; the kinds alternate.
 fn look_alike_view(request: &mut Request<'_>) -> Result<AxisView> {
     let kinds = request.spec.look_alike_kinds()?;
     let kind = kinds[(request.number % kinds.len() as u64) as usize];
@@ -112,8 +112,9 @@ mod tests {
     use crate::scene::PlacedObject;
     use crate::shapes::footprint;
 
-    /// Pixels between the middle of the drawn part and of its projected top: a wall of 12 mm seen from 20 degrees beside
-    /// it takes 4 px on one side and moves the middle by half of that; the rest is the raster of a millimetre.
+    /// Pixels between the middle of the drawn part and of its projected top: a wall of 12 mm seen from 20 degrees off
+    /// the vertical covers 4 px on one side and moves the centre by half of that; the rest is the raster of a
+    /// millimetre.
     const MIDDLE_TOLERANCE_PX: f64 = 3.0;
 
     #[test]
@@ -171,7 +172,7 @@ mod tests {
             let apart = (middle(&projected) - middle(&shown)).norm();
             assert!(apart < MIDDLE_TOLERANCE_PX, "{name} {axis} {number}: {apart} px");
             let line = truth.grasp.line;
-            // The marks are where the truth has them, within the part's outline.
+            // The marks are at their true position, within the part's outline.
             assert!((line.center().coords - middle(&shown)).norm() < 60.0, "{name} {axis}: {:?}", line.center());
             let range = if axis == Axis::Tilt { 5.0..20.0 } else { 0.75..1.3 };
             assert!(range.contains(&drawn.parameter.value), "{}", drawn.parameter.description);
@@ -209,7 +210,7 @@ mod tests {
         }
         let cluttered = axis_view(&spec, Axis::Clutter, 12, 8).unwrap();
         assert!((10..=15).contains(&cluttered.scene.distractors.len()));
-        // Tall things beside the part hide a little of it from a camera that is not straight above.
+        // Tall objects beside the part hide a small share of it from a camera that is not vertically above.
         assert!(cluttered.truths[0].visible_share > 0.85, "{}", cluttered.truths[0].visible_share);
     }
 

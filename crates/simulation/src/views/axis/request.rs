@@ -1,4 +1,4 @@
-//! What the axes have in common: which picture is asked for, and what is handed back.
+//! Types common to the axes: the requested picture, and the result.
 
 use std::ops::Range;
 
@@ -11,35 +11,35 @@ use crate::objects::ObjectSpec;
 use crate::scene::{SceneVariation, VariationConfig};
 use crate::workcell::Workcell;
 
-/// How many pictures an axis has: as many strata.
+/// Number of pictures of an axis, which is the number of strata.
 pub const PICTURES_PER_AXIS: u64 = 20;
 
-/// How much a picture was changed along its axis.
+/// The amount of change of a picture along its axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AxisParameter {
     /// The number, in `unit`.
     pub value: f64,
-    /// What the number counts: `of the usual height`, `degrees`, `px`.
+    /// Unit of the number: `of the usual height`, `degrees`, `px`.
     pub unit: &'static str,
-    /// All of it in words.
+    /// A description in words.
     pub description: String,
 }
 
-/// A part, axis, number and seed, as the axes' own modules need them.
+/// A part, axis, number and seed, in the form that the axes' modules need.
 pub(super) struct Request<'a> {
     pub(super) spec: &'a ObjectSpec,
     pub(super) number: u64,
     /// Seed of the ordinary scene.
     pub(super) scene_seed: u64,
-    /// Place of the picture in the axis' range, 0 to 1.
+    /// Position of the picture in the axis' range, 0 to 1.
     pub(super) level: f64,
-    /// What else the axis draws.
+    /// Further random numbers of the axis.
     pub(super) rng: Pcg64Mcg,
 }
 
 impl<'a> Request<'a> {
     pub(super) fn new(spec: &'a ObjectSpec, axis: Axis, number: u64, seed: u64) -> Self {
-        // FNV-1a: parts whose pictures had one seed would share each unlucky lamp.
+        // FNV-1a, so that parts do not share one seed and with it each unfavourable lamp.
         let part = spec
             .name
             .bytes()
@@ -55,7 +55,7 @@ impl<'a> Request<'a> {
         Self { spec, number, scene_seed, level, rng }
     }
 
-    /// The place of the picture in a range.
+    /// The picture's value in a range.
     pub(super) fn between(&self, range: Range<f64>) -> f64 {
         range.start + self.level * (range.end - range.start)
     }
@@ -65,7 +65,7 @@ impl<'a> Request<'a> {
     }
 }
 
-/// What an axis made: the picture before truths are measured.
+/// The result of an axis: the picture before truths are measured.
 pub(super) struct Drawn {
     pub(super) cell: Workcell,
     pub(super) scene: SceneVariation,

@@ -1,4 +1,4 @@
-//! How much of each instance of the part a picture shows.
+//! The visible share of each instance of the part in a picture.
 
 use nalgebra::{Isometry3, Translation3};
 use sdg_geometry::PosedCamera;
@@ -13,16 +13,16 @@ use crate::workcell::Workcell;
 /// One of the part's instances in a picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InstanceTruth {
-    /// Where it is, and its grasp.
+    /// Its pose, and its grasp.
     pub grasp: GraspTruth,
-    /// Share of its pixels that the picture shows, of those that it would show with nothing else on the table.
+    /// Share of its pixels in the picture, relative to those that it would have with nothing else on the table.
     pub visible_share: f64,
 }
 
-/// Where things are put that shall not be seen: below the floor.
+/// Position of hidden objects: below the floor.
 const OUT_OF_SIGHT_M: f64 = -10.0;
 
-/// The truth about each instance, with the share of it that shows.
+/// The truth about each instance, with its visible share.
 pub(super) fn instance_truths(
     cell: &mut Workcell,
     scene: &SceneVariation,
@@ -57,19 +57,19 @@ pub(super) fn instance_bodies(cell: &Workcell, count: usize) -> Result<Vec<Id<Bo
         .collect()
 }
 
-/// How many pixels show a body.
+/// Number of pixels that show a body.
 pub(super) fn num_pixels(cell: &Workcell, segmentation: &Segmentation, body: Id<Body>) -> usize {
     let model = cell.data().model();
     segmentation.pixels_where(|geom| model.body_of(geom) == body).count()
 }
 
-/// Takes a distractor out of the picture, for the truths about what remains.
+/// Removes a distractor from the picture, for the truths about the rest.
 pub(super) fn hide_distractor(cell: &mut Workcell, index: usize) -> Result<()> {
     let below = Isometry3::from_parts(Translation3::new(index as f64, 0.0, OUT_OF_SIGHT_M), Default::default());
     place_distractor(cell, index, &below)
 }
 
-/// Puts a distractor somewhere.
+/// Moves a distractor.
 pub(super) fn place_distractor(cell: &mut Workcell, index: usize, base_from_distractor: &Isometry3<f64>) -> Result<()> {
     let joint = cell.data().model().id::<Joint>(&format!("distractor_{index}_joint"))?;
     cell.data.place(joint, base_from_distractor);
