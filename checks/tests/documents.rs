@@ -90,7 +90,8 @@ fn the_site_s_summary_has_every_guide_and_what_guides_link_to() {
     let folder = root().join("docs");
     let path_of = |document: &Path, link: &str| {
         let file = link.split('#').next().unwrap();
-        (!file.is_empty() && !link.contains("://")).then(|| document.parent().unwrap().join(file).canonicalize().unwrap())
+        (!file.is_empty() && !link.contains("://"))
+            .then(|| document.parent().unwrap().join(file).canonicalize().unwrap())
     };
     let summary = folder.join("SUMMARY.md");
     let listed: Vec<PathBuf> =

@@ -15,7 +15,10 @@ const MAX_PAGE_BYTES: usize = 300_000;
 const WIDTHS: [u32; 2] = [390, 1280];
 
 fn site() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../target/site").canonicalize().expect("target/site, which `make site` makes")
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../target/site")
+        .canonicalize()
+        .expect("target/site, which `make site` makes")
 }
 
 /// The book's pages by their path in the site; the detector has tests of its own.

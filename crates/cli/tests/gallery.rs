@@ -9,8 +9,18 @@ use image::{Rgb, RgbImage};
 use crate::support::{Folder, sdg, shipped, stdout};
 
 const PARTS: [&str; 12] = [
-    "pendulum", "fuel_line", "rod_end", "housing", "pneumatic_cylinder", "ball_bearing", "common_line", "cranfield_face",
-    "key", "pliers", "circuit_board", "spring_clip",
+    "pendulum",
+    "fuel_line",
+    "rod_end",
+    "housing",
+    "pneumatic_cylinder",
+    "ball_bearing",
+    "common_line",
+    "cranfield_face",
+    "key",
+    "pliers",
+    "circuit_board",
+    "spring_clip",
 ];
 /// Seed of the samples, and the one of the tour's six in which much is refused.
 const SEED: &str = "3";

@@ -93,7 +93,8 @@ fn signature(arg: &Arg) -> String {
         (None, Some(long)) => format!("--{long} "),
         (None, None) => String::new(),
     };
-    let several = if takes_value && arg.get_num_args().is_some_and(|number| number.max_values() > 1) { " …" } else { "" };
+    let several =
+        if takes_value && arg.get_num_args().is_some_and(|number| number.max_values() > 1) { " …" } else { "" };
     format!("`{dashes}{values}").trim_end().replace('|', "\\|") + several + "`"
 }
 
@@ -113,7 +114,8 @@ fn meaning(arg: &Arg) -> String {
     if !values.is_empty() {
         write!(meaning, " One of {}.", values.join(", ")).unwrap();
     }
-    let defaults: Vec<_> = arg.get_default_values().iter().map(|value| format!("`{}`", value.to_string_lossy())).collect();
+    let defaults: Vec<_> =
+        arg.get_default_values().iter().map(|value| format!("`{}`", value.to_string_lossy())).collect();
     if !defaults.is_empty() && !arg.is_hide_default_value_set() {
         write!(meaning, " Default: {}.", defaults.join(", ")).unwrap();
     }

@@ -123,7 +123,8 @@ fn blocks_have_their_language_and_their_marker() {
 
 #[test]
 fn calls_are_what_stands_behind_the_program() {
-    let text = "D=x; sdg teach --demo a \\\n  --out b; ls\nfor s in c; do target/release/sdg detect [--json] d # --no\nmake x";
+    let text =
+        "D=x; sdg teach --demo a \\\n  --out b; ls\nfor s in c; do target/release/sdg detect [--json] d # --no\nmake x";
     let words = |line: &str| line.split(' ').map(str::to_owned).collect::<Vec<_>>();
     assert_eq!(calls(text), [words("teach --demo a --out b"), words("detect --json d")]);
 }

@@ -15,6 +15,7 @@ use crate::support::{Folder, shipped, taught_pendulum};
 /// The documents whose commands run. Another one with commands fails [`every_guide_with_commands_is_run`].
 const GUIDES: &[&str] = &[
     "README.md",
+    "docs/c.md",
     "docs/calibration.md",
     "docs/camera.md",
     "docs/devices.md",
@@ -52,7 +53,9 @@ fn folder_of_a_reader() -> Folder {
             copied(&shipped(part, name), &format!("datasets/demonstrations/{part}/{name}"));
         }
     }
-    for (file, names) in [("camera.yaml", &["wrist.yaml", "webcam.yaml", "camera.yaml"][..]), ("workcell.toml", &["cell.toml"])] {
+    for (file, names) in
+        [("camera.yaml", &["wrist.yaml", "webcam.yaml", "camera.yaml"][..]), ("workcell.toml", &["cell.toml"])]
+    {
         let shipped_file = root().join("datasets/workcell").join(file);
         copied(&shipped_file, &format!("datasets/workcell/{file}"));
         names.iter().for_each(|name| copied(&shipped_file, name));
@@ -105,7 +108,8 @@ fn run(guide: &str, all: bool) -> usize {
 #[test]
 fn every_guide_with_commands_is_run() {
     let mut found: BTreeSet<String> = BTreeSet::new();
-    let names = fs::read_dir(root().join("docs")).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    let names =
+        fs::read_dir(root().join("docs")).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
     let guides = names.filter(|name| name.ends_with(".md")).map(|name| format!("docs/{name}"));
     for guide in guides.chain(["README.md".to_owned()]) {
         let document = fs::read_to_string(root().join(&guide)).unwrap();
@@ -120,7 +124,7 @@ fn every_guide_with_commands_is_run() {
 #[test]
 fn commands_of_the_guides_run() {
     let num_run: usize = GUIDES.iter().map(|guide| run(guide, false)).sum();
-    assert!(num_run > 10, "expected more blocks that run, found {num_run}");
+    assert!(num_run >= 10, "expected ten blocks that run or more, found {num_run}");
 }
 
 #[test]
