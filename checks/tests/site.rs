@@ -12,7 +12,8 @@ use sdg_webdriver::{Browser, BrowserOptions, serve_folder};
 
 /// Most bytes of a page and its style, without its pictures.
 const MAX_PAGE_BYTES: usize = 300_000;
-const WIDTHS: [u32; 2] = [390, 1280];
+/// Widths of the window, and whether the dark scheme is on: colours are the same at every width.
+const LOOKS: [(u32, bool); 3] = [(390, false), (1280, false), (1280, true)];
 
 fn site() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -119,26 +120,22 @@ fn pages_are_accessible_at_a_phone_s_width_and_on_a_desk() {
     let browser = Browser::start(&BrowserOptions::default()).unwrap();
     let mut faults = Vec::new();
     for name in pages().keys() {
-        for width in WIDTHS {
-            for is_dark in [false, true] {
-                browser.emulate(width, 900, is_dark).unwrap();
-                browser.open(&server.url(name)).unwrap();
-                browser.run(&format!("if (!window.axe) {{ {axe}\n }}"), &[]).unwrap();
-                let script = "return axe.run(document).then((found) => found.violations.map((v) =>
-                    v.id + ': ' + v.nodes.slice(0, 3).map((n) => n.html.slice(0, 160)).join(' | ')))";
-                let found = browser.run(script, &[]).unwrap();
-                faults.extend(found.as_array().unwrap().iter().map(|fault| format!("{name} at {width} px: {fault}")));
-                let sticks_out = "return document.documentElement.scrollWidth - document.documentElement.clientWidth";
-                let sticks_out = browser.run(sticks_out, &[]).unwrap();
-                if sticks_out.as_f64() != Some(0.0) {
-                    faults.push(format!("{name} at {width} px: {sticks_out} px wider than the window"));
-                }
-                if !is_dark || name == "index.html" {
-                    let scheme = if is_dark { "-dark" } else { "" };
-                    let file = format!("{}-{width}{scheme}.png", name.trim_end_matches(".html").replace('/', "-"));
-                    browser.screenshot(&shots.join(file)).unwrap();
-                }
+        for (width, is_dark) in LOOKS {
+            browser.emulate(width, 900, is_dark).unwrap();
+            browser.open(&server.url(name)).unwrap();
+            browser.run(&format!("if (!window.axe) {{ {axe}\n }}"), &[]).unwrap();
+            let script = "return axe.run(document).then((found) => found.violations.map((v) =>
+                v.id + ': ' + v.nodes.slice(0, 3).map((n) => n.html.slice(0, 160)).join(' | ')))";
+            let found = browser.run(script, &[]).unwrap();
+            faults.extend(found.as_array().unwrap().iter().map(|fault| format!("{name} at {width} px: {fault}")));
+            let sticks_out = "return document.documentElement.scrollWidth - document.documentElement.clientWidth";
+            let sticks_out = browser.run(sticks_out, &[]).unwrap();
+            if sticks_out.as_f64() != Some(0.0) {
+                faults.push(format!("{name} at {width} px: {sticks_out} px wider than the window"));
             }
+            let scheme = if is_dark { "-dark" } else { "" };
+            let file = format!("{}-{width}{scheme}.png", name.trim_end_matches(".html").replace('/', "-"));
+            browser.screenshot(&shots.join(file)).unwrap();
         }
     }
     assert!(faults.is_empty(), "{}", faults.join("\n"));
