@@ -27,13 +27,13 @@ MDBOOK_LOG=warn target/tools/bin/mdbook build "$book" --dest-dir "$out.new"
 # Pages that show nothing of mdBook's own: its scripts and styles are left out. In the list of all pages, those of the third level are
 # left out, which one of the second level lists, and addresses of pages end with .html. mdBook makes index.html of README.md, but leaves
 # links to it as they are. A picture is a link to itself, by which a phone shows it large, instead of mdBook's checkbox, which shows it twice. The keyboard reaches what
-# scrolls sideways, and a table's empty corner is no heading.
+# scrolls sideways, a table's empty corner is no heading, and a short option stays on one line.
 find "$out.new" -maxdepth 1 -type f ! -name '*.html' -delete
 rm -rf "$out.new/css" "$out.new/fonts" "$out.new/toc.html" "$out.new/docs/site"
 find "$out.new" -name '*.html' -exec sed -i -E \
     -e '/<li data-section="[0-9]+\.[0-9]+\."/d' -e 's/<li data-section="[^"]*">/<li>/' -e '/<li><a href=/s/\.md"/.html"/' \
     -e 's/(href="[^"]*)README\.html/\1index.html/g' \
-    -e 's#<th( [^>]*)?></th>#<td></td>#g' \
+    -e 's#<th( [^>]*)?></th>#<td></td>#g' -e 's#<code>(--[^<]{1,28})</code>#<code class="option">\1</code>#g' \
     -e 's/<pre>/<pre tabindex="0">/g' -e 's/<div class="table-wrapper">/<div class="table-wrapper" tabindex="0">/g' \
     -e 's#<label class="checkbox-label"><input[^>]*>(<img src="([^"]*)"[^>]*>)<span[^>]*><img[^>]*></span></label>#<a href="\2">\1</a>#g' {} +
 cp docs/site/site.css crates/annotate/page/icon.svg "$out.new/"

@@ -1,5 +1,5 @@
 //! The site that `make site` built: every link and anchor of it leads somewhere, a page loads nothing from elsewhere and runs no script,
-//! no page is large, and axe-core finds nothing at a phone's width and on a desk.
+//! no page is large, every picture is shown, and axe-core finds nothing at a phone's width and on a desk.
 //!
 //! Needs target/site, for the last test Chromium and axe-core: `make site` brings all of them and runs these tests. Screenshots are kept
 //! in target/site-test.
@@ -128,6 +128,9 @@ fn pages_are_accessible_at_a_phone_s_width_and_on_a_desk() {
                 v.id + ': ' + v.nodes.slice(0, 3).map((n) => n.html.slice(0, 160)).join(' | ')))";
             let found = browser.run(script, &[]).unwrap();
             faults.extend(found.as_array().unwrap().iter().map(|fault| format!("{name} at {width} px: {fault}")));
+            let unseen = "return [...document.images].filter((i) => !i.complete || !i.naturalWidth).map((i) => i.src)";
+            let unseen = browser.run(unseen, &[]).unwrap();
+            faults.extend(unseen.as_array().unwrap().iter().map(|picture| format!("{name}: not shown: {picture}")));
             let sticks_out = "return document.documentElement.scrollWidth - document.documentElement.clientWidth";
             let sticks_out = browser.run(sticks_out, &[]).unwrap();
             if sticks_out.as_f64() != Some(0.0) {
