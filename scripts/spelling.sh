@@ -12,7 +12,7 @@ for file in "${files[@]}"; do
     [ -f "$file" ] || continue
     words=$(awk '/^[[:space:]]*```/ { code = !code; next } !code' "$file" |
         sed -E -e 's/`[^`]*`//g' -e 's/\]\([^)]*\)/]/g' -e 's/<[^>]*>//g' -e 's#https?://[^ )]*##g' -e 's/&[a-z]+;//g' \
-            -e "s/['’]s\b//g" -e 's#[[:alnum:]_.-]*[/_][[:alnum:]_./-]*##g' -e 's/[[:alnum:]-]+\.[a-z]{2,5}\b//g' -e 's/\b[[:alpha:]]*[0-9][[:alnum:]]*\b//g' |
+            -e "s/['’]s\b//g" -e 's#[[:alnum:]_.-]*[/_][[:alnum:]_./-]*##g' -e 's/[[:alnum:]*-]*\.[a-z]{2,5}\b//g' -e 's/\b[[:alpha:]]*[0-9][[:alnum:]]*\b//g' |
         hunspell -i utf-8 -d en_GB -l | sort -u | { grep -vxFf docs/site/words.txt || true; } | paste -sd' ')
     [ -z "$words" ] || { echo "$file: $words"; unknown=1; }
 done
