@@ -67,7 +67,7 @@ fn fault(root: &Command, words: &[String]) -> Option<String> {
     let mut command = root;
     let mut rest = words;
     while command.has_subcommands() {
-        let Some(verb) = rest.first() else { return None };
+        let verb = rest.first()?;
         if verb.chars().all(|c| !c.is_ascii_lowercase()) {
             // VERB, …, or an option of the program itself.
             return None;
