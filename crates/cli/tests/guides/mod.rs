@@ -127,9 +127,11 @@ fn calls_in_documents_name_verbs_and_options_that_there_are() {
             faults.extend(fault(&program, &call).map(|fault| format!("{name}: sdg {}: {fault}", call.join(" "))));
         }
         for span in of_spans.iter().filter(|span| span.starts_with("--")) {
-            let option = span.split([' ', '=', '…', '|', '[']).next().unwrap();
-            if option.len() > 2 && !known.contains(option) && !is_of_ros2(option) {
-                faults.push(format!("{name}: `{span}`: no verb has the option {option}"));
+            for word in span.split_whitespace().filter(|word| word.starts_with("--") && word.len() > 2) {
+                let option = word.split(['=', '…', '|', '[']).next().unwrap();
+                if !known.contains(option) && !is_of_ros2(option) {
+                    faults.push(format!("{name}: `{span}`: no verb has the option {option}"));
+                }
             }
         }
     }
