@@ -5,7 +5,7 @@ CARGO ?= cargo
 PROFILE := --release
 
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo web edge wheel capi test-python test-c test test-compile test-browser film walk acceptance test-v4l test-peers test-ros2 test-slurm slurm-image deb tarball image windows test-arm64 release hardening network-grasps placing heights test-wgpu test-ndarray test-torch package lint base-weights bench bench-search bench-browser bench-planning clean
+.PHONY: help setup build demo web site test-site test-guides edge wheel capi test-python test-c test test-compile test-browser film walk acceptance test-v4l test-peers test-ros2 test-slurm slurm-image deb tarball image windows test-arm64 release hardening network-grasps placing heights test-wgpu test-ndarray test-torch package lint base-weights bench bench-search bench-browser bench-planning clean
 
 help: ## Lists the targets
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
@@ -21,6 +21,18 @@ demo: build ## Teaches the pendulum from one photo, grasps it ten times, writes 
 
 web: setup ## Builds the page that detects in the browser into target/web
 	@scripts/web.sh
+
+site: setup web ## Builds the site of all guides into target/site (mdBook from its registry, once)
+	@scripts/site.sh
+
+# Screenshots stay in target/site-test.
+test-site: site ## Checks the built site: links, anchors, nothing from elsewhere, size, axe-core at 390 px and on a desk
+	@scripts/install.sh chromium chromium-driver
+	@scripts/axe.sh
+	$(CARGO) test $(PROFILE) --locked --workspace --test checks -- --ignored site::
+
+test-guides: setup ## Runs the guides' commands, those that take long too
+	$(CARGO) test $(PROFILE) --locked --workspace --test cli -- --ignored --nocapture guides::
 
 edge: setup ## Builds sdg without simulator for small machines, target/edge/sdg, and measures it
 	@scripts/edge.sh $(EDGE)
@@ -63,9 +75,9 @@ test-browser: build web ## Tests our pages in headless Chromium
 	$(CARGO) test $(PROFILE) --locked --workspace --test cli -- --ignored --test-threads 1 browser:: --skip film::
 	$(CARGO) test $(PROFILE) --locked --workspace --test browser -- --ignored --test-threads 1
 
-film: build ## Makes the front page's animation of the page, datasets/pictures/page.gif
+film: build ## Makes the pictures of the front page, the tour and the gallery, datasets/pictures
 	@scripts/install.sh chromium chromium-driver
-	$(CARGO) test $(PROFILE) --locked --workspace --test cli -- --ignored film::
+	$(CARGO) test $(PROFILE) --locked --workspace --test cli -- --ignored film:: gallery::
 
 # A folder has demo.* and further pictures with LabelMe marks beside them; FOLDER=2 where the part looks the same after half a turn.
 walk: build ## From a photograph to a tried model with a stop-watch, through the page in Chromium (SETS="FOLDER …")
@@ -156,7 +168,8 @@ package: ## Packages the libraries that other programs can use, into target/pack
 # build fetches LLVM unless it is told that only documents are made; a check does not need it.
 FEATURES = sdg-cli/ndarray,sdg-cli/wgpu,sdg-cli/cuda,sdg-cli/ros2,sdg-base-weights/wgpu,sdg-base-weights/cuda,sdg-web/webgpu,sdg-python/extension
 
-lint: setup ## Formatting and lints, with every feature, as CI denies them
+lint: setup ## Spelling, formatting and lints, with every feature, as CI denies them
+	@scripts/spelling.sh
 	$(CARGO) fmt --all --check
 	DOCS_RS=1 $(CARGO) clippy $(PROFILE) --locked --workspace --all-targets --features $(FEATURES) -- -D warnings
 	$(CARGO) clippy $(PROFILE) --locked --package sdg-cli --no-default-features --all-targets -- -D warnings

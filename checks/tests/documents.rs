@@ -84,6 +84,38 @@ fn links_lead_to_files_and_headings() {
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
+/// The site has the pages that docs/SUMMARY.md lists: all of docs, and what those lead to, since a link to another document would lead
+/// nowhere there.
+#[test]
+fn the_site_s_summary_has_every_guide_and_what_guides_link_to() {
+    let folder = root().join("docs");
+    let path_of = |document: &Path, link: &str| {
+        let file = link.split('#').next().unwrap();
+        (!file.is_empty() && !link.contains("://"))
+            .then(|| document.parent().unwrap().join(file).canonicalize().unwrap())
+    };
+    let summary = folder.join("SUMMARY.md");
+    let listed: Vec<PathBuf> =
+        links(&fs::read_to_string(&summary).unwrap()).iter().filter_map(|link| path_of(&summary, link)).collect();
+    let pages: BTreeSet<PathBuf> = listed.iter().cloned().collect();
+    assert_eq!(pages.len(), listed.len(), "docs/SUMMARY.md lists a page twice");
+    let mut missing = BTreeSet::new();
+    let mut expect = |page: PathBuf, why: &str| {
+        if page.extension().is_some_and(|extension| extension == "md") && page != summary && !pages.contains(&page) {
+            missing.insert(format!("{}, {why}", page.display()));
+        }
+    };
+    for guide in tracked("docs/*.md") {
+        expect(root().join(guide), "a guide");
+    }
+    for page in &pages {
+        for target in links(&fs::read_to_string(page).unwrap()).iter().filter_map(|link| path_of(page, link)) {
+            expect(target, &format!("to which {} leads", page.display()));
+        }
+    }
+    assert!(missing.is_empty(), "docs/SUMMARY.md lacks\n{}", missing.into_iter().collect::<Vec<_>>().join("\n"));
+}
+
 #[test]
 fn files_that_documents_name_exist() {
     let mut faults = Vec::new();

@@ -3,3 +3,4 @@
 
 mod documents;
 mod import_cycles;
+mod site;

@@ -9,6 +9,9 @@ mod browser;
 mod calibration;
 mod camera;
 mod devices;
+mod gallery;
+#[cfg(unix)]
+mod guides;
 mod half_precision;
 mod kept_models;
 mod labelled_pictures;
@@ -21,6 +24,7 @@ mod own_part;
 mod picture_kinds;
 mod place;
 mod plan;
+mod reference;
 mod region;
 #[path = "../../calibration/tests/rendering/mod.rs"]
 mod rendering;

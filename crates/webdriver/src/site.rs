@@ -67,6 +67,8 @@ fn media_type(name: &str) -> &'static str {
         Some("css") => "text/css",
         Some("js" | "mjs") => "text/javascript",
         Some("wasm") => "application/wasm",
+        // Without it a browser shows no drawing; of other pictures it knows the kind by their bytes.
+        Some("svg") => "image/svg+xml",
         _ => "application/octet-stream",
     }
 }
