@@ -70,6 +70,10 @@ export function teachRequest() {
   };
 }
 
+/** The settings that describe the part, and their values in the last teaching; null before it. */
+const partSettings = () => JSON.stringify([chosen("symmetry").value, by("fixed-height").checked]);
+let taughtWith = null;
+
 /** Teaches as the form says. */
 export async function teach() {
   if (isRunning()) return;
@@ -77,6 +81,7 @@ export async function teach() {
   by("teach-error").hidden = true;
   try {
     state.teaching = await api.teach(request);
+    taughtWith = partSettings();
     document.querySelector(".panel").scrollTop = 0;
     watch();
   } catch (error) {
@@ -167,10 +172,11 @@ function renderOutcome(news) {
   if (outcome.textContent !== text) outcome.textContent = text;
   by("teach-error").hidden = news.status !== "failed";
   by("teach-error").textContent = news.error ?? "";
-  const isOld = news.status === "done" && Boolean(state.models.at(-1)?.is_stale);
+  const hasChanged = Boolean(state.models.at(-1)?.is_stale) || (taughtWith !== null && taughtWith !== partSettings());
+  const isOld = news.status === "done" && hasChanged;
   outcome.classList.toggle("outdated", isOld);
   by("teach-old").hidden = !isOld;
-  const old = isOld ? "This result is old: photos, marks or pictures without the part have changed since. Teach again." : "";
+  const old = isOld ? "This result is old: photos, marks, pictures without the part or the part's symmetry have changed since. Teach again." : "";
   if (by("teach-old").textContent !== old) by("teach-old").textContent = old;
   by("go-try").hidden = news.status !== "done";
   by("go-try").classList.toggle("primary", !isOld);

@@ -219,6 +219,13 @@ fn a_refused_one_says_why_and_is_learnt_from() {
     let taught = "return document.querySelectorAll('#version-list li').length === 3
         && document.getElementById('teach-old').hidden && !document.getElementById('go-try').hidden";
     patiently(&page, "another version", taught);
+    // Another symmetry makes the result old, until the earlier one is chosen again.
+    page.click("#tab-teach");
+    for (turns, is_old) in [("2", true), ("1", false)] {
+        let choose = format!("document.querySelector('[name=symmetry][value=\"{turns}\"]').click()");
+        page.browser.run(&choose, &[]).unwrap();
+        page.wait_for("the result's age", &format!("return document.getElementById('teach-old').hidden !== {is_old}"));
+    }
     page.assert_quiet();
 }
 
