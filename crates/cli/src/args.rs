@@ -36,8 +36,14 @@ pub enum Command {
     /// Mark the grasp on photos in the browser, inspect training samples, teach a model and try it
     Annotate(AnnotateArgs),
     /// Teach a grasp model from demonstrations and write it to one file
+    #[command(
+        override_usage = "sdg teach [OPTIONS] --out <FILE> --demo <IMAGE[:ANNOTATION]>\n       sdg teach [OPTIONS] --out <FILE> --demos <DIR>"
+    )]
     Teach(TeachArgs),
     /// Find planar grasps in images or live pictures
+    #[command(
+        override_usage = "sdg detect [OPTIONS] --grasp-model <FILE> <IMAGE|DIR|->...\n       sdg detect [OPTIONS] --grasp-model <FILE> --from <ADDRESS>"
+    )]
     Detect(DetectArgs),
     /// Run grasp attempts in MuJoCo and report them
     Rehearse(RehearseArgs),

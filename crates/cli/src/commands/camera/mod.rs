@@ -28,6 +28,9 @@ pub enum CameraCommand {
     Board(board::BoardArgs),
     /// Calibrate a camera from given pictures of the board, or from pictures that it takes by itself, and write a
     /// camera file
+    #[command(
+        override_usage = "sdg camera calibrate [OPTIONS] <PICTURE>...\n       sdg camera calibrate [OPTIONS] --from <ADDRESS>"
+    )]
     Calibrate(calibrate::CalibrateArgs),
     /// Find a camera's pose from one picture of the board on the table
     Table(table::TableArgs),
