@@ -13,11 +13,13 @@ const LIMITS: ImageLimits = ImageLimits { max_pixels: 1_000_000 };
 /// A decoder holds a picture twice, at 16 bits with alpha.
 const MAX_EXTRA_BYTES: usize = 64 << 20;
 
-fn picture() -> RgbImage {
+/// A small picture of many colours.
+pub(super) fn picture() -> RgbImage {
     RgbImage::from_fn(31, 17, |x, y| Rgb([(x * 8) as u8, (y * 13) as u8, (x * y) as u8]))
 }
 
-fn encoded(format: ImageFormat) -> Vec<u8> {
+/// The same as a file.
+pub(super) fn encoded(format: ImageFormat) -> Vec<u8> {
     let mut bytes = Cursor::new(Vec::new());
     picture().write_to(&mut bytes, format).expect("a picture is encoded");
     bytes.into_inner()
