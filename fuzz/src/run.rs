@@ -88,14 +88,11 @@ pub fn execute(target: &Target, input: &[u8], allocator: &PeakAlloc) -> Executio
     Execution { accepted: broken.is_none() && accepted.unwrap_or_default(), seconds, bytes, broken }
 }
 
-/// Runs a target on the inputs of these numbers; `allocator` as of [`execute`].
-pub fn run(target: &Target, numbers: Range<u64>, allocator: &PeakAlloc) -> Outcome {
-    let seeds = (target.seeds)();
-    // What a target keeps for all its executions is not the first one's.
-    let _ = execute(target, &seeds[0], allocator);
+/// Runs a target on the inputs of these numbers, made of its seeds; `allocator` as of [`execute`].
+pub fn run(target: &Target, seeds: &[Vec<u8>], numbers: Range<u64>, allocator: &PeakAlloc) -> Outcome {
     let mut outcome = Outcome::default();
     for number in numbers {
-        let input = mutated(target, &seeds, number);
+        let input = mutated(target, seeds, number);
         let Execution { accepted, seconds, bytes, broken } = execute(target, &input, allocator);
         outcome.count += 1;
         outcome.accepted += u64::from(accepted);

@@ -70,7 +70,7 @@ pub fn costliest_pickles() -> Vec<Vec<u8>> {
 pub(super) const CHECKPOINT: Target = Target {
     name: "checkpoint",
     max_extra_bytes: 100_000_000,
-    quick_executions: 20_000,
+    quick_executions: 5_000,
     dictionary: &[
         b"\x80\x02}",
         b"PK\x03\x04",
