@@ -2,10 +2,10 @@
 
 use sdg_fci::wire::{
     COMMAND_SIZE_V5, COMMAND_SIZE_V10, CollisionBehavior, Command, ControllerMode, Deviation, HAND_HEADER_SIZE,
-    HEADER_SIZE, HandRequest, Header, HeaderKind, Load, MotionCommand, MotionGeneratorMode, MoveRequest, Request,
-    RobotCommand, RobotMode, RobotState, STATE_SIZE_V5, STATE_SIZE_V10, Status, Version,
+    HEADER_SIZE, HandRequest, Header, HeaderKind, Load, MAX_MESSAGE_SIZE, MotionCommand, MotionGeneratorMode,
+    MoveRequest, Request, RobotCommand, RobotMode, RobotState, STATE_SIZE_V5, STATE_SIZE_V10, Status, Version,
 };
-use sdg_fci::{RobotError, RobotErrors, WireError};
+use sdg_fci::{RobotError, RobotErrors, WireError, read_message};
 
 const VERSIONS: [Version; 2] = [Version::V5, Version::V10];
 
@@ -175,4 +175,44 @@ fn a_message_that_ends_early_or_late_says_by_how_much() {
     assert!(matches!(short, WireError::Short { found: 100, .. }), "{short}");
     let long = RobotState::decode(&[&bytes[..], &[0]].concat(), Version::V5).unwrap_err();
     assert_eq!(long.to_string(), "a state of 2373 bytes was expected, 2374 were found");
+}
+
+#[test]
+fn a_header_announces_no_less_than_itself_and_no_more_than_a_message_has() {
+    for (kind, min) in [(HeaderKind::Robot, HEADER_SIZE as u32), (HeaderKind::Hand, HAND_HEADER_SIZE as u32)] {
+        // The size is the last number of either header.
+        let header = |size: u32| {
+            let mut bytes = Header::message(kind, 1, 1, &[]);
+            bytes[kind.size() - 4..].copy_from_slice(&size.to_le_bytes());
+            Header::decode(&bytes, kind)
+        };
+        for size in [min, MAX_MESSAGE_SIZE] {
+            assert_eq!(header(size).unwrap().payload_size(kind), (size - min) as usize);
+        }
+        for found in [0, min - 1, MAX_MESSAGE_SIZE + 1, u32::MAX] {
+            assert_eq!(header(found), Err(WireError::MessageSize { min, max: MAX_MESSAGE_SIZE, found }));
+        }
+    }
+}
+
+/// What a message announces is taken as it arrives, in steps.
+#[test]
+fn a_header_that_announces_much_takes_little_memory() {
+    struct Stream<'a> {
+        bytes: &'a [u8],
+        largest_buffer: usize,
+    }
+    impl std::io::Read for Stream<'_> {
+        fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+            self.largest_buffer = self.largest_buffer.max(buffer.len());
+            self.bytes.read(buffer)
+        }
+    }
+    let mut bytes = Header::message(HeaderKind::Robot, 1, 1, &[7; 100]);
+    bytes[HEADER_SIZE - 4..HEADER_SIZE].copy_from_slice(&MAX_MESSAGE_SIZE.to_le_bytes());
+    let mut stream = Stream { bytes: &bytes, largest_buffer: 0 };
+    let error = read_message(&mut stream, HeaderKind::Robot).unwrap_err();
+    assert_eq!(error.kind(), std::io::ErrorKind::UnexpectedEof);
+    // Of the 4 MB that were announced.
+    assert!(stream.largest_buffer <= 8192, "{}", stream.largest_buffer);
 }
