@@ -17,11 +17,11 @@ READERS = [
     ("labelme", ["crates/demonstration/src/labelme.rs"]),
     ("yolo, data_yaml", ["crates/demonstration/src/yolo_pose.rs", "crates/demonstration/src/data_yaml.rs"]),
     ("opendr", ["crates/demonstration/src/npy.rs", "crates/demonstration/src/opendr.rs"]),
-    ("formats together", ["crates/demonstration/src/draft.rs", "crates/demonstration/src/format.rs", "crates/demonstration/src/reading.rs",
+    ("formats together", ["crates/demonstration/src/draft.rs", "crates/demonstration/src/format.rs",
                           "crates/demonstration/src/foreign.rs"]),
     ("png, jpeg, tiff, webp_bmp_ppm", ["crates/picture/src/"]),
     ("camera_file", ["crates/calibration/src/camera_file.rs", "crates/calibration/src/camera_sections.rs"]),
-    ("robot_poses", ["crates/calibration/src/hand_eye/poses_file.rs", "crates/calibration/src/hand_eye/readings.rs"]),
+    ("robot_poses", ["crates/calibration/src/hand_eye/poses_file.rs"]),
     ("workcell", ["crates/robot/src/workcell/"]),
     ("franka", ["crates/fci/src/wire/", "crates/fci/src/message.rs"]),
     ("fci_server", ["crates/fci/src/server/" + name for name in

@@ -1,6 +1,6 @@
 //! What is checked of the order and origin of messages, on both sides, over TCP and UDP on this computer.
 
-use std::io::{Read, Write};
+use std::io::Write;
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream, UdpSocket};
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -15,7 +15,7 @@ use sdg_fci::wire::{
     ControllerMode, Deviation, Header, HeaderKind, MotionCommand, MotionGeneratorMode, MoveRequest, Request,
     RobotCommand, RobotMode, RobotState, STATE_SIZE_V5, Version,
 };
-use sdg_fci::{FciError, read_message};
+use sdg_fci::{FciError, RobotError, RobotErrors, read_message};
 
 const TIMEOUT: Duration = Duration::from_millis(300);
 
@@ -89,9 +89,13 @@ fn a_state_of_another_computer_is_none() {
 fn an_answer_to_another_request_is_none() {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let played = listener.try_clone().unwrap();
-    let robot = thread::spawn(move || welcome(&played, 1));
+    let robot = thread::spawn(move || {
+        let (stream, client) = welcome(&played, 1);
+        UdpSocket::bind("127.0.0.1:0").unwrap().send_to(&state(1), client).unwrap();
+        stream
+    });
     let error = connect(&listener).unwrap_err();
-    assert!(matches!(error, FciError::Timeout { .. }), "{error}");
+    assert!(matches!(error, FciError::Timeout { what: "connect", .. }), "{error:?}");
     drop(robot.join().unwrap());
 }
 
@@ -174,7 +178,8 @@ impl Plant for FreeArm {
 
 /// A client of bare sockets, in a motion of joint positions.
 struct Client {
-    stream: TcpStream,
+    /// Kept open, or the robot would stop.
+    _stream: TcpStream,
     udp: UdpSocket,
 }
 
@@ -198,7 +203,7 @@ impl Client {
         });
         stream.write_all(&start.encode(2, Version::V5).unwrap()).unwrap();
         read_message(&mut stream, HeaderKind::Robot).unwrap().unwrap();
-        let client = Self { stream, udp };
+        let client = Self { _stream: stream, udp };
         while client.state().0.robot_mode != RobotMode::Move {}
         client
     }
@@ -261,6 +266,9 @@ fn a_position_that_is_no_number_stops_the_robot() {
         }
     }
     let reflex = (0..1000).map(|_| client.state().0).find(|state| state.robot_mode == RobotMode::Reflex);
-    assert!(reflex.is_some_and(|state| state.q_desired.iter().all(|q| q.is_finite()) && !state.errors.is_empty()));
-    let _ = (&client.stream).read(&mut [0; 64]);
+    let reflex = reflex.expect("a robot in reflex");
+    assert!(reflex.q_desired.iter().all(|q| q.is_finite()), "{:?}", reflex.q_desired);
+    // Of that alone: where a number that is none got further, other limits would be told as well.
+    assert_eq!(reflex.errors, RobotErrors::from(RobotError::JointMotionGeneratorPositionLimitsViolation));
+    drop(client);
 }

@@ -30,6 +30,7 @@ pub const TARGETS: &[Target] = &[
     marks::DATA_YAML,
     marks::OPENDR,
     pictures::PNG,
+    pictures::PNG_CHUNKS,
     pictures::JPEG,
     pictures::TIFF,
     pictures::OTHERS,

@@ -183,7 +183,15 @@ pub(super) const DETECTOR_CONFIG: Target = Target {
     name: "detector_config",
     max_extra_bytes: 16 << 20,
     quick_executions: 20_000,
-    dictionary: &[b"null", b"[]", b"{}", b"true"],
-    seeds: || vec![serde_json::to_vec(&sdg_detection::presets::edge(12)).unwrap_or_default()],
+    dictionary: &[b"null", b"[]", b"{}", b"true", b"\"faster\"", b"\"keypoint\"", b"\"mask\"", b"\"torchvision\""],
+    seeds: || {
+        let changes = br#"{"kind":"keypoint","numerics":"detectron2","classes":3,"keypoints":5,"min_size_test":320,"max_size_test":640,
+"stem_out_channels":16,"res2_out_channels":64,"width_per_group":16,"num_blocks":[1,1,1,1],"fpn_channels":32,"box_head_fc":64,"keypoint_convs":16}"#;
+        vec![
+            serde_json::to_vec(&sdg_detection::presets::edge(12)).unwrap_or_default(),
+            changes.to_vec(),
+            br#"{"kind":"mask","numerics":"torchvision","mask_convs":16}"#.to_vec(),
+        ]
+    },
     run: |bytes| std::str::from_utf8(bytes).is_ok_and(|text| RcnnConfig::from_json(text).is_ok()),
 };
