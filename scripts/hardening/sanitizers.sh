@@ -13,5 +13,5 @@ export RUSTC_BOOTSTRAP=1 RUSTFLAGS="-Zsanitizer=$kind" CARGO_TARGET_DIR=target/h
 # A file that may not grow is a signal that ends the sanitizer's own report; a leak is no error of memory here: threads outlive their tests.
 export ASAN_OPTIONS=detect_leaks=0 TSAN_OPTIONS=halt_on_error=0
 for package in $packages; do
-    cargo test --release --locked "${build_std[@]}" --target "$host" --package "$package" --lib
+    cargo test --release --locked "${build_std[@]}" --target "$host" --package "$package" --lib --tests
 done
