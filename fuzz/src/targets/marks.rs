@@ -86,12 +86,7 @@ pub(super) const YOLO: Target = Target {
     dictionary: &[b" 0.5", b"\n", b"\r\n", b" 2", b"-0.1 "],
     seeds: || {
         let line = b"0 0.5 0.5 0.25 0.125 0.4 0.5 2 0.6 0.5 2\n";
-        // Without visibilities, and a box alone.
-        vec![
-            line.to_vec(),
-            file(&format!("{FORMATS}/yolo-pose.txt")),
-            b"0 0.5 0.5 0.25 0.125 0.4 0.5 0.6 0.5\n".to_vec(),
-        ]
+        vec![line.to_vec(), file(&format!("{FORMATS}/yolo-pose.txt"))]
     },
     run: |bytes| read(bytes, Some(DATA), &PICTURE) | read(bytes, None, &PICTURE),
 };
