@@ -5,7 +5,7 @@ CARGO ?= cargo
 PROFILE := --release
 
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo web site test-site test-guides edge wheel capi test-python test-c test test-compile test-browser film walk acceptance test-v4l test-peers test-ros2 test-slurm slurm-image deb tarball image windows test-arm64 release hardening network-grasps placing heights test-wgpu test-ndarray test-torch package lint base-weights bench bench-search bench-browser bench-planning clean
+.PHONY: help setup build demo web site test-site test-guides edge wheel capi test-python test-c test test-compile test-browser film walk acceptance test-v4l test-peers test-ros2 test-slurm slurm-image deb tarball image windows test-arm64 release hardening network-grasps placing heights test-wgpu test-ndarray test-torch package lint base-weights bench bench-search bench-browser bench-planning clean deny
 
 help: ## Lists the targets
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
@@ -124,9 +124,8 @@ windows: setup ## sdg.exe without simulator, as a zip in target/packages/windows
 release: setup ## All packages with checksums, lists of what is in them, and the check of the libraries' interfaces, in target/packages/release
 	@scripts/packages/release.sh
 
-hardening: setup ## Hostile input for every reader of strangers' files and messages, resumed where it ended (EXECUTIONS=1000000, TARGETS="png jpeg")
-	@scripts/build.sh --bin hardening
-	@target/release/hardening --executions $(or $(EXECUTIONS),100000) $(TARGETS)
+hardening: setup ## Hostile input for every reader of strangers' files and messages, resumed where it ended (EXECUTIONS=1000000, TARGETS="png jpeg"; QUICK=1: two minutes; COVERAGE=1: lines reached; SECTIONS="input sync coverage guards address thread")
+	@QUICK="$(QUICK)" SECTIONS="$(or $(SECTIONS),$(if $(COVERAGE),coverage))" EXECUTIONS="$(EXECUTIONS)" TARGETS="$(TARGETS)" SHOW="$(SHOW)" scripts/hardening/run.sh
 
 # burn is compiled once more, with the device's backend; the tests are those that compare devices with flex.
 DEVICE_TESTS = $(CARGO) test $(PROFILE) --locked -p sdg-kernels -p sdg-grasp -p sdg-cli --features sdg-cli/$(1)
@@ -173,6 +172,9 @@ lint: setup ## Spelling, formatting and lints, with every feature, as CI denies 
 	$(CARGO) fmt --all --check
 	DOCS_RS=1 $(CARGO) clippy $(PROFILE) --locked --workspace --all-targets --features $(FEATURES) -- -D warnings
 	$(CARGO) clippy $(PROFILE) --locked --package sdg-cli --no-default-features --all-targets -- -D warnings
+
+deny: setup ## Licences and sources of all dependencies, and advisories where their database can be reached (ADVISORIES=FOLDER: a clone of it)
+	@ADVISORIES="$(ADVISORIES)" scripts/deny.sh
 
 # What is in target/base-weights is gone on with. DEVICE: flex, wgpu or cuda.
 DEVICE ?= flex

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use sdg_checks::{crate_rows, headings, links, named_files, names_in_code};
+use sha2::{Digest, Sha256};
 
 /// Folders of the repository whose files are named by path in documents.
 const FOLDERS: [&str; 11] = [
@@ -181,4 +182,18 @@ fn crates_that_never_see_burn_do_not() {
             }
         }
     }
+}
+
+/// Who changes the weights says where the new ones come from.
+#[test]
+fn the_shipped_weights_are_those_whose_provenance_is_told() {
+    let document = fs::read_to_string(root().join("docs/decisions/013-base-weights.md")).unwrap();
+    let told = document.lines().find_map(|line| line.strip_prefix("| SHA-256 | `")?.split('`').next());
+    let weights = fs::read(root().join("crates/grasp/weights/edge.safetensors")).unwrap();
+    let found: String = Sha256::digest(&weights).iter().map(|byte| format!("{byte:02x}")).collect();
+    assert_eq!(
+        told,
+        Some(found.as_str()),
+        "expected the SHA-256 of the document (left), found that of the file (right)"
+    );
 }

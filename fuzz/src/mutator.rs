@@ -35,12 +35,17 @@ pub fn mutated(target: &Target, seeds: &[Vec<u8>], number: u64) -> Vec<u8> {
     let rng = &mut Pcg64Mcg::seed_from_u64(name_hash.wrapping_add(number));
     let mut bytes = seeds[rng.random_range(0..seeds.len())].clone();
     let other = &seeds[rng.random_range(0..seeds.len())];
+    make_mistakes(&mut bytes, other, target.dictionary, rng);
+    bytes
+}
+
+/// Makes mistakes in bytes: mostly one, at most six. `other` is what pieces are taken from, `dictionary` words of the format.
+pub fn make_mistakes(bytes: &mut Vec<u8>, other: &[u8], dictionary: &[&[u8]], rng: &mut Pcg64Mcg) {
     // Half of all inputs have one mistake, a quarter two, and so on.
     let num_mistakes = (rng.random::<u32>().trailing_zeros() + 1).min(MAX_MISTAKES);
     for _ in 0..num_mistakes {
-        make_mistake(&mut bytes, other, target.dictionary, rng);
+        make_mistake(bytes, other, dictionary, rng);
     }
-    bytes
 }
 
 fn make_mistake(bytes: &mut Vec<u8>, other: &[u8], dictionary: &[&[u8]], rng: &mut Pcg64Mcg) {

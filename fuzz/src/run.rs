@@ -2,12 +2,13 @@
 
 use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Mutex, MutexGuard, Once, PoisonError};
 use std::time::Instant;
 
 use peak_alloc::PeakAlloc;
 
 use crate::mutator::mutated;
-use crate::target::{MAX_SECONDS, Target};
+use crate::target::{MAX_BYTES_PER_INPUT_BYTE, MAX_SECONDS, Target};
 
 /// What an execution broke.
 #[derive(Debug, Clone)]
@@ -35,38 +36,69 @@ pub struct Outcome {
     pub failures: Vec<Failure>,
 }
 
-/// Runs a target on the inputs of these numbers.
+/// What one execution came to.
+#[derive(Debug, Clone)]
+pub struct Execution {
+    /// Whether the reader accepted the input.
+    pub accepted: bool,
+    /// Seconds that it took.
+    pub seconds: f64,
+    /// Most bytes in use, beyond those before.
+    pub bytes: usize,
+    /// What was promised and what was found, where that differs.
+    pub broken: Option<String>,
+}
+
+/// The first panic of any thread since the execution began; also one that is caught where it happened.
+static PANIC: Mutex<Option<String>> = Mutex::new(None);
+
+fn panic_text() -> MutexGuard<'static, Option<String>> {
+    PANIC.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Notes panics instead of printing them.
+fn note_panics() {
+    static ONCE: Once = Once::new();
+    ONCE.call_once(|| {
+        std::panic::set_hook(Box::new(|panic| {
+            panic_text().get_or_insert_with(|| panic.to_string().replace('\n', " "));
+        }));
+    });
+}
+
+/// Runs a target on one input.
 ///
 /// `allocator` is the program's, which nothing else uses meanwhile: it counts what is taken.
-pub fn run(target: &Target, numbers: Range<u64>, allocator: &PeakAlloc) -> Outcome {
-    let seeds = (target.seeds)();
+pub fn execute(target: &Target, input: &[u8], allocator: &PeakAlloc) -> Execution {
+    note_panics();
+    let before = allocator.current_usage();
+    allocator.reset_peak_usage();
+    let start = Instant::now();
+    let accepted = catch_unwind(AssertUnwindSafe(|| (target.run)(input)));
+    let seconds = start.elapsed().as_secs_f64();
+    let bytes = allocator.peak_usage().saturating_sub(before);
+    let bound = target.max_extra_bytes + MAX_BYTES_PER_INPUT_BYTE * input.len();
+    let panic = panic_text().take();
+    let broken = match panic {
+        Some(panic) => Some(format!("a panic: {panic}")),
+        None if seconds > MAX_SECONDS => Some(format!("{seconds:.1} s, of at most {MAX_SECONDS}")),
+        None if bytes > bound => Some(format!("{bytes} bytes, of at most {bound}")),
+        None => None,
+    };
+    Execution { accepted: broken.is_none() && accepted.unwrap_or_default(), seconds, bytes, broken }
+}
+
+/// Runs a target on the inputs of these numbers, made of its seeds; `allocator` as of [`execute`].
+pub fn run(target: &Target, seeds: &[Vec<u8>], numbers: Range<u64>, allocator: &PeakAlloc) -> Outcome {
     let mut outcome = Outcome::default();
     for number in numbers {
-        let input = mutated(target, &seeds, number);
-        let before = allocator.current_usage();
-        allocator.reset_peak_usage();
-        let start = Instant::now();
-        let accepted = catch_unwind(AssertUnwindSafe(|| (target.run)(&input)));
-        let seconds = start.elapsed().as_secs_f64();
-        let taken = allocator.peak_usage().saturating_sub(before);
+        let input = mutated(target, seeds, number);
+        let Execution { accepted, seconds, bytes, broken } = execute(target, &input, allocator);
         outcome.count += 1;
+        outcome.accepted += u64::from(accepted);
         outcome.slowest_secs = outcome.slowest_secs.max(seconds);
-        outcome.most_bytes = outcome.most_bytes.max(taken);
-        let bound = target.max_extra_bytes + 20 * input.len();
-        let reason = match accepted {
-            Err(panic) => {
-                let text = panic.downcast_ref::<String>().cloned();
-                let text = text.or_else(|| panic.downcast_ref::<&str>().map(|text| (*text).to_owned()));
-                Some(format!("a panic: {}", text.unwrap_or_default()))
-            }
-            Ok(_) if seconds > MAX_SECONDS => Some(format!("{seconds:.1} s, of at most {MAX_SECONDS}")),
-            Ok(_) if taken > bound => Some(format!("{taken} bytes, of at most {bound}")),
-            Ok(accepted) => {
-                outcome.accepted += u64::from(accepted);
-                None
-            }
-        };
-        outcome.failures.extend(reason.map(|reason| Failure { number, reason, input }));
+        outcome.most_bytes = outcome.most_bytes.max(bytes);
+        outcome.failures.extend(broken.map(|reason| Failure { number, reason, input }));
     }
     outcome
 }

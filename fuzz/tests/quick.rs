@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used)]
 
 use peak_alloc::PeakAlloc;
-use sdg_fuzz::{TARGETS, run};
+use sdg_fuzz::{TARGETS, costliest_pickles, execute, run};
 
 #[global_allocator]
 static ALLOCATOR: PeakAlloc = PeakAlloc;
@@ -12,12 +12,14 @@ fn every_reader_refuses_or_reads_and_takes_neither_long_nor_much() {
     let mut wrong = Vec::new();
     for target in TARGETS {
         // Unchanged, each is read: else nothing of the format would be tried.
-        for (k, seed) in (target.seeds)().iter().enumerate() {
-            if !(target.run)(seed) {
-                wrong.push(format!("{}: seed {k} is refused", target.name));
+        let seeds = (target.seeds)();
+        for (k, seed) in seeds.iter().enumerate() {
+            let execution = execute(target, seed, &ALLOCATOR);
+            if !execution.accepted {
+                wrong.push(format!("{}: seed {k} is refused: {:?}", target.name, execution.broken));
             }
         }
-        let outcome = run(target, 0..target.quick_executions, &ALLOCATOR);
+        let outcome = run(target, &seeds, 0..target.quick_executions, &ALLOCATOR);
         println!(
             "{}: {} of {} accepted, slowest {:.0} ms, most {:.1} MB",
             target.name,
@@ -38,5 +40,20 @@ fn every_reader_refuses_or_reads_and_takes_neither_long_nor_much() {
             wrong.push(format!("{}: {} of {} accepted", target.name, outcome.accepted, outcome.count));
         }
     }
+    // No mistake makes these: an operation of a pickle, a million times.
+    let checkpoint = TARGETS.iter().find(|target| target.name == "checkpoint").unwrap();
+    for (k, pickle) in costliest_pickles().iter().enumerate() {
+        // The program reads a file from the disk: of the input's twenty bytes a byte this leaves three.
+        let execution = execute(checkpoint, pickle, &ALLOCATOR);
+        let most = checkpoint.max_extra_bytes + 3 * pickle.len();
+        if execution.broken.is_some() || execution.bytes > most {
+            wrong.push(format!(
+                "costly pickle {k}: {} bytes of at most {most}, {:?}",
+                execution.bytes, execution.broken
+            ));
+        }
+    }
+    // The targets' own hook notes panics and prints none.
+    let _ = std::panic::take_hook();
     assert!(wrong.is_empty(), "{wrong:#?}");
 }

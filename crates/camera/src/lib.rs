@@ -54,7 +54,7 @@ pub use decode::decode as decode_picture;
 pub use error::CameraError;
 pub use fault::Fault;
 pub use frame::{Camera, Frame, mean_brightness};
-pub use http::Url;
+pub use http::{Url, read_pictures};
 pub use latest::LatestFrame;
 pub use open::open;
 pub use options::{Encoding, OpenOptions};

@@ -1,6 +1,5 @@
 //! One program for all tests of this folder: each links the whole crate.
 #![allow(clippy::unwrap_used)]
 
-mod hostile_robot;
-mod mutations;
+mod sequence;
 mod wire;

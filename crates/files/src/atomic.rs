@@ -192,4 +192,37 @@ mod tests {
         assert_eq!(fs::read(&path).unwrap(), b"old");
         assert_eq!(names_in(folder.path()), ["model"]);
     }
+
+    /// Runs only as the child of [`a_file_is_flushed_before_it_takes_its_name_and_its_folder_after`].
+    #[cfg(target_os = "linux")]
+    #[test]
+    #[ignore = "another test runs it under strace"]
+    fn child_that_writes() {
+        write_atomically(Path::new(&std::env::var_os("SDG_TRACED_FILE").unwrap()), b"new").unwrap();
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    #[ignore = "needs strace, which `make hardening` installs"]
+    fn a_file_is_flushed_before_it_takes_its_name_and_its_folder_after() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("model");
+        let output = std::process::Command::new("strace")
+            .args(["-f", "-y", "-e", "trace=fsync,fdatasync,/rename"])
+            .arg(std::env::current_exe().unwrap())
+            .args(["--ignored", "--exact", "atomic::tests::child_that_writes"])
+            .env("SDG_TRACED_FILE", &path)
+            .output()
+            .unwrap();
+        assert!(output.status.success(), "{output:?}");
+        // The calls as strace prints them: `fsync(3</tmp/…/.sdg-x.tmp>)`, `rename("/tmp/…", "/tmp/…/model")`.
+        let printed = String::from_utf8_lossy(&output.stderr);
+        let calls: Vec<&str> = printed.lines().filter(|line| line.contains(" = 0")).collect();
+        let folder = folder.path().display().to_string();
+        let at = |wanted: &dyn Fn(&str) -> bool| calls.iter().position(|call| wanted(call));
+        let file = at(&|call| call.contains("sync(") && call.contains(".tmp>"));
+        let name = at(&|call| call.contains("rename") && call.contains("/model\""));
+        let after = at(&|call| call.contains("sync(") && call.contains(&format!("<{folder}>")));
+        assert!(file.is_some() && file < name && name < after, "{printed}");
+    }
 }

@@ -146,4 +146,33 @@ mod tests {
         assert_eq!(fs::read_to_string(&file).unwrap(), format!("{process}\n"));
         drop(taken);
     }
+
+    /// A holder removes the file, which another has opened by then and a third makes anew: two files, of which one counts.
+    #[cfg(unix)]
+    #[test]
+    fn a_lock_of_a_file_that_was_removed_counts_for_nothing() {
+        use std::sync::atomic::{AtomicBool, Ordering};
+        const TAKEN_BY_EACH: u32 = 150;
+        let folder = tempfile::tempdir().unwrap();
+        let marks = folder.path().join("part.json");
+        let is_held = AtomicBool::new(false);
+        let take_and_give_back = || {
+            let mut num_taken = 0;
+            while num_taken < TAKEN_BY_EACH {
+                let Ok(Some(lock)) = WriterLock::take(&marks) else {
+                    std::thread::yield_now();
+                    continue;
+                };
+                assert!(!is_held.swap(true, Ordering::SeqCst), "expected one holder, found two");
+                num_taken += 1;
+                std::thread::yield_now();
+                is_held.store(false, Ordering::SeqCst);
+                drop(lock);
+            }
+        };
+        std::thread::scope(|scope| {
+            let threads = [(); 3].map(|()| scope.spawn(take_and_give_back));
+            threads.into_iter().for_each(|thread| thread.join().unwrap());
+        });
+    }
 }

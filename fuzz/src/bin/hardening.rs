@@ -1,5 +1,5 @@
-//! `hardening [--executions N] [--out DIR] [TARGET…]`: many executions of the targets, resumed where they ended; `hardening --input FILE TARGET`
-//! is one execution, whose panic is told whole.
+//! `hardening [--executions N] [--seconds S] [--out DIR] [TARGET…]`: many executions of the targets, resumed where they ended, in S seconds for
+//! all of them together at most; `hardening --input FILE TARGET` is one execution, whose panic is told whole.
 //!
 //! A target's figures stand in DIR/TARGET.json, and each input that broke a promise in DIR/TARGET-NUMBER.bin.
 
@@ -7,33 +7,40 @@ use std::error::Error;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use peak_alloc::PeakAlloc;
-use sdg_fuzz::{Outcome, TARGETS, Target, run};
+use sdg_fuzz::{Outcome, TARGETS, Target, execute, run};
 use serde_json::{Value, json};
 
 #[global_allocator]
 static ALLOCATOR: PeakAlloc = PeakAlloc;
 
-/// Executions after which the figures are written.
-const BATCH: u64 = 10_000;
-const USAGE: &str = "usage: hardening [--executions N] [--out DIR] [TARGET…], or hardening --input FILE TARGET";
+/// Executions after which the time is looked at.
+const BATCH: u64 = 50;
+/// The figures are written so often.
+const KEEP_EVERY: Duration = Duration::from_secs(5);
+const USAGE: &str =
+    "usage: hardening [--executions N] [--seconds S] [--out DIR] [TARGET…], or hardening --input FILE TARGET";
 
 struct Asked {
     executions: u64,
+    /// For all targets together.
+    time: Option<Duration>,
     out: PathBuf,
     input: Option<PathBuf>,
     targets: Vec<&'static Target>,
 }
 
 fn asked() -> Result<Asked, Box<dyn Error>> {
-    let mut asked = Asked { executions: 100_000, out: "target/hardening".into(), input: None, targets: Vec::new() };
+    let mut asked =
+        Asked { executions: 100_000, time: None, out: "target/hardening".into(), input: None, targets: Vec::new() };
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
         let mut value = || arguments.next().ok_or(USAGE);
         match argument.as_str() {
             "--executions" => asked.executions = value()?.parse()?,
+            "--seconds" => asked.time = Some(Duration::from_secs(value()?.parse()?)),
             "--out" => asked.out = value()?.into(),
             "--input" => asked.input = Some(value()?.into()),
             name => {
@@ -55,7 +62,7 @@ fn reached(file: &Path) -> Value {
     text.and_then(|text| serde_json::from_str(&text).ok()).unwrap_or_else(|| json!({}))
 }
 
-fn attack(target: &Target, executions: u64, out: &Path) -> Result<u64, Box<dyn Error>> {
+fn attack(target: &Target, executions: u64, until: Option<Instant>, out: &Path) -> Result<u64, Box<dyn Error>> {
     let file = out.join(format!("{}.json", target.name));
     let earlier = reached(&file);
     let number = |key: &str| earlier[key].as_u64().unwrap_or(0);
@@ -63,20 +70,26 @@ fn attack(target: &Target, executions: u64, out: &Path) -> Result<u64, Box<dyn E
     let (mut accepted, mut most_bytes) = (number("accepted"), number("most_bytes"));
     let mut slowest_secs = earlier["slowest_secs"].as_f64().unwrap_or(0.0);
     let mut seconds = earlier["seconds"].as_f64().unwrap_or(0.0);
-    while total < executions {
+    let seeds = (target.seeds)();
+    // What a target keeps for all its executions is not the first one's.
+    let _ = execute(target, &seeds[0], &ALLOCATOR);
+    let is_in_time = || until.is_none_or(|until| Instant::now() < until);
+    while total < executions && is_in_time() {
         let start = Instant::now();
-        let end = executions.min(total + BATCH);
-        let Outcome { count, accepted: more, slowest_secs: slowest, most_bytes: most, failures: found } =
-            run(target, total..end, &ALLOCATOR);
-        for failure in &found {
-            fs::write(out.join(format!("{}-{}.bin", target.name, failure.number)), &failure.input)?;
-            eprintln!("{}: number {}: {}", target.name, failure.number, failure.reason);
+        while total < executions && start.elapsed() < KEEP_EVERY && is_in_time() {
+            let end = executions.min(total + BATCH);
+            let Outcome { count, accepted: more, slowest_secs: slowest, most_bytes: most, failures: found } =
+                run(target, &seeds, total..end, &ALLOCATOR);
+            for failure in &found {
+                fs::write(out.join(format!("{}-{}.bin", target.name, failure.number)), &failure.input)?;
+                eprintln!("{}: number {}: {}", target.name, failure.number, failure.reason);
+            }
+            total += count;
+            accepted += more;
+            failures += found.len() as u64;
+            most_bytes = most_bytes.max(most as u64);
+            slowest_secs = slowest_secs.max(slowest);
         }
-        total += count;
-        accepted += more;
-        failures += found.len() as u64;
-        most_bytes = most_bytes.max(most as u64);
-        slowest_secs = slowest_secs.max(slowest);
         seconds += start.elapsed().as_secs_f64();
         let figures = json!({
             "executions": total, "accepted": accepted, "failures": failures, "most_bytes": most_bytes,
@@ -107,8 +120,11 @@ fn main() -> Result<ExitCode, Box<dyn Error>> {
     // Each panic is a line of the figures; its message is not printed twice.
     std::panic::set_hook(Box::new(|_| {}));
     let mut failures = 0;
-    for target in &asked.targets {
-        failures += attack(target, asked.executions, &asked.out)?;
+    let begin = Instant::now();
+    for (place, target) in (1..).zip(&asked.targets) {
+        // What one target leaves of its time is the others'.
+        let until = asked.time.map(|time| begin + time * place / asked.targets.len() as u32);
+        failures += attack(target, asked.executions, until, &asked.out)?;
     }
     Ok(if failures == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }

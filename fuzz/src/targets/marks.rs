@@ -69,7 +69,7 @@ pub(super) const LABELME: Target = Target {
         b"\"imageData\"",
         b"[]",
     ],
-    seeds: || vec![file("datasets/demonstrations/pendulum/annotation.json")],
+    seeds: || vec![file("datasets/demonstrations/pendulum/annotation.json"), file(&format!("{FORMATS}/labelme.json"))],
     run: |bytes| {
         let _ = LabelFile::parse(bytes).map(|labels| labels.picture_names());
         read(bytes, None, &PICTURE)
@@ -84,7 +84,10 @@ pub(super) const YOLO: Target = Target {
     max_extra_bytes: MAX_EXTRA_BYTES,
     quick_executions: 20_000,
     dictionary: &[b" 0.5", b"\n", b"\r\n", b" 2", b"-0.1 "],
-    seeds: || vec![b"0 0.5 0.5 0.25 0.125 0.4 0.5 2 0.6 0.5 2\n".to_vec()],
+    seeds: || {
+        let line = b"0 0.5 0.5 0.25 0.125 0.4 0.5 2 0.6 0.5 2\n";
+        vec![line.to_vec(), file(&format!("{FORMATS}/yolo-pose.txt"))]
+    },
     run: |bytes| read(bytes, Some(DATA), &PICTURE) | read(bytes, None, &PICTURE),
 };
 

@@ -13,13 +13,24 @@ const LIMITS: ImageLimits = ImageLimits { max_pixels: 1_000_000 };
 /// A decoder holds a picture twice, at 16 bits with alpha.
 const MAX_EXTRA_BYTES: usize = 64 << 20;
 
-fn picture() -> RgbImage {
+/// A small picture of many colours.
+pub(super) fn picture() -> RgbImage {
     RgbImage::from_fn(31, 17, |x, y| Rgb([(x * 8) as u8, (y * 13) as u8, (x * y) as u8]))
 }
 
-fn encoded(format: ImageFormat) -> Vec<u8> {
+/// The same as a file.
+pub(super) fn encoded(format: ImageFormat) -> Vec<u8> {
     let mut bytes = Cursor::new(Vec::new());
     picture().write_to(&mut bytes, format).expect("a picture is encoded");
+    bytes.into_inner()
+}
+
+/// The same with a channel that says how much of a pixel is seen.
+fn with_alpha(format: ImageFormat) -> Vec<u8> {
+    let mut bytes = Cursor::new(Vec::new());
+    let mut picture = image::DynamicImage::ImageRgb8(picture()).into_rgba8();
+    picture.pixels_mut().enumerate().for_each(|(place, pixel)| pixel.0[3] = if place % 3 == 0 { 0 } else { 255 });
+    picture.write_to(&mut bytes, format).expect("a picture is encoded");
     bytes.into_inner()
 }
 
@@ -42,10 +53,39 @@ pub(super) const PNG: Target = Target {
         deep.write_to(&mut bytes[0], ImageFormat::Png).expect("a picture is encoded");
         grey.write_to(&mut bytes[1], ImageFormat::Png).expect("a picture is encoded");
         let [deep, grey] = bytes.map(Cursor::into_inner);
-        vec![encoded(ImageFormat::Png), deep, grey]
+        vec![encoded(ImageFormat::Png), deep, grey, with_alpha(ImageFormat::Png)]
     },
     run: read,
 };
+
+/// PNG whose checksums are made right again, so that mistakes get behind them.
+pub(super) const PNG_CHUNKS: Target = Target {
+    name: "png_chunks",
+    seeds: || {
+        let plain = encoded(ImageFormat::Png);
+        // Orientation 6, between the header and the pixels.
+        let exif = b"\0\0\0\x1aeXIfMM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0\0\0\0\0";
+        let turned = [&plain[..33], exif, &plain[33..]].concat();
+        (PNG.seeds)().into_iter().chain([turned]).collect()
+    },
+    run: |bytes| read(&with_checksums(bytes)),
+    ..PNG
+};
+
+/// A PNG with the checksum that each of its whole chunks should have.
+fn with_checksums(bytes: &[u8]) -> Vec<u8> {
+    let mut png = bytes.to_vec();
+    let mut at = 8;
+    while let Some(&[a, b, c, d]) = png.get(at..at + 4).and_then(|length| length.first_chunk::<4>()) {
+        let end = (at + 8).saturating_add(u32::from_be_bytes([a, b, c, d]) as usize);
+        let Some(checked) = png.get(at + 4..end) else { break };
+        let sum = crc32fast::hash(checked).to_be_bytes();
+        let Some(place) = png.get_mut(end..end + 4) else { break };
+        place.copy_from_slice(&sum);
+        at = end + 4;
+    }
+    png
+}
 
 /// JPEG with an orientation, and the scanner that cuts a stream of them.
 pub(super) const JPEG: Target = Target {
@@ -84,7 +124,12 @@ pub(super) const TIFF: Target = Target {
     max_extra_bytes: MAX_EXTRA_BYTES,
     quick_executions: 20_000,
     dictionary: &[b"II*\0", b"MM\0*", b"II+\0\x08\0\0\0", b"\x12\x01\x03\0", b"\x53\x01\x03\0", b"\x0e\x01\x02\0"],
-    seeds: || vec![encoded(ImageFormat::Tiff)],
+    seeds: || {
+        let deep = image::DynamicImage::ImageRgb8(picture()).into_rgb16();
+        let mut bytes = Cursor::new(Vec::new());
+        deep.write_to(&mut bytes, ImageFormat::Tiff).expect("a picture is encoded");
+        vec![encoded(ImageFormat::Tiff), bytes.into_inner(), with_alpha(ImageFormat::Tiff)]
+    },
     run: read,
 };
 

@@ -8,6 +8,15 @@ use crate::target::Target;
 
 const MAX_EXTRA_BYTES: usize = 16 << 20;
 
+/// A camera beside its robot.
+const OVER_BASE: &[u8] = b"
+table:
+  frame: base
+  height_m: 0.01
+  frame_from_camera: {translation_m: [0.5, 0, 0.58], rotation_xyzw: [1, 0, 0, 0]}
+  workspace_m: {x: [0.3, 0.7], y: [-0.3, 0.3]}
+";
+
 /// A camera's file.
 pub(super) const CAMERA_FILE: Target = Target {
     name: "camera_file",
@@ -25,12 +34,24 @@ pub(super) const CAMERA_FILE: Target = Target {
         b".nan",
         b"\n  ",
     ],
-    seeds: || vec![file("datasets/workcell/camera.yaml")],
+    seeds: || {
+        let shipped = file("datasets/workcell/camera.yaml");
+        // Up to its own table.
+        let lens =
+            shipped.split(|byte| *byte == b'\n').take_while(|line| !line.starts_with(b"table:")).collect::<Vec<_>>();
+        let beside = [lens.join(&b'\n').as_slice(), OVER_BASE].concat();
+        let mut seeds = vec![shipped, beside];
+        // The same as our own program writes it.
+        let read = |bytes: &[u8]| CalibratedCamera::from_yaml(&String::from_utf8_lossy(bytes));
+        seeds.extend(seeds.clone().iter().filter_map(|bytes| Some(read(bytes).ok()?.to_yaml().into_bytes())));
+        seeds
+    },
     run: |bytes| {
         let Some(camera) = std::str::from_utf8(bytes).ok().and_then(|text| CalibratedCamera::from_yaml(text).ok())
         else {
             return false;
         };
+        let _ = (camera.posed().is_ok(), camera.check_picture((640, 480)), camera.update_yaml(&camera.to_yaml()));
         // The lens is inverted wherever a picture is used.
         for pixel in [[0.0, 0.0], [320.0, 240.0], [639.0, 1.0]] {
             let _ = camera.intrinsics.unproject(&pixel.into());
@@ -85,6 +106,6 @@ pub(super) const WORKCELL: Target = Target {
         b"\n",
         b"\"\"\"",
     ],
-    seeds: || vec![file("datasets/workcell/workcell.toml")],
+    seeds: || vec![file("datasets/workcell/workcell.toml"), file("fuzz/corpus/workcell.toml")],
     run: |bytes| std::str::from_utf8(bytes).is_ok_and(|text| Workcell::from_toml(text).is_ok()),
 };

@@ -1,5 +1,4 @@
 //! Checkpoint files built byte by byte, with contents that no regular writer makes.
-#![allow(dead_code, reason = "each test takes what it needs")]
 
 /// A sequence of parts.
 pub fn cat(parts: &[&[u8]]) -> Vec<u8> {

@@ -15,11 +15,13 @@ mod snapshots;
 mod url;
 mod waiting;
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
+
+use image::RgbImage;
 
 use crate::error::CameraError;
 use crate::options::OpenOptions;
-use crate::source::Source;
+use crate::source::{Missing, Source};
 
 pub use url::Url;
 
@@ -44,4 +46,28 @@ pub(crate) fn connect(url: &Url, options: &OpenOptions, deadline: Instant) -> Re
             if kind.is_empty() { "no content type" } else { &kind }
         ))),
     }
+}
+
+/// The first pictures of a server, at most `max_pictures`, without the torn ones. Unlike a [`Camera`](crate::Camera) it does not connect
+/// again where the connection is lost, so that it ends with the server: for tests of servers, and of what servers may send.
+///
+/// # Errors
+/// [`CameraError::Open`] where the server's first answer is none of a camera.
+pub fn read_pictures(
+    url: &Url,
+    options: &OpenOptions,
+    timeout: Duration,
+    max_pictures: usize,
+) -> Result<Vec<RgbImage>, CameraError> {
+    let mut source = connect(url, options, Instant::now() + timeout)?;
+    let mut pictures = Vec::new();
+    let mut num_torn = 0;
+    while pictures.len() + num_torn < max_pictures {
+        match source.take(Instant::now() + timeout) {
+            Ok(Some(taken)) => pictures.push(taken.picture),
+            Err(Missing::Torn(_)) => num_torn += 1,
+            Ok(None) | Err(Missing::Late | Missing::Gone(_) | Missing::Ended(_)) => break,
+        }
+    }
+    Ok(pictures)
 }

@@ -3,7 +3,7 @@
 use std::io::{ErrorKind, Read, Write};
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, Shutdown, SocketAddr, TcpStream, UdpSocket};
 use std::sync::atomic::{AtomicU32, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, TryRecvError, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TryRecvError, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
@@ -12,6 +12,11 @@ use crate::error::{FciError, Result};
 use crate::message::read_message;
 use crate::wire::{Header, HeaderKind};
 use crate::wire_error::WireError;
+
+/// Responses that have arrived and were not looked at; the next ones wait in the network. A robot sends one for each request.
+const MAX_WAITING: usize = 16;
+/// Responses that were looked at and belong to another request than the one that is waited for; the oldest are dropped.
+const MAX_KEPT: usize = 16;
 
 /// The sending half, which any thread may use.
 #[derive(Debug, Clone)]
@@ -62,7 +67,7 @@ impl Session {
             Ok((stream.try_clone()?, udp))
         };
         let (reading, udp) = settings().map_err(|source| socket_error("open sockets for", address, source))?;
-        let (sender, incoming) = channel();
+        let (sender, incoming) = sync_channel(MAX_WAITING);
         let reader = thread::Builder::new()
             .name("fci responses".into())
             .spawn(move || read_responses(reading, kind, &sender))
@@ -97,7 +102,7 @@ impl Session {
                 Some(deadline) => self.incoming.recv_timeout(deadline.saturating_duration_since(Instant::now())),
             };
             match received {
-                Ok(Ok(response)) => self.kept.push(response),
+                Ok(Ok(response)) => self.keep(response),
                 Ok(Err(source)) => return Err(FciError::Wire { address: self.address, source }),
                 Err(RecvTimeoutError::Disconnected) => return Err(FciError::Closed { address: self.address }),
                 Err(RecvTimeoutError::Timeout) => {
@@ -131,12 +136,19 @@ impl Session {
     fn fetch(&mut self) -> Result<()> {
         loop {
             match self.incoming.try_recv() {
-                Ok(Ok(response)) => self.kept.push(response),
+                Ok(Ok(response)) => self.keep(response),
                 Ok(Err(source)) => return Err(FciError::Wire { address: self.address, source }),
                 Err(TryRecvError::Empty) => return Ok(()),
                 Err(TryRecvError::Disconnected) => return Err(FciError::Closed { address: self.address }),
             }
         }
+    }
+
+    fn keep(&mut self, response: (Header, Vec<u8>)) {
+        if self.kept.len() == MAX_KEPT {
+            self.kept.remove(0);
+        }
+        self.kept.push(response);
     }
 
     fn take_kept(&mut self, id: u32) -> Option<Vec<u8>> {
@@ -226,12 +238,16 @@ impl Drop for Session {
         let _ = stream.shutdown(Shutdown::Both);
         drop(stream);
         if let Some(reader) = self.reader.take() {
+            // It may wait for room.
+            while !reader.is_finished() {
+                let _ = self.incoming.recv_timeout(Duration::from_millis(1));
+            }
             let _ = reader.join();
         }
     }
 }
 
-fn read_responses(mut stream: impl Read, kind: HeaderKind, sender: &Sender<Incoming>) {
+fn read_responses(mut stream: impl Read, kind: HeaderKind, sender: &SyncSender<Incoming>) {
     loop {
         match read_message(&mut stream, kind) {
             // An error of the socket counts as its end, like a closed connection.

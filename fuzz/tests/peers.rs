@@ -1,5 +1,5 @@
-//! A client of a robot with errors in everything it sends: the result is errors, no panic, and no wait beyond the
-//! client's own limits.
+//! A client of a robot that makes mistakes in everything it sends: errors, no panic, no wait beyond the client's own bounds.
+#![allow(clippy::unwrap_used)]
 
 use std::io::Write;
 use std::net::{TcpListener, UdpSocket};
@@ -7,7 +7,6 @@ use std::ops::ControlFlow;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use crate::mutations::mutate;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use sdg_fci::client::{Hand, HandConfig, InternalController, Robot, RobotConfig};
@@ -16,6 +15,7 @@ use sdg_fci::wire::{
     ControllerMode, HandRequest, HandState, HandStatus, Header, HeaderKind, MotionGeneratorMode, Request, RobotMode,
     RobotState, Version,
 };
+use sdg_fuzz::make_mistakes;
 
 const NUM_SESSIONS: usize = 150;
 const TIMEOUT: Duration = Duration::from_millis(50);
@@ -26,7 +26,8 @@ const MAX_SESSION: Duration = Duration::from_secs(25);
 /// With errors in half of the cases.
 fn maybe_mutated(mut bytes: Vec<u8>, rng: &mut Pcg64Mcg) -> Vec<u8> {
     if rng.random_bool(0.5) {
-        mutate(&mut bytes, rng);
+        let other = bytes.clone();
+        make_mistakes(&mut bytes, &other, &[], rng);
     }
     bytes
 }

@@ -1,0 +1,139 @@
+//! Every order in which a camera's thread and a caller can take turns at the newest frame, up to seven turns, against a model without
+//! threads. Each turn is whole: what is done at the cell is done under one lock.
+
+use std::collections::VecDeque;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::time::Duration;
+
+use image::RgbImage;
+use sdg_camera::{Camera, CameraError, Fault, Frame, LatestFrame};
+
+/// Longest schedule: 3 + 9 + … + 3⁷ = 3279 of them.
+const MAX_TURNS: u32 = 7;
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Turn {
+    /// The camera gives a frame.
+    Frame,
+    /// The camera gives a torn one.
+    Torn,
+    /// The caller takes what is there.
+    Take,
+}
+
+const TURNS: [Turn; 3] = [Turn::Frame, Turn::Torn, Turn::Take];
+
+/// Gives a frame for each number that is sent, an error for `None`, its end when the sender is gone; says before each that it is asked.
+struct Driven(Receiver<Option<u64>>, Sender<()>);
+
+impl Camera for Driven {
+    fn next_frame(&mut self) -> Result<Option<Frame>, CameraError> {
+        let _ = self.1.send(());
+        match self.0.recv() {
+            Ok(Some(number)) => Ok(Some(Frame::new(RgbImage::new(1, 1), number, "test:".into()))),
+            Ok(None) => Err(CameraError::Fault { camera: "test:".into(), fault: Fault::Black }),
+            Err(_) => Ok(None),
+        }
+    }
+}
+
+/// What the cell promises, without threads.
+#[derive(Default)]
+struct Model {
+    newest: Option<u64>,
+    errors: VecDeque<()>,
+    num_dropped: u64,
+}
+
+impl Model {
+    fn take(&mut self) -> Result<Option<u64>, ()> {
+        if self.errors.pop_front().is_some() {
+            return Err(());
+        }
+        Ok(self.newest.take())
+    }
+}
+
+fn check(schedule: &[Turn]) {
+    let (send, receive) = channel();
+    let (asked, was_asked) = channel();
+    let latest = LatestFrame::spawn(Box::new(Driven(receive, asked)));
+    // Declared last, it is dropped first where an assertion fails: `latest` would wait for its thread for ever.
+    let send = send;
+    was_asked.recv().unwrap();
+    let mut model = Model::default();
+    let take = |model: &mut Model, timeout| {
+        let found = latest.take(timeout).map(|frame| frame.map(|frame| frame.number)).map_err(drop);
+        assert_eq!(found, model.take(), "{schedule:?}");
+        assert_eq!(latest.num_dropped(), model.num_dropped, "{schedule:?}");
+    };
+    for (number, turn) in (0..).zip(schedule) {
+        match turn {
+            Turn::Frame => {
+                send.send(Some(number)).unwrap();
+                model.num_dropped += u64::from(model.newest.replace(number).is_some());
+            }
+            Turn::Torn => {
+                send.send(None).unwrap();
+                model.errors.push_back(());
+            }
+            Turn::Take => {
+                take(&mut model, Duration::ZERO);
+                continue;
+            }
+        }
+        // It asks again when the cell has what was sent.
+        was_asked.recv().unwrap();
+    }
+    assert!(!latest.has_ended(), "{schedule:?}");
+    drop(send);
+    // All that was not taken is given before the end.
+    while model.newest.is_some() || !model.errors.is_empty() {
+        take(&mut model, Duration::ZERO);
+    }
+    take(&mut model, Duration::from_secs(10));
+    assert!(latest.has_ended(), "{schedule:?}");
+}
+
+#[test]
+fn every_schedule_gives_what_the_cell_promises() {
+    let mut num_schedules = 0;
+    for length in 1..=MAX_TURNS {
+        for number in 0..3_usize.pow(length) {
+            let digits = (0..length).map(|place| TURNS[number / 3_usize.pow(place) % 3]);
+            check(&digits.collect::<Vec<_>>());
+            num_schedules += 1;
+        }
+    }
+    assert_eq!(num_schedules, 3279);
+}
+
+/// A caller that waits is woken by each thing that a camera gives, by its end, and by nothing else.
+#[test]
+fn a_caller_that_waits_is_woken() {
+    for (sent, expected) in [(Some(Some(7)), Ok(Some(7))), (Some(None), Err(())), (None, Ok(None))] {
+        let (send, receive) = channel();
+        let (asked, was_asked) = channel();
+        let latest = LatestFrame::spawn(Box::new(Driven(receive, asked)));
+        was_asked.recv().unwrap();
+        let feeder = std::thread::spawn(move || {
+            // The caller waits by then; where it does not yet, the order is one of those above.
+            std::thread::sleep(Duration::from_millis(20));
+            if let Some(sent) = sent {
+                send.send(sent).unwrap();
+            }
+            send
+        });
+        if sent.is_none() {
+            drop(feeder.join().unwrap());
+            assert_eq!(
+                latest.take(Duration::from_secs(60)).map(|frame| frame.map(|frame| frame.number)).map_err(drop),
+                expected
+            );
+            continue;
+        }
+        let found = latest.take(Duration::from_secs(60)).map(|frame| frame.map(|frame| frame.number)).map_err(drop);
+        assert_eq!(found, expected);
+        drop(feeder.join().unwrap());
+    }
+}

@@ -1,0 +1,26 @@
+#!/usr/bin/env bash
+# Builds one program twice, in two folders, and compares the files bit for bit: `scripts/reproducible.sh` (hand_checks, a minute) or
+# `scripts/reproducible.sh --workspace --bin sdg` (half an hour, which compiles burn twice). Called with the arguments of `cargo build`.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+arguments=("$@")
+[ "$#" -gt 0 ] || arguments=(--package sdg-fci --example hand_checks)
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+commit=$(git rev-parse HEAD)
+for folder in first a/second/longer/folder; do
+    mkdir -p "$work/$folder"
+    git archive "$commit" | tar -x -C "$work/$folder"
+    # The folder's own name is no part of the program.
+    (cd "$work/$folder" && RUSTFLAGS="--remap-path-prefix=$work/$folder=." CARGO_TARGET_DIR="$work/$folder/target" \
+        cargo build --quiet --release --locked "${arguments[@]}")
+    (cd "$work/$folder/target/release" && find . -maxdepth 2 -type f -executable -not -path './build/*' -not -path './deps/*' \
+        -not -name '*-*' -print0 | sort -z | xargs -0 sha256sum) | tee "$work/sums-${folder%%/*}"
+done
+if cmp "$work/sums-first" "$work/sums-a"; then
+    echo "reproducible: equal, of commit $commit"
+else
+    echo "reproducible: expected equal files from two folders, found those above" >&2
+    exit 1
+fi
