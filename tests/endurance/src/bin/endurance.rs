@@ -1,0 +1,68 @@
+//! The sections of `make endure`.
+
+#[cfg(all(target_os = "linux", target_arch = "x86_64"))]
+fn main() -> anyhow::Result<()> {
+    sections::run()
+}
+
+#[cfg(not(all(target_os = "linux", target_arch = "x86_64")))]
+fn main() {
+    eprintln!("endurance: expected Linux on x86-64, whose system calls it follows");
+    std::process::exit(1);
+}
+
+#[cfg(all(target_os = "linux", target_arch = "x86_64"))]
+mod sections {
+    use std::fs;
+    use std::path::PathBuf;
+
+    use anyhow::{Context, Result, ensure};
+    use clap::{Parser, Subcommand, ValueEnum};
+    use sdg_endurance::crash;
+    use sdg_endurance::scenario::{Places, Scenario};
+
+    /// Commands killed while the disk loses what was not synced.
+    #[derive(Parser)]
+    struct Arguments {
+        /// The program that is tried.
+        #[arg(long, default_value = "target/release/sdg")]
+        sdg: PathBuf,
+        #[command(subcommand)]
+        section: Section,
+    }
+
+    #[derive(Subcommand)]
+    enum Section {
+        /// Kills commands at seeded moments; goes on where it ended.
+        Crash {
+            /// Kills of each command.
+            #[arg(long, default_value_t = 200)]
+            kills: u64,
+            #[arg(long, default_value_t = 1)]
+            seed: u64,
+            /// Without it, all commands.
+            #[arg(value_enum)]
+            commands: Vec<Scenario>,
+        },
+    }
+
+    pub fn run() -> Result<()> {
+        let Arguments { sdg, section } = Arguments::parse();
+        let root = PathBuf::from(".").canonicalize()?;
+        ensure!(root.join("datasets").exists(), "expected to be started in the repository's root");
+        let sdg = sdg.canonicalize().with_context(|| format!("{}: `make build` makes it", sdg.display()))?;
+        let work = root.join("target/endurance");
+        fs::create_dir_all(&work)?;
+        let places = Places { sdg, root, work };
+        match section {
+            Section::Crash { kills, seed, commands } => {
+                let commands = if commands.is_empty() { Scenario::value_variants().to_vec() } else { commands };
+                // One that fails does not keep the others from being tried.
+                let failed = commands.iter().filter_map(|command| crash::kill(*command, kills, seed, &places).err());
+                let failed: Vec<String> = failed.map(|error| format!("{error:#}")).collect();
+                ensure!(failed.is_empty(), "{}", failed.join("\n"));
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,17 @@
+//! Endurance: what `make endure` runs, each part resumable, on Linux for x86-64 alone.
+//!
+//! - [`crash`]: commands killed at seeded moments under [`tracer`], with [`disk`] losing what was not synced.
+//!
+//! It drives the program `sdg` from outside, as a user, and knows none of its crates but `calibration`, whose board it draws.
+#![cfg(all(target_os = "linux", target_arch = "x86_64"))]
+
+pub mod boards;
+pub mod crash;
+pub mod disk;
+pub mod page;
+pub mod scenario;
+pub mod tracer;
+
+#[path = "../../../crates/calibration/tests/rendering/mod.rs"]
+#[allow(missing_docs, clippy::unwrap_used, reason = "a file of tests")]
+mod rendering;
