@@ -32,6 +32,6 @@ mapfile -t programs < <(cargo test --release --locked "${packages[@]}" --lib --b
 objects=()
 for program in "${programs[@]}"; do objects+=(-object "$program"); done
 "$llvm/llvm-cov" export --format=lcov --instr-profile "$work/all.profdata" "${objects[@]}" >"$work/all.lcov"
-"$llvm/llvm-cov" export --summary-only --instr-profile "$work/all.profdata" "${objects[@]}" >"$work/summary.json"
+"$llvm/llvm-cov" export --skip-expansions --instr-profile "$work/all.profdata" "${objects[@]}" >"$work/all.json"
 
-FILES=${FILES:-} python3 scripts/coverage.py "$PWD" "$work/all.lcov" "$work/summary.json" "${crates[@]}"
+FILES=${FILES:-} python3 scripts/coverage.py "$PWD" "$work/all.lcov" "$work/all.json" "${crates[@]}"

@@ -16,6 +16,7 @@ use rand_pcg::Pcg64Mcg;
 use serde_json::{Value, json};
 
 use crate::disk::{Disk, Loss};
+use crate::files::{contents_under, files_under, fresh};
 use crate::page::Page;
 use crate::scenario::{Places, Scenario};
 use crate::tracer::{Ending, Tracee};
@@ -76,14 +77,6 @@ fn report(scenario: Scenario, changes: u64, lines: &[Value]) -> Result<()> {
     Ok(())
 }
 
-fn fresh(folder: &Path) -> Result<()> {
-    if folder.exists() {
-        fs::remove_dir_all(folder)?;
-    }
-    fs::create_dir_all(folder)?;
-    Ok(())
-}
-
 fn is_good(scenario: Scenario, ending: Ending) -> bool {
     // The page is ended by the same signal as by Ctrl-C.
     ending == Ending::Exited(0)
@@ -141,8 +134,7 @@ fn one(
     let (run, after, kept) = (work.join("run"), work.join(format!("after-{number}")), work.join("kept"));
     fresh(&run)?;
     scenario.prepare(places, &run, number % 2 == 1)?;
-    let before = files_under(&run)?.into_iter().map(|file| Ok((file.clone(), fs::read(run.join(file))?)));
-    let before: Vec<(PathBuf, Vec<u8>)> = before.collect::<Result<_>>()?;
+    let before = contents_under(&run)?;
     let (ending, changes, disk) = traced(scenario, places, &run, &kept, Some(at))?;
     if after.exists() {
         fs::remove_dir_all(&after)?;
@@ -209,19 +201,4 @@ fn judge(
         "the command had ended well, and what it wrote is lost ({state})"
     );
     Ok((state, left))
-}
-
-/// All files under a folder, from it.
-fn files_under(folder: &Path) -> Result<Vec<PathBuf>> {
-    let mut files = Vec::new();
-    let mut folders = vec![PathBuf::new()];
-    while let Some(next) = folders.pop() {
-        for entry in fs::read_dir(folder.join(&next))? {
-            let entry = entry?;
-            let path = next.join(entry.file_name());
-            if entry.file_type()?.is_dir() { folders.push(path) } else { files.push(path) }
-        }
-    }
-    files.sort();
-    Ok(files)
 }

@@ -1,6 +1,7 @@
 //! Endurance: what `make endure` runs, each part resumable, on Linux for x86-64 alone.
 //!
 //! - [`crash`]: commands killed at seeded moments under [`tracer`], with [`disk`] losing what was not synced.
+//! - [`refusals`]: the same commands on a disk that is full or read-only, without descriptors, while the clock is set back.
 //!
 //! It drives the program `sdg` from outside, as a user, and knows none of its crates but `calibration`, whose board it draws.
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
@@ -8,7 +9,9 @@
 pub mod boards;
 pub mod crash;
 pub mod disk;
+pub mod files;
 pub mod page;
+pub mod refusals;
 pub mod scenario;
 pub mod tracer;
 

@@ -18,7 +18,7 @@ mod sections {
 
     use anyhow::{Context, Result, ensure};
     use clap::{Parser, Subcommand, ValueEnum};
-    use sdg_endurance::crash;
+    use sdg_endurance::{crash, refusals};
     use sdg_endurance::scenario::{Places, Scenario};
 
     /// Commands killed while the disk loses what was not synced.
@@ -44,6 +44,21 @@ mod sections {
             #[arg(value_enum)]
             commands: Vec<Scenario>,
         },
+        /// Tries commands on a full disk, a read-only one, without descriptors and while the clock is set back (root).
+        Refusals {
+            /// Without it, all commands.
+            #[arg(value_enum)]
+            commands: Vec<Scenario>,
+        },
+    }
+
+    /// One command that fails does not keep the others from being tried.
+    fn each(commands: &[Scenario], run: impl Fn(Scenario) -> Result<()>) -> Result<()> {
+        let commands = if commands.is_empty() { Scenario::value_variants() } else { commands };
+        let failed: Vec<String> =
+            commands.iter().filter_map(|command| Some(format!("{:#}", run(*command).err()?))).collect();
+        ensure!(failed.is_empty(), "{}", failed.join("\n"));
+        Ok(())
     }
 
     pub fn run() -> Result<()> {
@@ -56,13 +71,9 @@ mod sections {
         let places = Places { sdg, root, work };
         match section {
             Section::Crash { kills, seed, commands } => {
-                let commands = if commands.is_empty() { Scenario::value_variants().to_vec() } else { commands };
-                // One that fails does not keep the others from being tried.
-                let failed = commands.iter().filter_map(|command| crash::kill(*command, kills, seed, &places).err());
-                let failed: Vec<String> = failed.map(|error| format!("{error:#}")).collect();
-                ensure!(failed.is_empty(), "{}", failed.join("\n"));
+                each(&commands, |command| crash::kill(command, kills, seed, &places))
             }
+            Section::Refusals { commands } => each(&commands, |command| refusals::try_all(command, &places)),
         }
-        Ok(())
     }
 }
