@@ -2,6 +2,7 @@
 //!
 //! - [`crash`]: commands killed at seeded moments under [`tracer`], with [`disk`] losing what was not synced.
 //! - [`refusals`]: the same commands on a disk that is full or read-only, without descriptors, while the clock is set back.
+//! - [`soak`]: long runs of live detection, of the page, and of a camera that goes away.
 //!
 //! It drives the program `sdg` from outside, as a user, and knows none of its crates but `calibration`, whose board it draws.
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
@@ -13,6 +14,7 @@ pub mod files;
 pub mod page;
 pub mod refusals;
 pub mod scenario;
+pub mod soak;
 pub mod tracer;
 
 #[path = "../../../crates/calibration/tests/rendering/mod.rs"]

@@ -18,7 +18,8 @@ mod sections {
 
     use anyhow::{Context, Result, ensure};
     use clap::{Parser, Subcommand, ValueEnum};
-    use sdg_endurance::{crash, refusals};
+    use sdg_endurance::soak::FrameRun;
+    use sdg_endurance::{crash, refusals, soak};
     use sdg_endurance::scenario::{Places, Scenario};
 
     /// Commands killed while the disk loses what was not synced.
@@ -50,6 +51,31 @@ mod sections {
             #[arg(value_enum)]
             commands: Vec<Scenario>,
         },
+        /// Live detection over many frames.
+        Frames {
+            /// The model's letter.
+            #[arg(long, default_value = "S")]
+            model: String,
+            #[arg(long, default_value_t = 100_000)]
+            frames: usize,
+            /// Search every frame on its own.
+            #[arg(long)]
+            every_frame: bool,
+            /// The camera closes its connection after so many frames.
+            #[arg(long, default_value_t = usize::MAX)]
+            frames_a_connection: usize,
+            /// End after so long, with what was done.
+            #[arg(long, default_value_t = 600)]
+            max_secs: u64,
+        },
+        /// Sessions of the annotation page on one server.
+        Page {
+            #[arg(long, default_value_t = 500)]
+            sessions: usize,
+            /// End after so long, with what was done.
+            #[arg(long, default_value_t = 600)]
+            max_secs: u64,
+        },
     }
 
     /// One command that fails does not keep the others from being tried.
@@ -74,6 +100,10 @@ mod sections {
                 each(&commands, |command| crash::kill(command, kills, seed, &places))
             }
             Section::Refusals { commands } => each(&commands, |command| refusals::try_all(command, &places)),
+            Section::Frames { model, frames, every_frame, frames_a_connection, max_secs } => {
+                soak::detect(&FrameRun { model, frames, every_frame, frames_a_connection, max_secs }, &places)
+            }
+            Section::Page { sessions, max_secs } => soak::page(sessions, max_secs, &places),
         }
     }
 }
