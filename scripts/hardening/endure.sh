@@ -36,7 +36,7 @@ for section in "${sections[@]}"; do
             try $endurance page --sessions "$sessions" --max-secs "$secs"
             ;;
         robot)
-            cargo build --release --locked -p sdg-simulation --example endured_attempts
+            scripts/build.sh --example endured_attempts
             try target/release/examples/endured_attempts "$attempts" 0 "$secs"
             ;;
         limits) try scripts/hardening/limits.sh ;;

@@ -169,7 +169,8 @@ fn judge(
 ) -> Result<(&'static str, usize)> {
     let output = scenario.output().map(Path::new);
     // What the page writes anew is the marks.
-    let is_written = |file: &Path| Some(file) == output || scenario == Scenario::Annotate && file.ends_with("photo.json");
+    let is_written =
+        |file: &Path| Some(file) == output || scenario == Scenario::Annotate && file.ends_with("photo.json");
     for (file, content) in before {
         if is_written(file) {
             ensure!(after.join(file).exists(), "{}: gone", file.display());
@@ -184,8 +185,11 @@ fn judge(
         let old = before.iter().find(|(before, _)| *before == file).map(|(_, content)| content);
         if name.starts_with(".sdg-") {
             left += 1;
-        } else if !name.ends_with(".lock") && old.is_none_or(|old| fs::read(after.join(&file)).ok().as_ref() != Some(old)) {
-            Scenario::check_whole(places, &after.join(&file)).with_context(|| format!("{}: damaged", file.display()))?;
+        } else if !name.ends_with(".lock")
+            && old.is_none_or(|old| fs::read(after.join(&file)).ok().as_ref() != Some(old))
+        {
+            Scenario::check_whole(places, &after.join(&file))
+                .with_context(|| format!("{}: damaged", file.display()))?;
         }
     }
     let state = output.map_or("none", |output| {

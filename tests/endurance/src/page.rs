@@ -27,7 +27,8 @@ impl Page {
     pub fn of(printed: ChildStdout) -> Result<Self> {
         let mut line = String::new();
         BufReader::new(printed).read_line(&mut line)?;
-        let line: Value = serde_json::from_str(&line).with_context(|| format!("expected an address, found {line:?}"))?;
+        let line: Value =
+            serde_json::from_str(&line).with_context(|| format!("expected an address, found {line:?}"))?;
         let url = line["url"].as_str().context("expected the field url")?;
         let (address, token) =
             url.strip_prefix("http://").and_then(|url| url.split_once("/?token=")).context("expected http://")?;

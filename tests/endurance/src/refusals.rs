@@ -93,7 +93,10 @@ pub fn try_all(scenario: Scenario, places: &Places) -> Result<()> {
         }
     }
     let (name, count) = (scenario.name(), troubles.len());
-    println!("{name}: {count} troubles; ended well {well}, refused with one clear line {refused}, faults {}", faults.len());
+    println!(
+        "{name}: {count} troubles; ended well {well}, refused with one clear line {refused}, faults {}",
+        faults.len()
+    );
     ensure!(faults.is_empty(), "{}", faults.join("\n"));
     Ok(())
 }
@@ -176,9 +179,13 @@ fn attempt(scenario: Scenario, trouble: Trouble, places: &Places) -> Result<bool
 fn check_is_clear(errors: &str, status: Option<ExitStatus>) -> Result<()> {
     let last = errors.lines().rfind(|line| !line.trim().is_empty()).unwrap_or_default();
     // The loader's own words, before any of the program runs.
-    let is_loaders = last.contains("error while loading shared libraries") || last.contains("cannot open shared object");
+    let is_loaders =
+        last.contains("error while loading shared libraries") || last.contains("cannot open shared object");
     let code = status.and_then(|status| status.code());
-    ensure!(is_loaders || last.starts_with("sdg: ") && code == Some(1), "expected one clear line, found {code:?}: {errors}");
+    ensure!(
+        is_loaders || last.starts_with("sdg: ") && code == Some(1),
+        "expected one clear line, found {code:?}: {errors}"
+    );
     Ok(())
 }
 
@@ -191,9 +198,14 @@ fn check_files(
 ) -> Result<()> {
     let output = scenario.output().map(Path::new);
     for (file, content) in before {
-        let is_output = Some(file.as_path()) == output || scenario == Scenario::Annotate && file.ends_with("photo.json");
+        let is_output =
+            Some(file.as_path()) == output || scenario == Scenario::Annotate && file.ends_with("photo.json");
         let found = fs::read(folder.join(file)).with_context(|| format!("{}: gone", file.display()))?;
-        ensure!(is_output && (is_good || scenario == Scenario::Annotate) || found == *content, "{}: changed", file.display());
+        ensure!(
+            is_output && (is_good || scenario == Scenario::Annotate) || found == *content,
+            "{}: changed",
+            file.display()
+        );
     }
     for file in files_under(folder)? {
         let name = file.file_name().unwrap_or_default().to_string_lossy();

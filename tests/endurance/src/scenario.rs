@@ -84,13 +84,38 @@ impl Scenario {
         match self {
             Self::Teach => &["teach", "--model", "S", "--demo", "photo.png", "--out", "part.sdg"],
             Self::Evaluate => &[
-                "evaluate", "--models", "S", "--objects", "pendulum", "--attempts", "1", "--views", "1", "--scenes", "1",
-                "--jobs", "2", "--out", "results",
+                "evaluate",
+                "--models",
+                "S",
+                "--objects",
+                "pendulum",
+                "--attempts",
+                "1",
+                "--views",
+                "1",
+                "--scenes",
+                "1",
+                "--jobs",
+                "2",
+                "--out",
+                "results",
             ],
             Self::Annotate => &["annotate", "photo.png", "--no-browser", "--json"],
-            Self::Convert => &["weights", "convert", "weights.safetensors", "converted.safetensors", "--config", "config.json"],
+            Self::Convert => {
+                &["weights", "convert", "weights.safetensors", "converted.safetensors", "--config", "config.json"]
+            }
             Self::Calibrate => &[
-                "camera", "calibrate", "--out", "camera.yaml", "0.png", "1.png", "2.png", "3.png", "4.png", "5.png", "6.png",
+                "camera",
+                "calibrate",
+                "--out",
+                "camera.yaml",
+                "0.png",
+                "1.png",
+                "2.png",
+                "3.png",
+                "4.png",
+                "5.png",
+                "6.png",
                 "7.png",
             ],
             Self::Table => &["camera", "table", "table.png", "--camera", "camera.yaml"],
@@ -190,7 +215,9 @@ impl Scenario {
         let photo = places.root.join("datasets/demonstrations/pendulum/image.png");
         let photo = photo.to_str().context("expected a path in UTF-8")?;
         match file.extension().and_then(|extension| extension.to_str()) {
-            Some("json") => drop(serde_json::from_slice::<serde_json::Value>(&fs::read(file)?).context("expected JSON")?),
+            Some("json") => {
+                drop(serde_json::from_slice::<serde_json::Value>(&fs::read(file)?).context("expected JSON")?)
+            }
             Some("sdg") => {
                 let found = places.run(&folder, &["detect", "--grasp-model", name, photo, "--json"])?;
                 ensure!(!found.is_empty(), "expected detections");

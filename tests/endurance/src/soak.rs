@@ -78,7 +78,8 @@ impl Course {
     fn tenth(&self, idx: usize) -> Tenth {
         let units = &self.0[self.0.len() * idx / 10..self.0.len() * (idx + 1) / 10];
         let most = |of: fn(&Held) -> u64| units.iter().map(of).max().unwrap_or_default();
-        let cpu_secs = units.last().map_or(0.0, |last| last.cpu_secs) - units.first().map_or(0.0, |first| first.cpu_secs);
+        let cpu_secs =
+            units.last().map_or(0.0, |last| last.cpu_secs) - units.first().map_or(0.0, |first| first.cpu_secs);
         Tenth {
             most: Held {
                 memory_kib: most(|held| held.memory_kib),
@@ -110,7 +111,10 @@ impl Course {
         ensure!(after.memory_kib <= may_be, "{what}: memory grows");
         ensure!(after.threads <= before.threads, "{what}: threads grow");
         ensure!(after.descriptors <= before.descriptors, "{what}: descriptors grow");
-        ensure!(!is_work_the_same || late.cpu_secs_each <= early.cpu_secs_each * MAX_SLOWER + 1e-3, "{what}: the last tenth is slower");
+        ensure!(
+            !is_work_the_same || late.cpu_secs_each <= early.cpu_secs_each * MAX_SLOWER + 1e-3,
+            "{what}: the last tenth is slower"
+        );
         Ok(())
     }
 }
@@ -138,10 +142,15 @@ fn model(places: &Places, letter: &str) -> Result<String> {
     let name = file.to_str().context("expected a path in UTF-8")?.to_owned();
     if !file.exists() {
         let demonstrations = places.root.join("datasets/demonstrations/pendulum");
-        let demonstration =
-            format!("{}:{}", demonstrations.join("image.png").display(), demonstrations.join("annotation.json").display());
+        let demonstration = format!(
+            "{}:{}",
+            demonstrations.join("image.png").display(),
+            demonstrations.join("annotation.json").display()
+        );
         // What it learns does not matter here: the same layers compute.
-        let output = places.sdg(&folder, &["teach", "--model", letter, "--steps", "2", "--demo", &demonstration, "--out", &name]).output()?;
+        let output = places
+            .sdg(&folder, &["teach", "--model", letter, "--steps", "2", "--demo", &demonstration, "--out", &name])
+            .output()?;
         ensure!(file.exists(), "teaching {letter}: {}", String::from_utf8_lossy(&output.stderr));
     }
     Ok(name)
@@ -235,7 +244,10 @@ fn connection(
     let mut request = [0; 4096];
     let _ = stream.read(&mut request)?;
     stream.set_nodelay(true)?;
-    write!(stream, "HTTP/1.1 200 OK\r\nContent-Type: multipart/x-mixed-replace; boundary=frame\r\nConnection: close\r\n\r\n")?;
+    write!(
+        stream,
+        "HTTP/1.1 200 OK\r\nContent-Type: multipart/x-mixed-replace; boundary=frame\r\nConnection: close\r\n\r\n"
+    )?;
     for _ in 0..each {
         let frame = &frames[*sent % frames.len()];
         // The boundary after a frame is its end.
@@ -262,7 +274,8 @@ pub fn page(sessions: usize, max_secs: u64, places: &Places) -> Result<()> {
     // The marks as the page takes them, read by the page from the shipped file.
     fs::copy(demonstrations.join("image.png"), folder.join("photo.png"))?;
     fs::copy(demonstrations.join("annotation.json"), folder.join("photo.json"))?;
-    let mut server = places.sdg(&folder, &["annotate", "photo.png", "--no-browser", "--json"]).stderr(Stdio::null()).spawn()?;
+    let mut server =
+        places.sdg(&folder, &["annotate", "photo.png", "--no-browser", "--json"]).stderr(Stdio::null()).spawn()?;
     let served = Page::of(server.stdout.take().context("expected a pipe")?)?;
     let marks = served.json("GET", "/api/session", b"")?["images"][0]["marks"].to_string();
     served.ask("DELETE", "/api/projects", b"")?;

@@ -76,8 +76,7 @@ impl Tracee {
         // SAFETY: only system calls between fork and exec; `filter` was allocated before.
         unsafe {
             command.pre_exec(move || {
-                let program =
-                    libc::sock_fprog { len: filter.len() as u16, filter: filter.as_ptr().cast_mut().cast() };
+                let program = libc::sock_fprog { len: filter.len() as u16, filter: filter.as_ptr().cast_mut().cast() };
                 let refused = libc::ptrace(libc::PTRACE_TRACEME, 0, 0, 0) != 0
                     || libc::prctl(libc::PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) != 0
                     || libc::prctl(libc::PR_SET_SECCOMP, libc::SECCOMP_MODE_FILTER, &program, 0, 0) != 0;
@@ -176,9 +175,8 @@ fn filter() -> Vec<sock_filter> {
     const X86_64: u32 = 0xC000_003E;
     let instruction = |code: u32, jt: u8, jf: u8, k: u32| sock_filter { code: code as u16, jt, jf, k };
     let load = |offset| instruction(libc::BPF_LD | libc::BPF_W | libc::BPF_ABS, 0, 0, offset);
-    let equals = |value: u32, jt: usize, jf: u8| {
-        instruction(libc::BPF_JMP | libc::BPF_JEQ | libc::BPF_K, jt as u8, jf, value)
-    };
+    let equals =
+        |value: u32, jt: usize, jf: u8| instruction(libc::BPF_JMP | libc::BPF_JEQ | libc::BPF_K, jt as u8, jf, value);
     let answer = |value| instruction(libc::BPF_RET | libc::BPF_K, 0, 0, value);
     let calls: Vec<c_long> = WRITES.into_iter().chain(NAMES.map(|(call, _)| call)).collect();
     let mut program = vec![load(4), equals(X86_64, 1, 0), answer(libc::SECCOMP_RET_ALLOW), load(0)];

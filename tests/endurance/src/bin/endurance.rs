@@ -18,9 +18,9 @@ mod sections {
 
     use anyhow::{Context, Result, ensure};
     use clap::{Parser, Subcommand, ValueEnum};
+    use sdg_endurance::scenario::{Places, Scenario};
     use sdg_endurance::soak::FrameRun;
     use sdg_endurance::{crash, refusals, soak};
-    use sdg_endurance::scenario::{Places, Scenario};
 
     /// Commands killed while the disk loses what was not synced.
     #[derive(Parser)]
