@@ -15,7 +15,7 @@ work=$PWD/target/coverage
 mkdir -p "$work"
 rm -rf "$work/profiles"
 
-export CARGO_TARGET_DIR=$work RUSTFLAGS="-C instrument-coverage"
+export CARGO_TARGET_DIR=$work RUSTC_WORKSPACE_WRAPPER=$PWD/scripts/hardening/instrument.sh
 # Names of profiles: one file a process would fill the disk; %m with 4 files are merged by the processes themselves.
 export LLVM_PROFILE_FILE=$work/profiles/%4m.profraw
 packages=(-p sdg-robot -p sdg-fci -p sdg-kinematics -p sdg-simulation)

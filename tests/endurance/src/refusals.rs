@@ -8,13 +8,16 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus};
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail, ensure};
 
 use crate::files::{contents_under, files_under, fresh};
 use crate::page::Page;
 use crate::scenario::{Places, Scenario};
+
+/// How long a page that refused is given to end, if it ends.
+const ENDING: Duration = Duration::from_secs(3);
 
 /// What is wrong with the machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -148,7 +151,13 @@ fn attempt(scenario: Scenario, trouble: Trouble, places: &Places) -> Result<bool
             Ok(page) => refusal = page.mark_teach_and_try(&photo).err(),
             Err(error) => refusal = Some(error),
         }
-        let ended = child.try_wait()?;
+        // One that refused may be ending by itself.
+        let given = Instant::now();
+        let mut ended = child.try_wait()?;
+        while refusal.is_some() && ended.is_none() && given.elapsed() < ENDING {
+            thread::sleep(Duration::from_millis(20));
+            ended = child.try_wait()?;
+        }
         child.kill()?;
         child.wait()?;
         ended
@@ -168,7 +177,7 @@ fn attempt(scenario: Scenario, trouble: Trouble, places: &Places) -> Result<bool
         (Some(_), Some(_)) => false,
     };
     ensure!(!errors.contains("panicked"), "a panic: {errors}");
-    if !is_good && refusal.is_none() {
+    if !is_good && status.is_some() {
         check_is_clear(&errors, status)?;
     }
     check_files(scenario, is_good, &before, places, &folder)?;

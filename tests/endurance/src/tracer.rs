@@ -118,6 +118,11 @@ impl Tracee {
                 }
                 continue;
             }
+            if ending == Some(Ending::Killed) {
+                // What the program had started ends with it, before another change.
+                kill(tid);
+                continue;
+            }
             let (signal, event) = (libc::WSTOPSIG(status), status >> 16);
             // A thread that is killed meanwhile answers no request.
             let step = if event == libc::PTRACE_EVENT_SECCOMP {
@@ -125,8 +130,7 @@ impl Tracee {
                 if call.changes(disk.root()) {
                     changes += 1;
                     if kill_at == Some(changes) {
-                        // SAFETY: no memory is involved.
-                        unsafe { libc::kill(main, libc::SIGKILL) };
+                        [main, tid].into_iter().for_each(kill);
                         ending = Some(Ending::Killed);
                         continue;
                     }
@@ -134,7 +138,6 @@ impl Tracee {
                 if call.is_followed() { libc::PTRACE_SYSCALL } else { libc::PTRACE_CONT }
             } else {
                 if signal == libc::SIGTRAP | 0x80
-                    && ending.is_none()
                     && let Ok(call) = Call::of(tid)
                 {
                     call.done(disk)?;
@@ -162,6 +165,11 @@ fn wait(pid: pid_t) -> Result<Option<(pid_t, c_int)>> {
         return if error.raw_os_error() == Some(libc::ECHILD) { Ok(None) } else { Err(error.into()) };
     }
     Ok(Some((found, status)))
+}
+
+fn kill(pid: pid_t) {
+    // SAFETY: no memory is involved. It was not waited for yet, so that the number is its own.
+    unsafe { libc::kill(pid, libc::SIGKILL) };
 }
 
 fn request(request: c_long, tid: pid_t, data: c_long) -> io::Result<()> {

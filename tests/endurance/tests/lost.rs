@@ -60,9 +60,9 @@ fn what_was_synced_and_renamed_is_the_old_file_or_the_new_one() {
 
 #[test]
 fn a_program_is_killed_before_the_change_that_is_asked_for() {
-    // Opened, written, synced, renamed.
+    // Made, written, synced, renamed unless the name is taken, renamed, and the folder synced.
     let synced = "printf new > t; sync t; mv t file; sync .";
-    assert_eq!(after(synced, Some(4)), (Ending::Killed, only([OLD])));
-    assert_eq!(after(synced, Some(5)), (Ending::Killed, only([OLD, "new"])));
-    assert_eq!(after(synced, Some(6)), (Ending::Exited(0), only(["new"])));
+    assert_eq!(after(synced, Some(5)), (Ending::Killed, only([OLD])));
+    assert_eq!(after(synced, Some(6)), (Ending::Killed, only([OLD, "new"])));
+    assert_eq!(after(synced, Some(7)), (Ending::Exited(0), only(["new"])));
 }
