@@ -106,7 +106,7 @@ pub fn try_all(scenario: Scenario, places: &Places) -> Result<()> {
 
 /// Whether the command ended well.
 fn attempt(scenario: Scenario, trouble: Trouble, places: &Places) -> Result<bool> {
-    let disk = SmallDisk::mount(&places.work.join("small"))?;
+    let disk = SmallDisk::mount(&places.work.join(format!("small-{}", scenario.name().replace(' ', "-"))))?;
     let folder = disk.0.clone();
     scenario.prepare(places, &folder, true)?;
     match trouble {
