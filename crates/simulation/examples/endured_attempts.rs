@@ -251,7 +251,7 @@ fn main() -> Result<(), Failure> {
     let num_attempts: u64 = arguments.next().map_or(Ok(1000), |n| n.parse())?;
     let first_seed: u64 = arguments.next().map_or(Ok(0), |n| n.parse())?;
     let max_secs: u64 = arguments.next().map_or(Ok(u64::MAX), |n| n.parse())?;
-    let (begun, shares) = (Instant::now(), Arc::new(Mutex::new(Shares::new())));
+    let (begun, mut shares) = (Instant::now(), Shares::new());
     // Of each kind: attempts, held, failed at a step, stopped.
     let mut counts: BTreeMap<&str, [u32; 4]> = BTreeMap::new();
     let mut faults = Vec::new();
@@ -261,8 +261,20 @@ fn main() -> Result<(), Failure> {
             break;
         }
         let (kind, errors) = Errors::of(seed);
-        let ended = attempt(seed, errors, &shares)?;
+        let of_attempt = Arc::new(Mutex::new(Shares::new()));
+        let ended = attempt(seed, errors, &of_attempt)?;
         println!("{seed}: {kind}: {ended}");
+        for (what, share) in of_attempt.lock().unwrap_or_else(PoisonError::into_inner).iter() {
+            let most = shares.entry(*what).or_insert(*share);
+            *most = most.max(*share);
+            let tolerance =
+                if ["position of joints", "workspace"].contains(what) { RANGE_TOLERANCE } else { TOLERANCE };
+            if share.is_nan() || *share > 1.0 + tolerance {
+                let fault = format!("{seed}: {kind}: {ended}: the limit of the {what} is broken: {share:.3}");
+                println!("  {fault}");
+                faults.push(fault);
+            }
+        }
         let count = counts.entry(kind).or_default();
         count[0] += 1;
         count[if ended == "held" {
@@ -287,12 +299,8 @@ fn main() -> Result<(), Failure> {
         println!("| {kind} | {all} | {held} | {failed} | {stopped} |");
     }
     println!("\n| limit | largest share in MuJoCo |\n|---|--:|");
-    for (what, share) in shares.lock().unwrap_or_else(PoisonError::into_inner).iter() {
+    for (what, share) in &shares {
         println!("| {what} | {:.1} % |", share * 100.0);
-        let tolerance = if ["position of joints", "workspace"].contains(what) { RANGE_TOLERANCE } else { TOLERANCE };
-        if share.is_nan() || *share > 1.0 + tolerance {
-            faults.push(format!("the limit of the {what} is broken: {share}"));
-        }
     }
     if faults.is_empty() { Ok(()) } else { Err(faults.join("\n").into()) }
 }
