@@ -143,7 +143,7 @@ fn one(
     let Loss { contents, folders } = loss;
     let mut line = json!({"number": number, "at": at, "changes": changes, "ending": format!("{ending:?}"), "lost": contents + folders});
     let found = judge(scenario, ending, &before, places, &after).and_then(|found| {
-        if number % scenario.again_every() == 0 {
+        if number.is_multiple_of(scenario.again_every()) {
             scenario.again(places, &after, reference).context("again")?;
         }
         Ok(found)

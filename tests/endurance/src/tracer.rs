@@ -28,8 +28,10 @@ const WRITES: [c_long; 10] = [
     libc::SYS_copy_file_range,
     libc::SYS_sendfile,
 ];
+/// Numbers of arguments: a folder's descriptor, and the path from it.
+type PathArguments = &'static [(Option<usize>, usize)];
 /// Those with paths: where the (folder, path) arguments are. A call without a folder's descriptor has `None`.
-const NAMES: [(c_long, &[(Option<usize>, usize)]); 16] = [
+const NAMES: [(c_long, PathArguments); 16] = [
     (libc::SYS_open, &[(None, 0)]),
     (libc::SYS_creat, &[(None, 0)]),
     (libc::SYS_openat, &[(Some(0), 1)]),
