@@ -5,7 +5,7 @@ CARGO ?= cargo
 PROFILE := --release
 
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo web site test-site test-guides edge wheel capi test-python test-c test test-compile test-browser film walk acceptance test-v4l test-peers test-ros2 test-slurm slurm-image deb tarball image windows test-arm64 release hardening network-grasps placing heights test-wgpu test-ndarray test-torch package lint base-weights bench bench-search bench-browser bench-planning clean deny
+.PHONY: help setup build demo web site test-site test-guides edge wheel capi test-python test-c test test-compile test-browser film walk acceptance test-v4l test-peers test-ros2 test-slurm slurm-image deb tarball image windows test-arm64 release hardening network-grasps placing heights test-wgpu test-ndarray test-torch package lint base-weights bench bench-search bench-browser bench-planning clean deny endure coverage
 
 help: ## Lists the targets
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
@@ -126,6 +126,12 @@ release: setup ## All packages with checksums, lists of what is in them, and the
 
 hardening: setup ## Hostile input for every reader of strangers' files and messages, resumed where it ended (EXECUTIONS=1000000, TARGETS="png jpeg"; QUICK=1: two minutes; COVERAGE=1: lines reached; SECTIONS="input sync coverage guards address thread")
 	@QUICK="$(QUICK)" SECTIONS="$(or $(SECTIONS),$(if $(COVERAGE),coverage))" EXECUTIONS="$(EXECUTIONS)" TARGETS="$(TARGETS)" SHOW="$(SHOW)" scripts/hardening/run.sh
+
+endure: setup ## Commands killed while the disk loses what was not synced, full disks, long runs, a robot told wrong (SECTION="crash soak", QUICK=1; root)
+	@scripts/hardening/endure.sh $(SECTION)
+
+coverage: setup ## Lines and regions of robot, fci and kinematics that tests reach (FILES=1: the lines that none does)
+	@scripts/coverage.sh
 
 # burn is compiled once more, with the device's backend; the tests are those that compare devices with flex.
 DEVICE_TESTS = $(CARGO) test $(PROFILE) --locked -p sdg-kernels -p sdg-grasp -p sdg-cli --features sdg-cli/$(1)

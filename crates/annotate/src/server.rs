@@ -120,6 +120,11 @@ impl Server {
                 Ok((stream, _)) => stream,
                 // A connection that broke before it was accepted must not end the server.
                 Err(error) if error.kind() == io::ErrorKind::ConnectionAborted => continue,
+                // The connections that are open will give some back; the page stays until then.
+                Err(error) if is_out_of_descriptors(&error) => {
+                    tokio::time::sleep(LOOK_EVERY).await;
+                    continue;
+                }
                 Err(error) => return Err(error),
             };
             let Ok(permit) = Arc::clone(&connections).try_acquire_owned() else { continue };
@@ -131,6 +136,14 @@ impl Server {
         }
         Ok(())
     }
+}
+
+/// Whether this process, or the whole machine, has as many files open as it may.
+fn is_out_of_descriptors(error: &io::Error) -> bool {
+    // EMFILE and ENFILE have no kinds of their own; the numbers are those of every Unix.
+    const EMFILE: i32 = 24;
+    const ENFILE: i32 = 23;
+    cfg!(unix) && matches!(error.raw_os_error(), Some(EMFILE | ENFILE))
 }
 
 /// Answers the requests of one connection until either side closes it.

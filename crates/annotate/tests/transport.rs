@@ -88,3 +88,31 @@ fn nothing_is_kept_open_after_a_refusal_and_after_http_1_0() {
         assert_eq!(statuses(&answer), [status]);
     }
 }
+
+/// Runs only as the child of [`a_page_outlives_a_lack_of_descriptors`], where few files may be open.
+#[cfg(unix)]
+#[test]
+#[ignore = "needs few descriptors; another test runs it in a child process"]
+fn child_with_few_descriptors() {
+    let served = Served::start();
+    let connect = || std::net::TcpStream::connect(served.host());
+    // Client and server share what there is: the server lacks a descriptor for the connections that it has not taken yet.
+    let held: Vec<_> = std::iter::from_fn(|| connect().ok()).collect();
+    assert!(held.len() > 2, "{}", held.len());
+    std::thread::sleep(Duration::from_millis(500));
+    drop(held);
+    assert_eq!(served.ask("GET", "/api/session", b"").status, 200);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_page_outlives_a_lack_of_descriptors() {
+    let output = std::process::Command::new("sh")
+        .args(["-c", "ulimit -n 24; exec \"$0\" \"$@\""])
+        .arg(std::env::current_exe().unwrap())
+        .args(["--ignored", "--exact", "transport::child_with_few_descriptors"])
+        .output()
+        .unwrap();
+    let printed = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success() && printed.contains("1 passed"), "{printed}");
+}

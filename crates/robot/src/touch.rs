@@ -244,3 +244,61 @@ impl Descent {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use sdg_kinematics::ready_pose;
+
+    use super::*;
+
+    /// What the robot feels where nothing touches it, N.
+    const FREE_AIR_N: f64 = 2.0;
+    const MAX_CYCLES: usize = 10_000;
+
+    /// Comes down with an arm that something holds where it is, feeling `pressed_n` of the force of its own spring, N, once it moves.
+    fn descend(touch_down: TouchDown, pressed_n: impl Fn(f64) -> f64) -> Touched {
+        let (arm, q, still) = (ArmGeometry::panda(), ready_pose(), JointVector::zeros());
+        let mut descent = Descent::new(touch_down, &arm, q, still);
+        for _ in 0..MAX_CYCLES {
+            let pressed_n = match descent.phase {
+                Phase::Standing => 0.0,
+                Phase::Down => pressed_n(touch_down.free_air.stiffness.z * descent.down_m),
+                Phase::Pressing => pressed_n(touch_down.contact.stiffness.z * descent.down_m),
+            };
+            if descent.next(&arm, &q, &still, FREE_AIR_N + pressed_n).1 {
+                return descent.touched();
+            }
+        }
+        panic!("it does not end");
+    }
+
+    #[test]
+    fn a_force_just_below_the_one_of_a_contact_is_none_and_one_just_above_is() {
+        let touch_down = TouchDown::default();
+        for (pressed_n, is_contact) in [(0.99, false), (1.01, true)] {
+            let touched = descend(touch_down, |_| pressed_n * touch_down.contact_n);
+            assert_eq!(touched.is_contact, is_contact, "{pressed_n}");
+        }
+    }
+
+    /// The reference gives way until the force that was asked for is felt.
+    #[test]
+    fn it_presses_with_the_force_that_is_told() {
+        for press_n in [4.0, 8.0] {
+            let touch_down = TouchDown { press_n, press_secs: 5.0, ..TouchDown::default() };
+            let touched = descend(touch_down, |spring_n| spring_n);
+            assert!(touched.is_contact && (touched.force_n - press_n).abs() < 0.05 * press_n, "{touched:?}");
+            assert!(touched.peak_n < 1.5 * press_n.max(touch_down.contact_n), "{touched:?}");
+        }
+    }
+
+    #[test]
+    fn forces_that_would_be_a_blow_are_refused() {
+        let told = |contact_n, press_n| TouchDown { contact_n, press_n, ..TouchDown::default() }.validate();
+        told(15.0, 15.0).unwrap();
+        for (contact_n, press_n) in [(15.1, 4.0), (3.0, 15.1), (0.0, 4.0), (3.0, 0.0), (f64::NAN, 4.0)] {
+            let found = told(contact_n, press_n).unwrap_err().to_string();
+            assert!(found.contains("at most 15"), "{found}");
+        }
+    }
+}

@@ -240,13 +240,7 @@ impl Arm for FrankaArm {
         if self.sensitivity == Some(sensitivity) {
             return Ok(());
         }
-        let factor = match sensitivity {
-            ContactSensitivity::Free => 1.0,
-            ContactSensitivity::Contact => CONTACT_FACTOR,
-        };
-        let (torque, force) = (FREE_TORQUE_NM.map(|value| value * factor), FREE_FORCE.map(|value| value * factor));
-        let behavior = CollisionBehavior::new(torque, torque, force, force);
-        self.robot.set_collision_behavior(&behavior).map_err(|error| self.error(error))?;
+        self.robot.set_collision_behavior(&collision_behavior(sensitivity)).map_err(|error| self.error(error))?;
         self.sensitivity = Some(sensitivity);
         Ok(())
     }
@@ -300,5 +294,36 @@ fn arm_state(state: &RobotState) -> ArmState {
             RobotMode::AutomaticErrorRecovery => ArmMode::Recovering,
             RobotMode::UserStopped | RobotMode::Other => ArmMode::UserStopped,
         },
+    }
+}
+
+/// At what a Franka stops by itself.
+fn collision_behavior(sensitivity: ContactSensitivity) -> CollisionBehavior {
+    let factor = match sensitivity {
+        ContactSensitivity::Free => 1.0,
+        ContactSensitivity::Contact => CONTACT_FACTOR,
+    };
+    let (torque, force) = (FREE_TORQUE_NM.map(|value| value * factor), FREE_FORCE.map(|value| value * factor));
+    CollisionBehavior::new(torque, torque, force, force)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Twice as much where contact is wanted, never more.
+    #[test]
+    fn a_franka_stops_at_20_n_in_free_motion_and_at_40_n_where_it_may_touch() {
+        for (sensitivity, max_n, max_nm) in
+            [(ContactSensitivity::Free, 20.0, 20.0), (ContactSensitivity::Contact, 40.0, 40.0)]
+        {
+            let behavior = collision_behavior(sensitivity);
+            for force in [behavior.upper_force_nominal, behavior.upper_force_acceleration] {
+                assert!(force[..3].iter().all(|value| *value > 0.0 && *value <= max_n), "{sensitivity:?}: {force:?}");
+            }
+            for torque in [behavior.upper_torque_nominal, behavior.upper_torque_acceleration] {
+                assert!(torque.iter().all(|value| *value > 0.0 && *value <= max_nm), "{sensitivity:?}: {torque:?}");
+            }
+        }
     }
 }

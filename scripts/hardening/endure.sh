@@ -1,0 +1,47 @@
+#!/usr/bin/env bash
+# Endurance, section by section; each goes on where it ended or counts what fits in its time. docs/testing.md has the figures.
+#
+#   endure.sh [SECTION…]   crash, refusals, soak, robot, limits, mutants; without a section, the first four
+#   QUICK=1                a few of each
+#   KILLS, FRAMES, SESSIONS, DISCONNECTIONS, ATTEMPTS   how many; SECS: the longest that a part of soak or robot takes
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+
+if [ -n "${QUICK:-}" ]; then
+    kills=5 frames=500 sessions=30 disconnections=50 attempts=6 secs=120
+else
+    kills=200 frames=100000 sessions=500 disconnections=1000 attempts=1000 secs=36000
+fi
+kills=${KILLS:-$kills} frames=${FRAMES:-$frames} sessions=${SESSIONS:-$sessions} secs=${SECS:-$secs}
+disconnections=${DISCONNECTIONS:-$disconnections} attempts=${ATTEMPTS:-$attempts}
+sections=("$@")
+[ ${#sections[@]} -gt 0 ] || sections=(crash refusals soak robot)
+
+scripts/build.sh --bin sdg --bin endurance
+endurance=target/release/endurance
+failed=()
+try() { "$@" || failed+=("$*"); }
+for section in "${sections[@]}"; do
+    case $section in
+        crash) try $endurance crash --kills "$kills" ;;
+        refusals)
+            scripts/install.sh libfaketime python3
+            try $endurance refusals
+            ;;
+        soak)
+            try $endurance frames --frames "$frames" --max-secs "$secs"
+            try $endurance frames --frames $((frames / 10)) --every-frame --max-secs "$secs"
+            try $endurance frames --model C --frames $((frames / 5)) --every-frame --max-secs "$secs"
+            try $endurance frames --frames $((disconnections + 1)) --frames-a-connection 1 --max-secs "$secs"
+            try $endurance page --sessions "$sessions" --max-secs "$secs"
+            ;;
+        robot)
+            scripts/build.sh --example endured_attempts
+            try target/release/examples/endured_attempts "$attempts" 0 "$secs"
+            ;;
+        limits) try scripts/hardening/limits.sh ;;
+        mutants) try scripts/hardening/mutants.sh ;;
+        *) echo "endure: expected crash, refusals, soak, robot, limits or mutants, found $section" >&2; exit 2 ;;
+    esac
+done
+[ ${#failed[@]} -eq 0 ] || { printf 'endure: failed: %s\n' "${failed[@]}" >&2; exit 1; }

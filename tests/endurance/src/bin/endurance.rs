@@ -1,0 +1,109 @@
+//! The sections of `make endure`.
+
+#[cfg(all(target_os = "linux", target_arch = "x86_64"))]
+fn main() -> anyhow::Result<()> {
+    sections::run()
+}
+
+#[cfg(not(all(target_os = "linux", target_arch = "x86_64")))]
+fn main() {
+    eprintln!("endurance: expected Linux on x86-64, whose system calls it follows");
+    std::process::exit(1);
+}
+
+#[cfg(all(target_os = "linux", target_arch = "x86_64"))]
+mod sections {
+    use std::fs;
+    use std::path::PathBuf;
+
+    use anyhow::{Context, Result, ensure};
+    use clap::{Parser, Subcommand, ValueEnum};
+    use sdg_endurance::scenario::{Places, Scenario};
+    use sdg_endurance::soak::FrameRun;
+    use sdg_endurance::{crash, refusals, soak};
+
+    /// Commands killed while the disk loses what was not synced.
+    #[derive(Parser)]
+    struct Arguments {
+        /// The program that is tried.
+        #[arg(long, default_value = "target/release/sdg")]
+        sdg: PathBuf,
+        #[command(subcommand)]
+        section: Section,
+    }
+
+    #[derive(Subcommand)]
+    enum Section {
+        /// Kills commands at seeded moments; goes on where it ended.
+        Crash {
+            /// Kills of each command.
+            #[arg(long, default_value_t = 200)]
+            kills: u64,
+            #[arg(long, default_value_t = 1)]
+            seed: u64,
+            /// Without it, all commands.
+            #[arg(value_enum)]
+            commands: Vec<Scenario>,
+        },
+        /// Tries commands on a full disk, a read-only one, without descriptors and while the clock is set back (root).
+        Refusals {
+            /// Without it, all commands.
+            #[arg(value_enum)]
+            commands: Vec<Scenario>,
+        },
+        /// Live detection over many frames.
+        Frames {
+            /// The model's letter.
+            #[arg(long, default_value = "S")]
+            model: String,
+            #[arg(long, default_value_t = 100_000)]
+            frames: usize,
+            /// Search every frame on its own.
+            #[arg(long)]
+            every_frame: bool,
+            /// The camera closes its connection after so many frames.
+            #[arg(long, default_value_t = usize::MAX)]
+            frames_a_connection: usize,
+            /// End after so long, with what was done.
+            #[arg(long, default_value_t = 600)]
+            max_secs: u64,
+        },
+        /// Sessions of the annotation page on one server.
+        Page {
+            #[arg(long, default_value_t = 500)]
+            sessions: usize,
+            /// End after so long, with what was done.
+            #[arg(long, default_value_t = 600)]
+            max_secs: u64,
+        },
+    }
+
+    /// One command that fails does not keep the others from being tried.
+    fn each(commands: &[Scenario], run: impl Fn(Scenario) -> Result<()>) -> Result<()> {
+        let commands = if commands.is_empty() { Scenario::value_variants() } else { commands };
+        let failed: Vec<String> =
+            commands.iter().filter_map(|command| Some(format!("{:#}", run(*command).err()?))).collect();
+        ensure!(failed.is_empty(), "{}", failed.join("\n"));
+        Ok(())
+    }
+
+    pub fn run() -> Result<()> {
+        let Arguments { sdg, section } = Arguments::parse();
+        let root = PathBuf::from(".").canonicalize()?;
+        ensure!(root.join("datasets").exists(), "expected to be started in the repository's root");
+        let sdg = sdg.canonicalize().with_context(|| format!("{}: `make build` makes it", sdg.display()))?;
+        let work = root.join("target/endurance");
+        fs::create_dir_all(&work)?;
+        let places = Places { sdg, root, work };
+        match section {
+            Section::Crash { kills, seed, commands } => {
+                each(&commands, |command| crash::kill(command, kills, seed, &places))
+            }
+            Section::Refusals { commands } => each(&commands, |command| refusals::try_all(command, &places)),
+            Section::Frames { model, frames, every_frame, frames_a_connection, max_secs } => {
+                soak::detect(&FrameRun { model, frames, every_frame, frames_a_connection, max_secs }, &places)
+            }
+            Section::Page { sessions, max_secs } => soak::page(sessions, max_secs, &places),
+        }
+    }
+}

@@ -1,0 +1,302 @@
+//! Long runs: memory, threads and descriptors stay flat, and the last tenth is no slower.
+//!
+//! ```text
+//! a camera of ours (HTTP, motion JPEG) ─ frame ─ sdg detect --from http://… --json ─ line ─ the next frame
+//! ```
+//!
+//! A frame is sent when the line of the one before was printed, so that none is dropped and the time between is that of one frame.
+
+use std::fmt;
+use std::fs;
+use std::io::{BufRead, BufReader, Cursor, Read, Write};
+use std::net::{Ipv4Addr, TcpListener, TcpStream};
+use std::path::Path;
+use std::process::{Child, Stdio};
+use std::sync::mpsc::{Receiver, channel};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, ensure};
+use image::{ImageFormat, RgbImage};
+
+use crate::files::fresh;
+use crate::page::Page;
+use crate::scenario::Places;
+
+/// Longer than any frame takes on a busy machine.
+const TIMEOUT: Duration = Duration::from_secs(120);
+/// What the allocator keeps for itself.
+const MAX_GROWTH: f64 = 1.05;
+/// A page of the allocator, where the whole is small.
+const MAX_GROWTH_KIB: u64 = 4 << 10;
+/// Processor time a unit in the last tenth over that in the fifth: a busy neighbour takes some of the caches.
+const MAX_SLOWER: f64 = 1.15;
+const NUM_FRAMES: u32 = 16;
+
+/// What a process holds, and the processor time that it has used.
+#[derive(Debug, Clone, Copy, Default)]
+struct Held {
+    memory_kib: u64,
+    threads: u64,
+    descriptors: u64,
+    cpu_secs: f64,
+}
+
+impl Held {
+    fn of(pid: u32) -> Result<Self> {
+        let status = fs::read_to_string(format!("/proc/{pid}/status"))?;
+        let field = |name: &str| {
+            let line = status.lines().find_map(|line| line.strip_prefix(name)).context("expected a field of status")?;
+            line.split_whitespace().next().and_then(|number| number.parse().ok()).context("expected a number")
+        };
+        let stat = fs::read_to_string(format!("/proc/{pid}/stat"))?;
+        // The name, in brackets, may have blanks in it.
+        let after_name = stat.rsplit(')').next().unwrap_or_default();
+        let ticks: Vec<u64> = after_name.split_whitespace().skip(11).take(2).filter_map(|n| n.parse().ok()).collect();
+        Ok(Self {
+            memory_kib: field("VmRSS:")?,
+            threads: field("Threads:")?,
+            descriptors: fs::read_dir(format!("/proc/{pid}/fd"))?.count() as u64,
+            // A hundred ticks a second, whatever the kernel's own clock.
+            cpu_secs: ticks.iter().sum::<u64>() as f64 / 100.0,
+        })
+    }
+}
+
+/// What a process held after each unit: a frame, a session, a disconnection.
+#[derive(Debug, Default)]
+struct Course(Vec<Held>);
+
+/// The largest values of a tenth.
+#[derive(Debug, Clone, Copy)]
+struct Tenth {
+    most: Held,
+    cpu_secs_each: f64,
+}
+
+impl Course {
+    fn tenth(&self, idx: usize) -> Tenth {
+        let units = &self.0[self.0.len() * idx / 10..self.0.len() * (idx + 1) / 10];
+        let most = |of: fn(&Held) -> u64| units.iter().map(of).max().unwrap_or_default();
+        let cpu_secs =
+            units.last().map_or(0.0, |last| last.cpu_secs) - units.first().map_or(0.0, |first| first.cpu_secs);
+        Tenth {
+            most: Held {
+                memory_kib: most(|held| held.memory_kib),
+                threads: most(|held| held.threads),
+                descriptors: most(|held| held.descriptors),
+                cpu_secs,
+            },
+            cpu_secs_each: cpu_secs / (units.len() - 1).max(1) as f64,
+        }
+    }
+
+    /// Prints the fifth tenth beside the last; what comes before is starting. Processor time is compared where every unit does the same.
+    fn report(&self, what: impl fmt::Display, secs: f64, is_work_the_same: bool) -> Result<()> {
+        ensure!(self.0.len() >= 30, "expected at least 30 units, found {}", self.0.len());
+        let [early, late] = [4, 9].map(|idx| self.tenth(idx));
+        let show = |tenth: &Tenth| {
+            let Held { memory_kib, threads, descriptors, .. } = tenth.most;
+            format!(
+                "{:.1} MB, {threads} threads, {descriptors} descriptors, {:.1} ms of processor each",
+                memory_kib as f64 / 1024.0,
+                tenth.cpu_secs_each * 1e3
+            )
+        };
+        println!("{what} in {secs:.0} s: fifth tenth {}; last tenth {}", show(&early), show(&late));
+        let memory = (0..10).map(|idx| format!("{:.1}", self.tenth(idx).most.memory_kib as f64 / 1024.0));
+        println!("  most memory of each tenth, MB: {}", memory.collect::<Vec<_>>().join(" "));
+        let (before, after) = (early.most, late.most);
+        let may_be = ((before.memory_kib as f64 * MAX_GROWTH) as u64).max(before.memory_kib + MAX_GROWTH_KIB);
+        ensure!(after.memory_kib <= may_be, "{what}: memory grows");
+        ensure!(after.threads <= before.threads, "{what}: threads grow");
+        ensure!(after.descriptors <= before.descriptors, "{what}: descriptors grow");
+        ensure!(
+            !is_work_the_same || late.cpu_secs_each <= early.cpu_secs_each * MAX_SLOWER + 1e-3,
+            "{what}: the last tenth is slower"
+        );
+        Ok(())
+    }
+}
+
+/// The pendulum's photo, moved a little from frame to frame along a closed way.
+fn frames(places: &Places) -> Result<Vec<Vec<u8>>> {
+    let photo = image::open(places.root.join("datasets/demonstrations/pendulum/image.png"))?.into_rgb8();
+    let (width, height) = photo.dimensions();
+    let moved = |idx: u32| {
+        // There and back, two pixels a frame.
+        let shift = 2 * (NUM_FRAMES / 2).abs_diff(idx);
+        let picture = RgbImage::from_fn(width, height, |x, y| *photo.get_pixel((x + shift) % width, y));
+        let mut bytes = Cursor::new(Vec::new());
+        picture.write_to(&mut bytes, ImageFormat::Jpeg)?;
+        Ok(bytes.into_inner())
+    };
+    (0..NUM_FRAMES).map(moved).collect()
+}
+
+/// The model of a letter, taught once.
+fn model(places: &Places, letter: &str) -> Result<String> {
+    let folder = places.work.join("once");
+    fs::create_dir_all(&folder)?;
+    let file = folder.join(format!("soak-{letter}.sdg"));
+    let name = file.to_str().context("expected a path in UTF-8")?.to_owned();
+    if !file.exists() {
+        let demonstrations = places.root.join("datasets/demonstrations/pendulum");
+        let demonstration = format!(
+            "{}:{}",
+            demonstrations.join("image.png").display(),
+            demonstrations.join("annotation.json").display()
+        );
+        // What it learns does not matter here: the same layers compute.
+        let output = places
+            .sdg(&folder, &["teach", "--model", letter, "--steps", "2", "--demo", &demonstration, "--out", &name])
+            .output()?;
+        ensure!(file.exists(), "teaching {letter}: {}", String::from_utf8_lossy(&output.stderr));
+    }
+    Ok(name)
+}
+
+/// How the frames of a run are looked at, and how often the camera goes away.
+#[derive(Debug, Clone)]
+pub struct FrameRun {
+    /// The model's letter.
+    pub model: String,
+    /// Frames in all.
+    pub frames: usize,
+    /// Every frame is searched on its own.
+    pub every_frame: bool,
+    /// The connection ends after so many frames.
+    pub frames_a_connection: usize,
+    /// No frame is begun after that; what was done counts.
+    pub max_secs: u64,
+}
+
+/// Live detection over many frames, from a camera that goes away as often as is asked for.
+///
+/// # Errors
+/// A run that grows, slows down, or ends early.
+pub fn detect(run: &FrameRun, places: &Places) -> Result<()> {
+    let model = model(places, &run.model)?;
+    let frames = frames(places)?;
+    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?;
+    let address = format!("http://{}/video.mjpg", listener.local_addr()?);
+    let (printed, lines) = channel();
+    let (planned, each) = (run.frames, run.frames_a_connection);
+    // It ends with this process where nobody connects any more.
+    thread::spawn(move || serve(&listener, &frames, each, &lines));
+    let mut arguments = vec!["detect", "--grasp-model", &model, "--from", &address, "--json", "--stall-secs", "60"];
+    if run.every_frame {
+        arguments.push("--every-frame");
+    }
+    let folder = places.work.join("soak");
+    fresh(&folder)?;
+    let mut command = places.sdg(&folder, &arguments);
+    command.stderr(Stdio::null());
+    let mut child = command.spawn()?;
+    let output = BufReader::new(child.stdout.take().context("expected a pipe")?);
+    let (start, mut course) = (Instant::now(), Course::default());
+    for line in output.lines() {
+        let line = line?;
+        // What is said of a camera that is gone is no frame.
+        if !line.contains("\"detections\"") {
+            continue;
+        }
+        course.0.push(Held::of(child.id())?);
+        if course.0.len() == planned || start.elapsed().as_secs() >= run.max_secs {
+            break;
+        }
+        let _ = printed.send(());
+    }
+    end(&mut child)?;
+    let done = course.0.len();
+    ensure!(done == planned || start.elapsed().as_secs() >= run.max_secs, "ended after {done} of {planned} frames");
+    let how = if run.every_frame { "each searched" } else { "followed" };
+    let disconnections = (done - 1) / each;
+    let what = format!("{done} frames, model {}, {how}, {disconnections} disconnections", run.model);
+    course.report(what, start.elapsed().as_secs_f64(), run.every_frame)
+}
+
+fn end(child: &mut Child) -> Result<()> {
+    child.kill()?;
+    child.wait()?;
+    Ok(())
+}
+
+/// Serves motion JPEG: a frame, then the next when a line was printed; the connection is closed after `each` frames.
+fn serve(listener: &TcpListener, frames: &[Vec<u8>], each: usize, lines: &Receiver<()>) -> Result<()> {
+    let mut sent = 0;
+    for stream in listener.incoming() {
+        let mut stream = stream?;
+        let of_connection = connection(&mut stream, frames, each, lines, &mut sent);
+        // The program ends a connection of its own when it ends.
+        let _ = of_connection;
+    }
+    Ok(())
+}
+
+fn connection(
+    stream: &mut TcpStream,
+    frames: &[Vec<u8>],
+    each: usize,
+    lines: &Receiver<()>,
+    sent: &mut usize,
+) -> Result<()> {
+    let mut request = [0; 4096];
+    let _ = stream.read(&mut request)?;
+    stream.set_nodelay(true)?;
+    write!(
+        stream,
+        "HTTP/1.1 200 OK\r\nContent-Type: multipart/x-mixed-replace; boundary=frame\r\nConnection: close\r\n\r\n"
+    )?;
+    for _ in 0..each {
+        let frame = &frames[*sent % frames.len()];
+        // The boundary after a frame is its end.
+        let length = frame.len();
+        write!(stream, "--frame\r\nContent-Type: image/jpeg\r\nContent-Length: {length}\r\n\r\n")?;
+        stream.write_all(frame)?;
+        write!(stream, "\r\n")?;
+        *sent += 1;
+        lines.recv_timeout(TIMEOUT)?;
+    }
+    Ok(())
+}
+
+/// Sessions of the annotation page on one server: a project, marks, a teaching, a picture that is tried, the project left.
+///
+/// # Errors
+/// As [`detect`].
+pub fn page(sessions: usize, max_secs: u64, places: &Places) -> Result<()> {
+    let folder = places.work.join("soak");
+    fresh(&folder)?;
+    fs::create_dir(folder.join("state"))?;
+    let demonstrations = places.root.join("datasets/demonstrations/pendulum");
+    let photo = fs::read(demonstrations.join("image.png"))?;
+    // The marks as the page takes them, read by the page from the shipped file.
+    fs::copy(demonstrations.join("image.png"), folder.join("photo.png"))?;
+    fs::copy(demonstrations.join("annotation.json"), folder.join("photo.json"))?;
+    let mut server =
+        places.sdg(&folder, &["annotate", "photo.png", "--no-browser", "--json"]).stderr(Stdio::null()).spawn()?;
+    let served = Page::of(server.stdout.take().context("expected a pipe")?)?;
+    let marks = served.json("GET", "/api/session", b"")?["images"][0]["marks"].to_string();
+    served.ask("DELETE", "/api/projects", b"")?;
+    let (start, mut course) = (Instant::now(), Course::default());
+    while course.0.len() < sessions && start.elapsed().as_secs() < max_secs {
+        let name = format!("part{}", course.0.len());
+        served.ask("POST", &format!("/api/projects?name={name}&photo=photo.png"), &photo)?;
+        served.ask("PUT", "/api/images/0/marks", marks.as_bytes())?;
+        served.mark_teach_and_try(&photo)?;
+        served.ask("DELETE", "/api/projects", b"")?;
+        course.0.push(Held::of(server.id())?);
+        // The disk is not what is tried.
+        remove(&folder.join(&name))?;
+    }
+    end(&mut server)?;
+    course.report(format!("{} page sessions", course.0.len()), start.elapsed().as_secs_f64(), true)
+}
+
+fn remove(folder: &Path) -> Result<()> {
+    if folder.exists() {
+        fs::remove_dir_all(folder)?;
+    }
+    Ok(())
+}
