@@ -215,7 +215,7 @@ impl ProjectFile {
     }
 
     /// Keeps the names of missing files, after the existing ones.
-    pub fn keep_gone(&mut self, gone: &Gone) {
+    pub fn keep_missing(&mut self, gone: &Gone) {
         let photos = gone.photos.iter().filter(|name| !self.photos.contains(name));
         let photos: Vec<String> = photos.cloned().collect();
         self.photos.extend(photos);

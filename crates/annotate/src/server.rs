@@ -31,7 +31,7 @@ use crate::routes;
 use crate::session::Session;
 
 /// Interval of the checks whether to stop.
-const LOOK_EVERY: Duration = Duration::from_millis(100);
+const POLL_INTERVAL: Duration = Duration::from_millis(100);
 /// Maximum silence of a connection, in either direction, before it is closed.
 const MAX_WAIT: Duration = Duration::from_secs(30);
 /// Time for which the body of a rejected request is read and discarded: closing a connection with unread bytes resets
@@ -115,14 +115,14 @@ impl Server {
         let listener = tokio::net::TcpListener::from_std(self.listener)?;
         let connections = Arc::new(Semaphore::new(MAX_CONNECTIONS));
         while !stop() {
-            let Ok(accepted) = timeout(LOOK_EVERY, listener.accept()).await else { continue };
+            let Ok(accepted) = timeout(POLL_INTERVAL, listener.accept()).await else { continue };
             let stream = match accepted {
                 Ok((stream, _)) => stream,
                 // A connection that broke before it was accepted must not end the server.
                 Err(error) if error.kind() == io::ErrorKind::ConnectionAborted => continue,
                 // The connections that are open will give some back; the page stays until then.
                 Err(error) if is_out_of_descriptors(&error) => {
-                    tokio::time::sleep(LOOK_EVERY).await;
+                    tokio::time::sleep(POLL_INTERVAL).await;
                     continue;
                 }
                 Err(error) => return Err(error),

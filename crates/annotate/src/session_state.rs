@@ -193,7 +193,7 @@ impl State {
                 became: self.became(id).map(|id| name(&self.images[id].picture)),
             });
         }
-        file.keep_gone(&self.gone);
+        file.keep_missing(&self.gone);
         file.removed.extend(self.images.iter().filter(|i| i.is_removed).map(|i| name(&i.picture)));
         file.removed.extend(self.trial_pictures.iter().filter(|t| t.is_removed).map(|t| name(&t.picture)));
         // Removed once and added again under the same name.

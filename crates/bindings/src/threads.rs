@@ -9,9 +9,9 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use crate::fault::{Fault, FaultKind, Result};
 
 /// Idle pools: concurrent callers use one each.
-static AT_REST: Mutex<Vec<ThreadPool>> = Mutex::new(Vec::new());
+static IDLE_POOLS: Mutex<Vec<ThreadPool>> = Mutex::new(Vec::new());
 /// Id of the process that computed first and has the threads; 0 before.
-static COMPUTES_IN: AtomicU32 = AtomicU32::new(0);
+static COMPUTING_PID: AtomicU32 = AtomicU32::new(0);
 /// Maximum number of threads.
 const MAX_THREADS: usize = 1024;
 
@@ -29,7 +29,7 @@ pub fn on_threads<T: Send>(threads: Option<usize>, work: impl FnOnce() -> T + Se
             format!("expected threads from 1 to {MAX_THREADS}, found {count}"),
         ));
     }
-    let at_rest = || AT_REST.lock().unwrap_or_else(PoisonError::into_inner);
+    let at_rest = || IDLE_POOLS.lock().unwrap_or_else(PoisonError::into_inner);
     let pool = {
         let mut pools = at_rest();
         pools.iter().position(|pool| pool.current_num_threads() == count).map(|idx| pools.swap_remove(idx))
@@ -52,7 +52,7 @@ pub fn on_threads<T: Send>(threads: Option<usize>, work: impl FnOnce() -> T + Se
 /// The process was forked from one that had computed.
 pub(crate) fn check_process() -> Result<()> {
     let own = process::id();
-    match COMPUTES_IN.compare_exchange(0, own, Ordering::Relaxed, Ordering::Relaxed) {
+    match COMPUTING_PID.compare_exchange(0, own, Ordering::Relaxed, Ordering::Relaxed) {
         Err(first) if first != own => Err(Fault::new(
             FaultKind::Forked,
             "expected a process that was started anew (spawn), found one that was forked after its parent had computed: the threads that \

@@ -16,7 +16,7 @@ use crate::error::CameraError;
 use crate::source::{Missing, Source, Taken};
 
 /// Interval of checks for new files.
-const LOOK_EVERY: Duration = Duration::from_millis(20);
+const POLL_INTERVAL: Duration = Duration::from_millis(20);
 /// Time for which the length of an undecodable file must not change; until then the file is assumed to be still
 /// written.
 const UNCHANGED_TIME: Duration = Duration::from_millis(500);
@@ -122,7 +122,7 @@ impl Source for Folder {
                 Some(path) => break path,
                 None if !self.playback.is_followed => return Ok(None),
                 None if Instant::now() >= deadline => return Err(Missing::Late),
-                None => sleep(LOOK_EVERY),
+                None => sleep(POLL_INTERVAL),
             }
         };
         self.next_at = Instant::now() + self.playback.interval.unwrap_or_default();
@@ -178,7 +178,7 @@ fn read_finished(path: &Path, frame: PixelFrame) -> Result<(image::RgbImage, Sys
         if age.is_some_and(|age| age > UNCHANGED_TIME * 4) {
             return Err(found);
         }
-        sleep(LOOK_EVERY);
+        sleep(POLL_INTERVAL);
     }
 }
 

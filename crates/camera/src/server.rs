@@ -19,7 +19,7 @@ const WRITE_TIMEOUT: Duration = Duration::from_secs(5);
 /// Time limit for receiving a request.
 const REQUEST_TIMEOUT: Duration = Duration::from_secs(5);
 /// Interval of checks for the server's end while there are no pictures.
-const LOOK_EVERY: Duration = Duration::from_millis(200);
+const POLL_INTERVAL: Duration = Duration::from_millis(200);
 /// Time limit at the end for browsers to receive the last picture.
 const LAST_PICTURE_WITHIN: Duration = Duration::from_millis(500);
 /// Maximum number of connections; one user needs fewer.
@@ -258,7 +258,7 @@ fn next_picture(shared: &Shared, last: Option<u64>) -> Option<Arc<Published>> {
         match newest.as_ref() {
             Some(published) if Some(published.number) != last => return Some(Arc::clone(published)),
             _ if shared.is_stopped.load(Ordering::SeqCst) => return None,
-            _ => newest = shared.changed.wait_timeout(newest, LOOK_EVERY).unwrap_or_else(PoisonError::into_inner).0,
+            _ => newest = shared.changed.wait_timeout(newest, POLL_INTERVAL).unwrap_or_else(PoisonError::into_inner).0,
         }
     }
 }

@@ -116,7 +116,7 @@ pub const UNKNOWN_HEIGHTS_M: RangeInclusive<f64> = -0.010..=0.080;
 /// Margin of the searched sizes beyond those at the ends of the height range, for errors of poses.
 const SIZE_LEEWAY: f64 = 0.03;
 /// Accuracy of a part's height as derived from its apparent size, m.
-const BY_SIZE_WITHIN_M: f64 = 0.015;
+const HEIGHT_BY_SIZE_SIGMA_M: f64 = 0.015;
 /// In a picture for measuring a height, maximum distance of the part from its earlier position, m.
 const SAME_PART_M: f64 = 0.040;
 /// If sizes by several demonstrations differ by more than this, they give no height.
@@ -214,7 +214,7 @@ impl<P> ModelFinder<P> {
         place.table_height_m += higher_m;
         self.perception.move_to(&place)?;
         let distance_m = place.camera.world_from_camera.translation.z - self.marks_z_m(&place);
-        self.perception.look_for_sizes(heights_m.map(|heights_m| {
+        self.perception.set_sizes(heights_m.map(|heights_m| {
             // A higher part is nearer to the camera, and appears larger.
             let size =
                 |height_m: f64| (distance_m / (distance_m + higher_m - height_m).max(0.5 * distance_m)).max(0.51);
@@ -278,7 +278,7 @@ impl<P> ModelFinder<P> {
     }
 
     /// Keeps the last picture and the outlines of its parts.
-    fn keep_sights(&mut self, sightings: &[Sighting]) {
+    fn keep_views(&mut self, sightings: &[Sighting]) {
         let (Some((picture, found)), Some(place)) = (&self.last, self.perception.camera_over_table()) else { return };
         let outlines = found.iter().filter(|found| found.pose.is_some()).map(|found| found.detection.outline.as_ref());
         let parts = sightings.iter().zip(outlines).filter_map(|(sighting, outline)| {
@@ -360,13 +360,13 @@ impl<A: Arm, P: Pictures<A>> PartFinder<A> for ModelFinder<P> {
         let grasp_height_m = lengths.map_or(0.0, |lengths| lengths.grasp_height_m);
         let expected_at = expected.base_from_tcp.translation;
         let higher_m = expected_at.z - grasp_height_m - self.camera.table_height_m;
-        let heights_m = higher_m - BY_SIZE_WITHIN_M..=higher_m + BY_SIZE_WITHIN_M;
+        let heights_m = higher_m - HEIGHT_BY_SIZE_SIGMA_M..=higher_m + HEIGHT_BY_SIZE_SIGMA_M;
         let sightings = self.look(arm, higher_m, Some(&heights_m))?;
         let is_near = |sighting: &Sighting| {
             let apart = sighting.target.base_from_tcp.translation.vector - expected_at.vector;
-            sighting.target.score >= sdg_robot::CONFIRMED && apart.xy().norm() <= SAME_PART_M
+            sighting.target.score >= sdg_robot::MIN_CONFIRMING_SCORE && apart.xy().norm() <= SAME_PART_M
         };
-        self.keep_sights(&sightings);
+        self.keep_views(&sightings);
         Ok(sightings.into_iter().filter(is_near).collect())
     }
 

@@ -2,7 +2,7 @@
 
 use sdg_grasp::GraspModel;
 use sdg_robot::CameraPose;
-use sdg_robot::height::{HeightMeasurement, ToldHeight};
+use sdg_robot::height::{GivenHeight, HeightMeasurement};
 
 use crate::mounted_camera::MountedCamera;
 
@@ -11,7 +11,7 @@ use crate::mounted_camera::MountedCamera;
 pub fn height_measurement(
     model: &GraspModel,
     camera: &MountedCamera,
-    told: Option<ToldHeight>,
+    told: Option<GivenHeight>,
 ) -> Option<HeightMeasurement> {
     let lengths = model.facts().lengths?;
     let measurement = HeightMeasurement::new(lengths.mark_height_m, lengths.grasp_height_m);
@@ -21,7 +21,7 @@ pub fn height_measurement(
 impl MountedCamera {
     /// For a camera beside the robot: uses the given height of the marks (z in the base, m) in place of the model's
     /// height over the table. A camera on the hand measures the height.
-    pub fn with_marks_at(self, model: &GraspModel, told: Option<&ToldHeight>) -> Self {
+    pub fn with_marks_at(self, model: &GraspModel, told: Option<&GivenHeight>) -> Self {
         match (self.pose, model.facts().lengths, told) {
             (CameraPose::InBase(_), Some(lengths), Some(told)) => {
                 Self { table_height_m: told.height_m - lengths.mark_height_m, ..self }

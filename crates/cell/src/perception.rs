@@ -89,14 +89,14 @@ impl Perception {
     }
 
     /// Searches for parts of these sizes in the plane of the marks, relative to the part's own, as
-    /// [`PlanViewDetector::look_for_sizes`]; no effect for pictures of any camera.
+    /// [`PlanViewDetector::set_sizes`]; no effect for pictures of any camera.
     ///
     /// # Errors
     /// The range is invalid.
-    pub fn look_for_sizes(&mut self, sizes: Option<RangeInclusive<f64>>) -> Result<()> {
+    pub fn set_sizes(&mut self, sizes: Option<RangeInclusive<f64>>) -> Result<()> {
         match &mut self.view {
             View::AnyCamera(_) => Ok(()),
-            View::OverTable(detector, _) => Ok(detector.look_for_sizes(sizes)?),
+            View::OverTable(detector, _) => Ok(detector.set_sizes(sizes)?),
         }
     }
 

@@ -21,7 +21,7 @@ const SAMPLE_M: f64 = 0.0006;
 /// Spacing of the windows, m.
 const WINDOWS_APART_M: f64 = 0.004;
 /// Minimum and maximum distance of a window from the outline, m.
-const BESIDE_M: [f64; 2] = [0.002, 0.040];
+const WINDOW_DISTANCE_M: [f64; 2] = [0.002, 0.040];
 /// Step between the tested heights, m: half a pixel of disparity.
 const STEP_M: f64 = 0.0005;
 /// Minimum correlation of both pictures at a window's height; and, beyond a distance from that height in m, the
@@ -169,7 +169,7 @@ fn window() -> Vec<Vector2<f64>> {
 fn middles(pictures: [&PosedPicture; 2], part: &PartOnSurface<'_>) -> Vec<Point2<f64>> {
     let outline = part.outline_m;
     let bounds = outline.bounds();
-    let reach_m = BESIDE_M[1];
+    let reach_m = WINDOW_DISTANCE_M[1];
     let steps = |from: f64, to: f64| {
         let count = ((to - from + 2.0 * reach_m) / WINDOWS_APART_M).ceil() as usize;
         (0..=count).map(move |k| from - reach_m + k as f64 * WINDOWS_APART_M)
@@ -189,7 +189,7 @@ fn middles(pictures: [&PosedPicture; 2], part: &PartOnSurface<'_>) -> Vec<Point2
         .flat_map(|y| steps(bounds.x1, bounds.x2).map(move |x| Point2::new(x, y)))
         .filter(|p| !outline.contains(p))
         .map(|p| (outline.distance_to_edge(&p) - WINDOW_M, p))
-        .filter(|(distance_m, p)| (BESIDE_M[0]..=reach_m).contains(distance_m) && is_clear(p))
+        .filter(|(distance_m, p)| (WINDOW_DISTANCE_M[0]..=reach_m).contains(distance_m) && is_clear(p))
         .collect();
     beside.sort_by(|one, other| one.0.total_cmp(&other.0));
     beside.into_iter().map(|(_, p)| p).collect()

@@ -9,7 +9,7 @@ use crate::paint::{Paint, Tone};
 /// Minimum score for advice: below it nothing resembles the part, and advice would mislead. Chosen by hand.
 pub const MIN_ADVISED_SCORE: f64 = 0.03;
 /// Deviations from the photo's size below this are not given as a reason. Chosen by hand.
-const SAME_SIZE: f64 = 0.03;
+const SIZE_TOLERANCE: f64 = 0.03;
 
 /// The advice, in words, for a refused detection that is the part after all.
 pub fn advice_in_words(advice: Advice) -> &'static str {
@@ -136,7 +136,8 @@ impl Wording<'_> {
     /// The strongest reasons in words, `most` at most.
     pub fn reasons(&self, detection: &GraspDetection, most: usize) -> String {
         let Some(evidence) = &detection.evidence else { return "the network is not sure".to_owned() };
-        let size = self.detector.size_of(detection, self.picture_size).filter(|size| (size - 1.0).abs() >= SAME_SIZE);
+        let size =
+            self.detector.size_of(detection, self.picture_size).filter(|size| (size - 1.0).abs() >= SIZE_TOLERANCE);
         let in_words = |kind: EvidenceKind| match (kind, size) {
             (EvidenceKind::Size, Some(size)) => format!("its size is {size:.2} of the photo's"),
             _ => kind.objection().to_owned(),

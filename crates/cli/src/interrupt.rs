@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 /// Signals closer together than this count as one: `timeout -s INT` sends the signal to the process and to its group.
-const SAME_PRESS: Duration = Duration::from_millis(500);
+const DEBOUNCE: Duration = Duration::from_millis(500);
 
 /// Whether Ctrl-C was pressed.
 #[derive(Debug, Clone, Default)]
@@ -20,7 +20,7 @@ impl Interrupt {
         // Without a handler Ctrl-C ends the process; this too leaves no half-written file.
         let _ = ctrlc::set_handler(move || {
             flag.store(true, Ordering::SeqCst);
-            if first.get_or_insert_with(Instant::now).elapsed() > SAME_PRESS {
+            if first.get_or_insert_with(Instant::now).elapsed() > DEBOUNCE {
                 std::process::exit(130);
             }
         });

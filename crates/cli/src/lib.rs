@@ -108,7 +108,7 @@ pub fn run(args: &Args) -> u8 {
     };
     match done {
         Ok(outcome) => {
-            if tells_its_time(&args.command) {
+            if prints_total_time(&args.command) {
                 eprintln!("took {:.1} s from start to exit", clock::elapsed_secs());
             }
             outcome.code()
@@ -122,7 +122,7 @@ pub fn run(args: &Args) -> u8 {
 }
 
 /// Verbs whose total time is printed at the end: those that take long and do not report it in their own lines.
-fn tells_its_time(command: &Command) -> bool {
+fn prints_total_time(command: &Command) -> bool {
     match command {
         Command::Demo(_) | Command::Rehearse(_) | Command::Augment(_) => true,
         Command::Evaluate(evaluate) => !evaluate.sharing.list_units,

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args as ClapArgs;
 use sdg_grasp::{ComputeBackend, SearchRegion};
-use sdg_robot::height::ToldHeight;
+use sdg_robot::height::GivenHeight;
 
 /// Device for the network.
 #[derive(Debug, ClapArgs)]
@@ -52,9 +52,9 @@ pub struct ToldHeightArgs {
 
 impl ToldHeightArgs {
     /// The given height for a table at `table_height_m` in the base frame, m.
-    pub fn told(&self, table_height_m: f64) -> Option<ToldHeight> {
+    pub fn told(&self, table_height_m: f64) -> Option<GivenHeight> {
         let height_m = table_height_m + 1e-3 * self.mark_height_mm?;
-        Some(ToldHeight { height_m, sigma_m: 1e-3 * self.mark_height_sigma_mm })
+        Some(GivenHeight { height_m, sigma_m: 1e-3 * self.mark_height_sigma_mm })
     }
 }
 

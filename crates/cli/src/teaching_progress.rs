@@ -9,7 +9,7 @@ use sdg_grasp::{TeachingEvent, ValidationRecord};
 use crate::interrupt::Interrupt;
 
 /// Number of steps between plain lines.
-const LINE_EVERY: usize = 20;
+const STEPS_PER_LINE: usize = 20;
 /// Weight of the newest loss in the displayed moving average.
 const SMOOTHING: f64 = 0.1;
 
@@ -51,7 +51,7 @@ impl TeachingProgress {
                             format!("{} gone, {left}, loss {loss:.2}{}", clock(*elapsed_secs), self.last_validation)
                         });
                     }
-                    None if done % LINE_EVERY == 0 || done == *planned_steps => {
+                    None if done % STEPS_PER_LINE == 0 || done == *planned_steps => {
                         let left = left.map_or_else(|| AFTER_LAST_STEP.to_owned(), |left| format!("{left:.0} s left"));
                         eprintln!(
                             "teaching: step {done} of {planned_steps}, loss {loss:.2}, {elapsed_secs:.0} s gone, {left}"
@@ -67,7 +67,7 @@ impl TeachingProgress {
                     Some(bar) => show_step(bar, done, *planned_steps, {
                         format!("{} gone, loss {loss:.2}: angles, then the network", clock(*elapsed_secs))
                     }),
-                    None if done % LINE_EVERY == 0 || done == *planned_steps => eprintln!(
+                    None if done % STEPS_PER_LINE == 0 || done == *planned_steps => eprintln!(
                         "teaching angles: step {done} of {planned_steps}, loss {loss:.2}, {elapsed_secs:.0} s gone"
                     ),
                     None => {}

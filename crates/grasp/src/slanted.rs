@@ -17,7 +17,7 @@ use crate::sighting::Sighting;
 use crate::verification::{SearchedImage, Shot, agreement_in, foreshortening, usual_focal_px};
 
 /// Number of places used, best first, and their minimum agreement. Chosen by hand, for time.
-const NUM_ASKED: usize = 4;
+const NUM_SLANT_PLACES: usize = 4;
 const MIN_AGREEMENT: f64 = 0.25;
 /// Minimum share of edges on crests; a place below it carries no information. Chosen by hand.
 const MIN_CONSENSUS: f64 = 0.3;
@@ -74,7 +74,7 @@ pub(crate) fn suggested_slant(
 ) -> Option<Slant> {
     let mut best: Vec<_> = sightings.iter().filter(|sighting| sighting.placed.agreement >= MIN_AGREEMENT).collect();
     best.sort_by(|a, b| b.placed.agreement.total_cmp(&a.placed.agreement));
-    best.truncate(NUM_ASKED);
+    best.truncate(NUM_SLANT_PLACES);
     let shortened = parallel::map(&best, |sighting| {
         let fit = foreshortening(searched, &sighting.placed)?;
         Some(Shortened {

@@ -168,8 +168,8 @@ impl PlacedDemonstration<'_> {
 
 /// Distance from an end of the size range, in ln, within which a pose may have been stopped by it, and the gain of
 /// agreement beyond it that shows this. Chosen by hand.
-const AT_END: f64 = 0.02;
-const BETTER_BEYOND: f64 = 0.05;
+const END_MARGIN_LOG: f64 = 0.02;
+const MIN_GAIN_BEYOND_END: f64 = 0.05;
 /// Minimum agreement for searching the marks; poses below it are refused. Chosen by hand, for time.
 const MIN_MARKED: f64 = 0.3;
 
@@ -189,12 +189,12 @@ impl<'a> SizedDemonstration<'a> {
         let scales = self.prepared.search.scales();
         let from_end =
             (scales.end() / view_from_working.scale).ln().min((view_from_working.scale / scales.start()).ln());
-        if from_end > AT_END {
+        if from_end > END_MARGIN_LOG {
             return false;
         }
         let comparison = self.prepared.search.comparison(&view.picture());
         let refined = comparison.refined_by_edges(view_from_working);
-        !scales.contains(&refined.scale) && comparison.agreement(&refined).both() > agreement + BETTER_BEYOND
+        !scales.contains(&refined.scale) && comparison.agreement(&refined).both() > agreement + MIN_GAIN_BEYOND_END
     }
 
     fn placed(

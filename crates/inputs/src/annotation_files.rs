@@ -15,7 +15,7 @@ pub const DATA_YAML: &str = "data.yaml";
 /// Other common names; searched after the first in each folder.
 const OTHER_DATA_YAML: [&str; 3] = ["data.yml", "dataset.yaml", "dataset.yml"];
 /// Maximum number of folders between a label file and its data.yaml: labels/train/a.txt.
-const FOLDERS_UP: usize = 3;
+const MAX_PARENT_FOLDERS: usize = 3;
 
 /// An annotation file, with the files that belong to it.
 pub struct AnnotationFile {
@@ -66,12 +66,12 @@ impl AnnotationFile {
         let objects = marked.checked(|facts| self.objects(facts))?;
         objects.iter().try_for_each(Annotation::check).with_context(|| self.path.display().to_string())?;
         // After all fallible steps, so that an error is printed alone.
-        self.tell_passed_over();
+        self.report_skipped();
         Ok(objects)
     }
 
     /// Prints the entries of the file that do not mark a part.
-    pub fn tell_passed_over(&self) {
+    pub fn report_skipped(&self) {
         for foreign in Annotation::passed_over(&self.bytes) {
             eprintln!("{}: skipped {foreign}", self.path.display());
         }
@@ -131,7 +131,7 @@ fn beside(path: &Path, format: AnnotationFormat) -> Option<PathBuf> {
         }
         AnnotationFormat::YoloPose => {
             let names = || std::iter::once(DATA_YAML).chain(OTHER_DATA_YAML);
-            let folders = path.ancestors().skip(1).take(FOLDERS_UP);
+            let folders = path.ancestors().skip(1).take(MAX_PARENT_FOLDERS);
             folders.flat_map(|folder| names().map(|name| folder.join(name))).find(|file| file.exists())
         }
         _ => None,

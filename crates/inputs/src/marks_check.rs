@@ -37,12 +37,12 @@ impl MarkedPhoto<'_> {
         annotation: impl Fn(&T) -> &Annotation,
     ) -> Result<Vec<T>> {
         let (marked, is_turned) = self.read_upright(read, annotation)?;
-        self.tell_if(is_turned);
+        self.report_orientation(is_turned);
         Ok(marked)
     }
 
     /// Reports an applied orientation, after all fallible steps.
-    fn tell_if(&self, is_turned: bool) {
+    fn report_orientation(&self, is_turned: bool) {
         if is_turned {
             eprintln!(
                 "{}: turned as its Exif orientation says; the marks are read on the turned photo",
@@ -105,7 +105,7 @@ impl MarkedPhoto<'_> {
                 reading.in_words()
             );
         }
-        self.tell_if(is_turned);
+        self.report_orientation(is_turned);
         Ok(marked)
     }
 

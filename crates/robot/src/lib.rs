@@ -77,7 +77,7 @@ pub use robot_address::RobotAddress;
 pub use safety::{CheckedMotion, SafetyLimits, SelfCollision, Violation, WorkspaceBox};
 pub use sdg_kinematics::ArmGeometry;
 pub use sequence::{
-    CONFIRMED, FREE_CLEARANCE_M, GraspConfig, GraspOutcome, GraspReport, LOOK_AT_M, LOOK_HEIGHT_M, LookOut,
+    FREE_CLEARANCE_M, GraspConfig, GraspOutcome, GraspReport, LOOK_AT_M, LOOK_HEIGHT_M, LookOut, MIN_CONFIRMING_SCORE,
     PlacingConfig, PlacingOutcome, PlacingReport, SURE, camera_looking_down, grasp, grasp_and_place, grasp_softly,
 };
 pub use surroundings::{Destination, Surroundings, Way};

@@ -63,13 +63,13 @@ impl PlaceGoal {
         let pitch_m = self.tray.as_ref().map_or([0.0; 2], |tray| tray.pitch_m);
         let does = |goal: &Self| goal.lacks_room(part, &turns_rad, opening_m).is_none();
         let longer = |along: &[[bool; 2]]| -> Vec<String> {
-            along.iter().filter_map(|&along| self.pitch_that_does(along, does)).map(told).collect()
+            along.iter().filter_map(|&along| self.sufficient_pitch(along, does)).map(told).collect()
         };
-        let mut would_do = longer(&[[true, false], [false, true]]);
-        if would_do.is_empty() {
-            would_do = longer(&[[true, true]]);
+        let mut would_suffice = longer(&[[true, false], [false, true]]);
+        if would_suffice.is_empty() {
+            would_suffice = longer(&[[true, true]]);
         }
-        let expected = match would_do.join(" or ") {
+        let expected = match would_suffice.join(" or ") {
             none if none.is_empty() => "a wider pitch".to_owned(),
             pitches => format!("a pitch of {pitches}"),
         };
@@ -142,7 +142,7 @@ impl PlaceGoal {
     }
 
     /// The smallest sufficient pitch, in whole millimetres, increased along the tray's x, its y, or both.
-    fn pitch_that_does(&self, along: [bool; 2], does: impl Fn(&Self) -> bool) -> Option<[f64; 2]> {
+    fn sufficient_pitch(&self, along: [bool; 2], does: impl Fn(&Self) -> bool) -> Option<[f64; 2]> {
         const MAX_STEPS: u32 = 300;
         let before_m = self.tray.as_ref()?.pitch_m;
         let does = |steps: [u32; 2]| {

@@ -14,7 +14,7 @@ use sdg_ros2::{RosError, Transforms, camera_info};
 use crate::lines::Lines;
 
 /// Interval at which a thread checks whether it must end.
-const LOOK_EVERY: Duration = Duration::from_millis(100);
+const POLL_INTERVAL: Duration = Duration::from_millis(100);
 
 /// Source of the camera's pose.
 #[derive(Debug, Clone)]
@@ -59,7 +59,7 @@ impl CameraPoseReader {
         let mut reader = Self { source, known, is_stopped, threads: Vec::new() };
         let infos = node.subscribe::<CameraInfo>("camera_info", Qos::SENSORS)?;
         reader.spawn(lines, move |known| {
-            let Some(received) = infos.receive(LOOK_EVERY)? else { return Ok(()) };
+            let Some(received) = infos.receive(POLL_INTERVAL)? else { return Ok(()) };
             let read = camera_info::read_camera_info(&received.message);
             lock(known).sent = Some(read.as_ref().copied().map_err(ToString::to_string));
             read.map(drop)
@@ -70,7 +70,7 @@ impl CameraPoseReader {
             {
                 let messages = node.subscribe::<TfMessage>(topic, qos)?;
                 reader.spawn(lines, move |known| {
-                    let Some(received) = messages.receive(LOOK_EVERY)? else { return Ok(()) };
+                    let Some(received) = messages.receive(POLL_INTERVAL)? else { return Ok(()) };
                     match lock(known).transforms.add(&received.message, is_static) {
                         0 => Ok(()),
                         num_refused => Err(RosError::Transform {

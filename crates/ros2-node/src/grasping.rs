@@ -7,7 +7,7 @@ use std::time::{Duration, Instant, SystemTime};
 use anyhow::{Context, Result};
 use sdg_cell::{ModelFinder, MountedCamera, Pictures, TakenPicture, UNKNOWN_HEIGHTS_M, height_measurement, part_shape};
 use sdg_grasp::{GraspError, GraspModel};
-use sdg_robot::height::ToldHeight;
+use sdg_robot::height::GivenHeight;
 use sdg_robot::workcell::Workcell;
 use sdg_robot::{
     Arm, GraspConfig, GraspOutcome, GraspStep, GraspTarget, KnownTarget, Pace, PartFinder, PlannedArm, Robot,
@@ -20,7 +20,7 @@ use crate::pictures::Shared;
 use crate::settings::IsInterrupted;
 
 /// Maximum wait for a picture taken after the arm stopped.
-const PATIENCE: Duration = Duration::from_secs(5);
+const PICTURE_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// The inputs of a grasp besides the arm and the model.
 #[derive(Debug, Clone)]
@@ -30,7 +30,7 @@ pub struct GraspSettings {
     /// The camera of the pictures.
     pub camera: MountedCamera,
     /// The given height; without it, the height is measured.
-    pub told: Option<ToldHeight>,
+    pub told: Option<GivenHeight>,
     /// Share of the joints' velocity limits, unless a request gives another.
     pub speed: f64,
     /// The frame of poses in responses.
@@ -43,8 +43,8 @@ struct TopicPictures(Arc<Shared>);
 
 impl<A: Arm> Pictures<A> for TopicPictures {
     fn take(&mut self, _arm: &mut A) -> sdg_robot::Result<TakenPicture> {
-        let picture = self.0.newer_than(SystemTime::now(), PATIENCE).ok_or_else(|| {
-            let secs = PATIENCE.as_secs();
+        let picture = self.0.newer_than(SystemTime::now(), PICTURE_TIMEOUT).ok_or_else(|| {
+            let secs = PICTURE_TIMEOUT.as_secs();
             RobotError::Perception(format!("no picture for {secs} s that was taken after the arm stopped"))
         })?;
         let age = SystemTime::now().duration_since(picture.captured).unwrap_or_default();

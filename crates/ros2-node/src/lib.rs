@@ -46,7 +46,7 @@ use searching::Searcher;
 use services::{Change, Services};
 
 /// Interval of checks for requests while there is no picture.
-const LOOK_EVERY: Duration = Duration::from_millis(5);
+const POLL_INTERVAL: Duration = Duration::from_millis(5);
 
 /// Runs until `is_interrupted` returns true.
 ///
@@ -67,7 +67,7 @@ pub fn run(
     let mut searcher = Searcher::new(settings.model, settings.min_score);
     eprintln!("sdg ros2: pictures from {}; publishes {}; Ctrl-C ends it", reader.topic, topics.names());
     while !is_interrupted() {
-        if let Some(picture) = reader.shared.next(LOOK_EVERY) {
+        if let Some(picture) = reader.shared.next(POLL_INTERVAL) {
             let over_table = camera_pose.at(&picture.header).map_err(anyhow::Error::from);
             match over_table.and_then(|over_table| searcher.search(&picture, over_table.as_ref())) {
                 Ok(searched) => {

@@ -14,7 +14,7 @@ use sdg_ros2::{PictureError, RosError, encoding};
 use crate::lines::Lines;
 
 /// Interval at which a thread checks whether it must end.
-const LOOK_EVERY: Duration = Duration::from_millis(100);
+const POLL_INTERVAL: Duration = Duration::from_millis(100);
 
 /// A picture with its origin.
 #[derive(Debug, Clone)]
@@ -126,7 +126,7 @@ impl PictureReader {
         let (writer, lines) = (Arc::clone(&shared), Arc::clone(lines));
         let thread = std::thread::spawn(move || {
             while !writer.is_stopped.load(Ordering::SeqCst) {
-                let received = subscription.receive(LOOK_EVERY);
+                let received = subscription.receive(POLL_INTERVAL);
                 writer.counts.lost.store(subscription.num_lost(), Ordering::Relaxed);
                 match received {
                     Ok(Some(received)) => take(&writer, &lines, subscription.topic(), &received, read),

@@ -19,7 +19,7 @@ use crate::pictures::PictureReader;
 use crate::searching::Searched;
 
 /// Interval of diagnostics.
-const DIAGNOSTICS_EVERY: Duration = Duration::from_secs(1);
+const DIAGNOSTICS_INTERVAL: Duration = Duration::from_secs(1);
 /// Time without a picture after which the camera is stale.
 const STALE_AFTER: Duration = Duration::from_secs(2);
 /// The grasp's frame in tf.
@@ -109,7 +109,7 @@ impl Topics {
 
     /// Publishes diagnostics if they are due.
     pub(super) fn diagnose(&mut self, reader: &PictureReader, has_model: bool) {
-        if self.last_diagnostics.elapsed() < DIAGNOSTICS_EVERY {
+        if self.last_diagnostics.elapsed() < DIAGNOSTICS_INTERVAL {
             return;
         }
         self.last_diagnostics = Instant::now();

@@ -34,7 +34,7 @@ struct Pair<Q: Cdr + 'static, A: Cdr + 'static> {
 
 /// The client of a request.
 #[derive(Clone, Copy)]
-enum Asker {
+enum Client {
     Full(RequestId),
     Trigger(RequestId),
 }
@@ -49,18 +49,18 @@ impl<Q: Cdr + Clone + Default + 'static, A: Cdr + 'static> Pair<Q, A> {
     }
 
     /// The waiting requests; a Trigger is a request with default values.
-    fn requests(&self, lines: &Lines) -> Vec<(Asker, Result<Q, RosError>)> {
+    fn requests(&self, lines: &Lines) -> Vec<(Client, Result<Q, RosError>)> {
         let mut requests = Vec::new();
         loop {
             match self.full.receive(Duration::ZERO) {
-                Ok(Some((id, request))) => requests.push((Asker::Full(id), request)),
+                Ok(Some((id, request))) => requests.push((Client::Full(id), request)),
                 Ok(None) => break,
                 Err(error) => lines.complain(&error.to_string()),
             }
         }
         loop {
             match self.trigger.receive(Duration::ZERO) {
-                Ok(Some((id, request))) => requests.push((Asker::Trigger(id), request.map(|_| Q::default()))),
+                Ok(Some((id, request))) => requests.push((Client::Trigger(id), request.map(|_| Q::default()))),
                 Ok(None) => break,
                 Err(error) => lines.complain(&error.to_string()),
             }
@@ -68,10 +68,10 @@ impl<Q: Cdr + Clone + Default + 'static, A: Cdr + 'static> Pair<Q, A> {
         requests
     }
 
-    fn answer(&self, asker: Asker, full: A, success: bool, message: String, lines: &Lines) {
+    fn answer(&self, asker: Client, full: A, success: bool, message: String, lines: &Lines) {
         let sent = match asker {
-            Asker::Full(id) => self.full.answer(id, full),
-            Asker::Trigger(id) => self.trigger.answer(id, TriggerResponse { success, message }),
+            Client::Full(id) => self.full.answer(id, full),
+            Client::Trigger(id) => self.trigger.answer(id, TriggerResponse { success, message }),
         };
         if let Err(error) = sent {
             lines.complain(&error.to_string());
@@ -81,7 +81,7 @@ impl<Q: Cdr + Clone + Default + 'static, A: Cdr + 'static> Pair<Q, A> {
 
 /// A detection request that waits for a picture.
 struct Detecting {
-    asker: Asker,
+    asker: Client,
     request: DetectRequest,
     asked: Instant,
     deadline: Instant,
@@ -98,11 +98,11 @@ pub(super) struct Services {
     detect: Pair<DetectRequest, DetectResponse>,
     detecting: Vec<Detecting>,
     teach: Pair<TeachRequest, TeachResponse>,
-    teaching: Option<(Asker, Teaching)>,
+    teaching: Option<(Client, Teaching)>,
     teach_with: Arc<Teach>,
     trigger_teaching: Option<TeachJob>,
     grasp: Option<(Pair<GraspRequest, GraspResponse>, Grasping)>,
-    grasping: Option<Asker>,
+    grasping: Option<Client>,
     lines: Arc<Lines>,
 }
 
@@ -178,7 +178,7 @@ impl Services {
         }
     }
 
-    fn answer_detection(&self, asker: Asker, answer: Result<DetectResponse, String>) {
+    fn answer_detection(&self, asker: Client, answer: Result<DetectResponse, String>) {
         let answer =
             answer.unwrap_or_else(|message| DetectResponse { success: false, message, ..DetectResponse::default() });
         // A client that gets only yes or no asks whether the part is there.
@@ -221,8 +221,8 @@ impl Services {
         for (asker, request) in self.teach.requests(&self.lines) {
             let begun = match (asker, request, &self.trigger_teaching) {
                 _ if self.teaching.is_some() => Err("a teaching is under way".to_owned()),
-                (Asker::Trigger(_), Ok(_), Some(job)) => Ok(Teaching::begin(job.clone(), &self.teach_with)),
-                (Asker::Trigger(_), Ok(_), None) => {
+                (Client::Trigger(_), Ok(_), Some(job)) => Ok(Teaching::begin(job.clone(), &self.teach_with)),
+                (Client::Trigger(_), Ok(_), None) => {
                     Err("expected a node that was started with a demonstration and a file to teach".to_owned())
                 }
                 (_, Ok(request), _) => {
@@ -255,7 +255,7 @@ impl Services {
         is_used.then_some(Change::UseModel(path))
     }
 
-    fn answer_teaching(&self, asker: Asker, taught: Result<(&Path, f64), String>) {
+    fn answer_teaching(&self, asker: Client, taught: Result<(&Path, f64), String>) {
         let answer = match taught {
             Ok((path, seconds)) => TeachResponse {
                 success: true,

@@ -42,9 +42,9 @@ const MAX_EVALUATIONS: usize = 120;
 const MAX_LOSS_BY_EDGES: f64 = 0.005;
 
 /// A pose of lower agreement is refused without a close look. Chosen by hand, for time.
-const MIN_LOOKED_AT: f64 = 0.3;
+const MIN_CLOSE_LOOK_AGREEMENT: f64 = 0.3;
 /// A pose of lower agreement is not tried at other turns. Chosen by hand, for time.
-const MIN_TURNED: f64 = 0.45;
+const MIN_TURN_AGREEMENT: f64 = 0.45;
 /// Poses of lower agreement are not refined further. Chosen by hand, not measured.
 pub(crate) const MIN_REFINED: f64 = 0.25;
 
@@ -149,15 +149,15 @@ impl Comparison<'_> {
     /// All measurements at a pose. Slower than [`Self::agreement`], which is enough for climbing.
     pub fn evidence(&self, image_from_demonstration: &PlanarSimilarity) -> Evidence {
         let (evidence, agreement) = self.evidence_from_afar(image_from_demonstration);
-        let close =
-            (agreement >= self.min_agreement.max(MIN_LOOKED_AT)).then(|| self.close_look(image_from_demonstration));
+        let close = (agreement >= self.min_agreement.max(MIN_CLOSE_LOOK_AGREEMENT))
+            .then(|| self.close_look(image_from_demonstration));
         Evidence { close, ..evidence }
     }
 
     /// `pose`, or another turn at which the part resembles itself if the distinguishing features favour it. For a part
     /// of revolution, its position along the axis and its end, as found from the profile. Scales stay in `scales`.
     pub fn best_turn(&self, pose: &PlanarSimilarity, scales: &RangeInclusive<f64>) -> PlanarSimilarity {
-        if self.agreement(pose).both() < MIN_TURNED {
+        if self.agreement(pose).both() < MIN_TURN_AGREEMENT {
             return *pose;
         }
         if let Some(profile) = self.profile {

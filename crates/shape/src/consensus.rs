@@ -26,9 +26,9 @@ const START_STEP: f64 = 3.0;
 /// Maximum rounds of gathering crests, and the movement (level pixels) below which they stop. Both limit
 /// the time; chosen by hand, not measured.
 const MAX_ROUNDS: usize = 5;
-const STILL: f64 = 0.01;
+const CONVERGED_PX: f64 = 0.01;
 /// Steps that differ by less, in level pixels, are treated as one. Chosen by hand, for time.
-const SAME_PLACE: f64 = 0.02;
+const MERGE_PX: f64 = 0.02;
 
 /// A pose and the share of points with a crest there.
 pub(crate) struct Snapped {
@@ -74,7 +74,7 @@ pub(crate) fn snap_from(
         let units = step_units(level, matched, &best.pose);
         let moved = best.pose.moved([0, 1, 2, 3].map(|k| step[k] * units[k]));
         best = Snapped { pose: range.clamped(&moved), score, num_rounds: round };
-        if step.amax() < STILL {
+        if step.amax() < CONVERGED_PX {
             break;
         }
     }
@@ -102,7 +102,7 @@ fn best_fit(sightings: &Sightings<4>, is_free: [bool; 4], mut steps: Vec<Vector4
         let mut fitted: Vec<Vector4<f64>> = Vec::with_capacity(steps.len());
         for step in steps {
             let step = fit_offsets(sightings, is_free, step, std::slice::from_ref(width));
-            if fitted.iter().all(|other| (other - step).amax() > SAME_PLACE) {
+            if fitted.iter().all(|other| (other - step).amax() > MERGE_PX) {
                 fitted.push(step);
             }
         }

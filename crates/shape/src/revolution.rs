@@ -29,7 +29,7 @@ const ACROSS: usize = 8;
 const INNER: f64 = 0.8;
 /// A point further from the axis, in mean radii, belongs to a wing: heads and hexagons of the parts above reach up to
 /// 1.9, the wings of a wing bolt 2.9.
-const MOST_OF_MEAN: f64 = 2.3;
+const MAX_RADIUS_OVER_MEAN: f64 = 2.3;
 
 /// The axis of such a part, as its photo shows it.
 #[derive(Debug, Clone, PartialEq)]
@@ -103,7 +103,7 @@ impl Revolution {
         let radius = |piece: &[(f64, f64)]| piece.iter().map(|(across, _)| across.abs()).fold(0.0, f64::max);
         let mean_radius = pieces.iter().map(|piece| radius(piece)).sum::<f64>() / (pieces.len() as f64).max(1.0);
         let greatest = pieces.iter().map(|piece| radius(piece)).fold(0.0, f64::max);
-        if last - first < MIN_SLENDERNESS * 2.0 * mean_radius || greatest > MOST_OF_MEAN * mean_radius {
+        if last - first < MIN_SLENDERNESS * 2.0 * mean_radius || greatest > MAX_RADIUS_OVER_MEAN * mean_radius {
             return false;
         }
         // For each section the mean light at each position across, divided by the section's mean.

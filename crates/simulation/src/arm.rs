@@ -169,9 +169,9 @@ impl Arm for Workcell {
         if let Some(HandCommand::Move { opening_m: told_m, .. }) = self.hand_command {
             let found_m = self.opening_m();
             if (found_m - told_m).abs() >= HAND_THERE_M {
-                let (told_mm, found_mm) = (told_m * 1e3, found_m * 1e3);
+                let (given_mm, found_mm) = (told_m * 1e3, found_m * 1e3);
                 return Err(RobotError::Hand(format!(
-                    "the opening should be {told_mm:.0} mm, but is {found_mm:.0} mm"
+                    "the opening should be {given_mm:.0} mm, but is {found_mm:.0} mm"
                 )));
             }
         }

@@ -22,9 +22,9 @@ const MAX_SHARE: f64 = 0.3;
 const MAX_SHARE_OF_FEW: f64 = 0.5;
 /// Largest residual of an explanation beyond the corners' own errors, in radians of the picture: 5 px at a focal length
 /// of 700 px. A robot with errors of 0.5 mm and 0.25 degrees has as much.
-const MAX_LEFT_RAD: f64 = 0.007;
+const MAX_RESIDUAL_RAD: f64 = 0.007;
 /// Largest residual of the closed form before the minimum is searched, which takes long if there is none: robot errors
-/// with [`MAX_LEFT_RAD`] have a fifth of it between two pictures.
+/// with [`MAX_RESIDUAL_RAD`] have a fifth of it between two pictures.
 const MAX_CLOSED_RAD: f64 = 0.1;
 /// Ratio of two explanations' residuals up to which they count as equal.
 const ALIKE: f64 = 1.2;
@@ -150,7 +150,7 @@ fn left_px(evidence: &Evidence, robot: &[Isometry3<f64>]) -> Option<f64> {
 }
 
 fn is_little(evidence: &Evidence, rms_px: f64) -> bool {
-    let most = evidence_rms_px(evidence) + MAX_LEFT_RAD * 0.5 * (evidence.camera.fx + evidence.camera.fy);
+    let most = evidence_rms_px(evidence) + MAX_RESIDUAL_RAD * 0.5 * (evidence.camera.fx + evidence.camera.fy);
     rms_px <= most
 }
 

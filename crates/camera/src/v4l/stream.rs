@@ -20,11 +20,11 @@ use crate::source::{Missing, Source, Taken};
 use crate::yuv::{rgb24_to_rgb, yuyv_to_rgb};
 
 /// Interval of checks for a filled buffer: the system's own wait has no timeout.
-const LOOK_EVERY: Duration = Duration::from_millis(1);
+const POLL_INTERVAL: Duration = Duration::from_millis(1);
 /// If no picture was read for longer than this, the filled buffers are dropped: they are too old.
 const MAX_AGE: Duration = Duration::from_millis(200);
 /// V4L2's exposure times are in units of 100 µs.
-const EXPOSURES_A_SECOND: f64 = 1e4;
+const EXPOSURE_UNITS_PER_SEC: f64 = 1e4;
 /// V4L2_EXPOSURE_MANUAL.
 const EXPOSURE_MANUAL: i32 = 1;
 
@@ -108,7 +108,7 @@ fn set_controls(device: &mut Device, options: &OpenOptions, address: &str) -> Re
         Ok(())
     };
     if let Some(secs) = options.exposure_secs {
-        let units = (secs * EXPOSURES_A_SECOND).round() as i32;
+        let units = (secs * EXPOSURE_UNITS_PER_SEC).round() as i32;
         set("fixed exposure", [(Cid::EXPOSURE_AUTO, EXPOSURE_MANUAL), (Cid::EXPOSURE_ABSOLUTE, units)])?;
     }
     if let Some(kelvin) = options.white_balance_kelvin {
@@ -155,7 +155,7 @@ impl Stream {
             if Instant::now() >= deadline {
                 return Err(Missing::Late);
             }
-            sleep(LOOK_EVERY);
+            sleep(POLL_INTERVAL);
         }
         Ok(())
     }

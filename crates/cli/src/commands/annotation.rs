@@ -131,7 +131,7 @@ fn read_marks(
     }
     let DeclaredImage { file_name, width, height } = declared_image(args, input)?;
     let objects = input.objects(&ImageFacts { width, height, file_name: file_name.as_deref() })?;
-    input.tell_passed_over();
+    input.report_skipped();
     Ok((width, height, file_name, objects))
 }
 

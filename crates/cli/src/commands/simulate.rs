@@ -16,7 +16,7 @@ use crate::interrupt::Interrupt;
 use crate::parts::part_named;
 
 /// Interval at which Ctrl-C and the server are checked.
-const LOOK_EVERY: Duration = Duration::from_millis(100);
+const POLL_INTERVAL: Duration = Duration::from_millis(100);
 
 /// `sdg simulate`
 #[derive(Debug, ClapArgs)]
@@ -68,7 +68,7 @@ pub fn run(args: &SimulateArgs) -> Result<Outcome> {
     }
     let interrupt = Interrupt::watch();
     while !interrupt.is_requested() && server.is_running() {
-        thread::sleep(LOOK_EVERY);
+        thread::sleep(POLL_INTERVAL);
     }
     let statistics = server.statistics();
     server.stop()?;

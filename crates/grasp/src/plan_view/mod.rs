@@ -111,7 +111,7 @@ impl PlanViewDetector {
     ///
     /// # Errors
     /// An invalid range, as for [`GraspModel::with_size_tolerance`].
-    pub fn look_for_sizes(&mut self, sizes: Option<RangeInclusive<f64>>) -> Result<()> {
+    pub fn set_sizes(&mut self, sizes: Option<RangeInclusive<f64>>) -> Result<()> {
         if self.sizes == sizes {
             return Ok(());
         }

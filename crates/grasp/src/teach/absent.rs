@@ -22,7 +22,7 @@ use crate::taught::TaughtDemonstration;
 
 /// One sample in this many shows a picture without the part. Chosen by hand, not measured: fewer than the composed ones
 /// without it.
-const ONE_IN: u64 = 12;
+const SAMPLE_INTERVAL: u64 = 12;
 /// Number of held-back samples with the part with which the score is compared. Chosen for time: one takes about 50 ms.
 const NUM_POSITIVES: u64 = 12;
 /// First index of these samples: far beyond those of the networks' validation, and separate from those of the reported
@@ -60,10 +60,10 @@ impl AbsentSamples {
 
     /// Sample `index`, if it is one of these: a window of one picture at a place determined by seed and index.
     pub(super) fn sample(&self, index: u64, [width, height]: [u32; 2]) -> Option<Sample> {
-        if self.pictures.is_empty() || index % ONE_IN != ONE_IN - 1 {
+        if self.pictures.is_empty() || index % SAMPLE_INTERVAL != SAMPLE_INTERVAL - 1 {
             return None;
         }
-        let turn = index / ONE_IN;
+        let turn = index / SAMPLE_INTERVAL;
         let picture = &self.pictures[(turn % self.pictures.len() as u64) as usize];
         let random = scramble(self.seed ^ scramble(turn));
         let place = |random: u64, room: u32| (random % u64::from(room + 1)) as u32;

@@ -44,7 +44,7 @@ impl Scenes {
             }
         }
         let num_instances = layout.bodies.len();
-        let kinds = self.lay_others(subject, &mut layout, num_instances, rng);
+        let kinds = self.place_others(subject, &mut layout, num_instances, rng);
         let bodies = layout.bodies;
         (finish(view, bodies, conditions.glare, rng), kinds, num_instances, conditions)
     }
@@ -80,7 +80,7 @@ impl Scenes {
     }
 
     /// Places other parts beside the instances and covers over them; returns their kinds.
-    pub(super) fn lay_others(
+    pub(super) fn place_others(
         &self,
         subject: &Subject,
         layout: &mut Layout<'_>,

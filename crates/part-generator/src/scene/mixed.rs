@@ -59,7 +59,7 @@ impl Scenes {
             }
         }
         let num_instances = part_idxs.len();
-        let _kinds = self.lay_others(&self.subjects[first], &mut layout, num_instances, &mut rng);
+        let _kinds = self.place_others(&self.subjects[first], &mut layout, num_instances, &mut rng);
         let bodies = layout.bodies;
         let scene = finish(view, bodies, conditions.glare, &mut rng);
         let sensor = self.sensor(&conditions, &mut rng);

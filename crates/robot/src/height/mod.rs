@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! Sighting, Sighting ─ triangulate ─ MeasuredHeight ─┐
-//! --mark-height-mm ─ ToldHeight ─────────────────────┴─ settle ─ the more certain of both; refused where they contradict each other
+//! --mark-height-mm ─ GivenHeight ─────────────────────┴─ settle ─ the more certain of both; refused where they contradict each other
 //! ```
 //! **Frames.** All heights are z of the robot's base, of the plane of the marks. A picture shows a part in an assumed
 //! plane; for another plane, position, size and opening of the part scale about the point vertically below the camera.
@@ -13,7 +13,7 @@ mod settle;
 mod sighting;
 mod triangulation;
 
-pub use settle::{HeightSource, SettledHeight, ToldHeight, settle};
+pub use settle::{GivenHeight, HeightSource, SettledHeight, settle};
 pub use sighting::Sighting;
 pub use triangulation::{HeightError, MIN_BASELINE_M, MeasuredHeight, RELIEF_M, triangulate, triangulate_nearest};
 
@@ -31,7 +31,7 @@ pub struct HeightMeasurement {
     /// Distance at which a part may be seen above or below its marks, one standard deviation, m.
     pub relief_m: f64,
     /// The given height of the marks; z of the base.
-    pub told: Option<ToldHeight>,
+    pub told: Option<GivenHeight>,
 }
 
 impl HeightMeasurement {

@@ -7,7 +7,7 @@ const MAX_SIGMAS: f64 = 3.0;
 
 /// A given height of the marks; z of the base.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ToldHeight {
+pub struct GivenHeight {
     /// Height, m.
     pub height_m: f64,
     /// Its standard deviation, m.
@@ -50,11 +50,11 @@ pub struct SettledHeight {
 /// The reason why there is none, in one sentence: both are missing (`why_not` measured), or they differ by more than
 /// three standard deviations.
 pub fn settle(
-    told: Option<ToldHeight>,
+    told: Option<GivenHeight>,
     measured: Option<MeasuredHeight>,
     why_not: Option<&str>,
 ) -> Result<SettledHeight, String> {
-    let by_told = |ToldHeight { height_m, sigma_m }| SettledHeight { height_m, sigma_m, source: HeightSource::Told };
+    let by_told = |GivenHeight { height_m, sigma_m }| SettledHeight { height_m, sigma_m, source: HeightSource::Told };
     let by_measurement =
         |MeasuredHeight { height_m, sigma_m }| SettledHeight { height_m, sigma_m, source: HeightSource::Measured };
     let (told, measured) = match (told, measured) {
@@ -66,13 +66,13 @@ pub fn settle(
             return Err(format!("the height of the part was not measured, and none was given: {why}"));
         }
     };
-    let [apart_mm, told_mm, measured_mm] =
+    let [apart_mm, given_mm, measured_mm] =
         [(told.height_m - measured.height_m).abs(), told.height_m, measured.height_m].map(|length| length * 1e3);
     let max_mm = MAX_SIGMAS * told.sigma_m.hypot(measured.sigma_m) * 1e3;
     if apart_mm > max_mm {
         let [told_sigma_mm, measured_sigma_mm] = [told.sigma_m, measured.sigma_m].map(|sigma| sigma * 1e3);
         return Err(format!(
-            "expected marks at the given height of {told_mm:.1} ± {told_sigma_mm:.1} mm, measured {measured_mm:.1} ± \
+            "expected marks at the given height of {given_mm:.1} ± {told_sigma_mm:.1} mm, measured {measured_mm:.1} ± \
              {measured_sigma_mm:.1} mm: at most {max_mm:.1} mm apart are allowed, found {apart_mm:.1} mm"
         ));
     }
@@ -83,8 +83,8 @@ pub fn settle(
 mod tests {
     use super::*;
 
-    fn told(height_mm: f64, sigma_mm: f64) -> Option<ToldHeight> {
-        Some(ToldHeight { height_m: 1e-3 * height_mm, sigma_m: 1e-3 * sigma_mm })
+    fn told(height_mm: f64, sigma_mm: f64) -> Option<GivenHeight> {
+        Some(GivenHeight { height_m: 1e-3 * height_mm, sigma_m: 1e-3 * sigma_mm })
     }
 
     fn measured(height_mm: f64, sigma_mm: f64) -> Option<MeasuredHeight> {

@@ -9,13 +9,13 @@ use crate::arm_state::PERIOD_SECS;
 
 /// A straight path in joint space is curved, and the reference may be lower than the measured position, m: differences
 /// up to this do not count as moving lower.
-const LEAVING_M: f64 = 0.5e-3;
+const ASCENT_TOLERANCE_M: f64 = 0.5e-3;
 /// Largest distance of the reference below the measured tcp for an arm that rests on something, m.
 const BELOW_MEASURED_M: f64 = 1e-3;
 /// Largest sideways distance of a compliant tcp from the descent, m: joint friction and contact forces push it.
-const STANDS_BESIDE_M: f64 = 5e-3;
+const MAX_DESCENT_OFFSET_M: f64 = 5e-3;
 /// Largest sideways distance of the hand from its contact position until it is as high as the limits require, m.
-const BESIDE_M: f64 = 1e-3;
+const MAX_ASCENT_OFFSET_M: f64 = 1e-3;
 
 /// The position of a hand that came straight down by contact, and so may be lower than the limits allow.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -45,7 +45,7 @@ impl FeltBelow {
 
     fn is_here(&self, tcp: &Vector3<f64>) -> bool {
         let [x, y] = self.at_m;
-        (tcp.x - x).hypot(tcp.y - y) <= STANDS_BESIDE_M && tcp.z >= self.lowest_m
+        (tcp.x - x).hypot(tcp.y - y) <= MAX_DESCENT_OFFSET_M && tcp.z >= self.lowest_m
     }
 }
 
@@ -68,9 +68,9 @@ impl SafetyLimits {
             let table_m = self.below_table_m(start);
             let floor_m = self.workspace.map_or(0.0, |workspace| workspace.min_m.z - tcp.z);
             let deepest_m = table_m.max(floor_m);
-            let is_below = deepest_m > 0.0 && deepest_m <= felt.below_limits_m + LEAVING_M;
+            let is_below = deepest_m > 0.0 && deepest_m <= felt.below_limits_m + ASCENT_TOLERANCE_M;
             // Each is lowered only as far as necessary.
-            let lower_m = |needed_m: f64| if needed_m > 0.0 { needed_m + LEAVING_M } else { 0.0 };
+            let lower_m = |needed_m: f64| if needed_m > 0.0 { needed_m + ASCENT_TOLERANCE_M } else { 0.0 };
             (is_below && felt.is_here(&tcp)).then(|| self.lowered(lower_m(table_m), lower_m(floor_m)))
         });
         LimitsFrom { limits: self, leaving }
@@ -113,7 +113,7 @@ impl LimitsFrom<'_> {
                 continue;
             }
             let [beside_m, down_m] = [(tcp - from).xy().norm(), highest_m - tcp.z];
-            if was_above || beside_m > BESIDE_M || down_m > LEAVING_M {
+            if was_above || beside_m > MAX_ASCENT_OFFSET_M || down_m > ASCENT_TOLERANCE_M {
                 let (beside_mm, down_mm) = (beside_m * 1e3, down_m.max(0.0) * 1e3);
                 return Err(Violation::Leaving { time_secs, beside_mm, down_mm });
             }

@@ -16,8 +16,8 @@ pub(super) const HOVER_SHIFTS_M: [[f64; 2]; 3] = [[0.0, 0.0], [-0.03, 0.03], [0.
 /// Score threshold of perception.
 pub const SURE: f64 = 0.5;
 /// A detection within this many metres and radians of the first look's part is accepted at a lower score.
-pub const CONFIRMED: f64 = 0.2;
-const CONFIRMED_WITHIN: (f64, f64) = (0.015, 0.26);
+pub const MIN_CONFIRMING_SCORE: f64 = 0.2;
+const CONFIRMING_TOLERANCE: (f64, f64) = (0.015, 0.26);
 
 impl<A: Arm> Sequence<'_, '_, A> {
     /// Looks from one pose after the other until the part is found.
@@ -170,7 +170,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
 /// Whether a second look sees the part of the first one.
 fn confirms(first: &GraspTarget, second: &GraspTarget) -> bool {
     let apart = first.base_from_tcp.inverse() * second.base_from_tcp;
-    second.score >= CONFIRMED
-        && apart.translation.vector.norm() <= CONFIRMED_WITHIN.0
-        && apart.rotation.angle() <= CONFIRMED_WITHIN.1
+    second.score >= MIN_CONFIRMING_SCORE
+        && apart.translation.vector.norm() <= CONFIRMING_TOLERANCE.0
+        && apart.rotation.angle() <= CONFIRMING_TOLERANCE.1
 }

@@ -17,7 +17,7 @@ const MIN_DISTANCE_M: f64 = 0.18;
 
 /// Share of the sideways distance for a picture that replaces one without the part: it is then far enough from the one
 /// on the other side.
-const NEARER: f64 = 0.5;
+const REPLACEMENT_SHIFT_SHARE: f64 = 0.5;
 
 impl<A: Arm> Sequence<'_, '_, A> {
     /// Measures the part's height, if that is configured; returns the grasp at that height.
@@ -79,7 +79,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         let mut by_part: Option<(MeasuredHeight, [Sighting; 2])> = None;
         // If one of the first two shows nothing, the next is closer to the part: long parts fill the picture, and
         // reflections move.
-        let nearer_m = NEARER * half_m;
+        let nearer_m = REPLACEMENT_SHIFT_SHARE * half_m;
         let mut shown_at_m = None;
         for [across_m, along_m] in
             [[half_m, 0.0], [-half_m, 0.0], [nearer_m, 0.0], [-nearer_m, 0.0], [0.0, half_m], [0.0, -half_m]]

@@ -39,7 +39,7 @@ use crate::robot::Robot;
 use crate::touch::{TouchDown, Touched};
 
 pub use config::{GraspConfig, LOOK_AT_M, LOOK_HEIGHT_M, LookOut, camera_looking_down};
-pub use look::{CONFIRMED, SURE};
+pub use look::{MIN_CONFIRMING_SCORE, SURE};
 pub use placing::{PlacingConfig, PlacingOutcome, PlacingReport, grasp_and_place};
 
 use held_part::HeldPart;

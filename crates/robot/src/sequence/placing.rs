@@ -290,7 +290,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         placing: &PlacingConfig,
     ) -> Steps<Option<GraspTarget>> {
         let turns_rad = same_turns_rad(placing.symmetry);
-        let num_skipped = turns_rad.len().div_ceil(MAX_LOOK_TURNS);
+        let num_skipped = turns_rad.len().div_ceil(MAX_VIEW_TURNS);
         let grasps: Vec<Isometry3<f64>> = turns_rad
             .into_iter()
             .step_by(num_skipped)
@@ -319,7 +319,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
                 Some(size_m) => inside(goal, &found.base_from_tcp, size_m),
                 None => {
                     let apart = found.base_from_tcp.translation.vector - base_from_part.translation.vector;
-                    apart.xy().norm() <= MAX_SEEN_BESIDE_M
+                    apart.xy().norm() <= MAX_PLACE_OFFSET_M
                 }
             };
             if let Some(found) = found.filter(|found| found.score >= SURE && is_here(found)) {
@@ -333,9 +333,9 @@ impl<A: Arm> Sequence<'_, '_, A> {
 
 /// Maximum number of symmetric view orientations: a hand that was turned for its fingers may not reach the one of its
 /// own turn.
-const MAX_LOOK_TURNS: usize = 4;
+const MAX_VIEW_TURNS: usize = 4;
 /// A part farther from its place is another part, m.
-const MAX_SEEN_BESIDE_M: f64 = 0.03;
+const MAX_PLACE_OFFSET_M: f64 = 0.03;
 
 fn fails(why: String) -> Stop {
     Stop::Failed(GraspStep::Check, why)

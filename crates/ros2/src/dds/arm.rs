@@ -40,7 +40,7 @@ const MAX_STATE_AGE: Duration = Duration::from_millis(500);
 /// Largest gap between two states of a moving arm, s: drivers publish 20 to 1000 per second, and networks delay them.
 const MAX_SILENCE_SECS: f64 = 0.5;
 /// Interval of checking the states while a hand or an arm moves.
-const LOOK_EVERY: Duration = Duration::from_millis(5);
+const POLL_INTERVAL: Duration = Duration::from_millis(5);
 
 /// An arm behind ROS 2.
 pub struct TrajectoryArm {
@@ -81,7 +81,7 @@ impl TrajectoryArm {
                 let why = format!("expected the joints {joints} on {}, found none of them", arm.states.topic);
                 return Err(RobotError::Unreachable { peer: "the arm on ROS 2".to_owned(), why });
             }
-            std::thread::sleep(LOOK_EVERY);
+            std::thread::sleep(POLL_INTERVAL);
         }
         Ok(arm)
     }
@@ -193,7 +193,7 @@ impl Arm for TrajectoryArm {
         let deadline = Instant::now() + Duration::from_secs_f64(motion.duration_secs() + MAX_DELAY_SECS);
         let mut seen_secs = f64::NAN;
         let (end, result) = loop {
-            if let Some(ended) = self.motions.result(&mut goal, LOOK_EVERY).map_err(|error| self.lost(error))? {
+            if let Some(ended) = self.motions.result(&mut goal, POLL_INTERVAL).map_err(|error| self.lost(error))? {
                 break ended;
             }
             while let Ok(Some(_)) = self.motions.feedback(&goal, Duration::ZERO) {
@@ -237,7 +237,7 @@ impl Arm for TrajectoryArm {
             if let Some(reason) = self.observe(watch, &mut seen_secs)? {
                 return Err(RobotError::Stopped(reason));
             }
-            std::thread::sleep(LOOK_EVERY);
+            std::thread::sleep(POLL_INTERVAL);
         }
         Ok(())
     }
@@ -273,7 +273,7 @@ impl Arm for TrajectoryArm {
         let mut seen_secs = f64::NAN;
         let failed = |error: RosError| RobotError::Hand(error.to_string());
         let (end, result) = loop {
-            if let Some(ended) = self.gripper.result(&mut goal, LOOK_EVERY).map_err(failed)? {
+            if let Some(ended) = self.gripper.result(&mut goal, POLL_INTERVAL).map_err(failed)? {
                 break ended;
             }
             if let Some(reason) = self.observe(watch, &mut seen_secs)? {

@@ -110,7 +110,7 @@ struct Found {
 
 impl Found {
     fn is_worth_more(&self) -> bool {
-        self.agreement >= WORTH_MORE
+        self.agreement >= MIN_FURTHER_AGREEMENT
     }
 }
 
@@ -135,7 +135,7 @@ const STARTS_AT_ONCE: usize = 64;
 const FOLLOWED_AT_ONCE: usize = 8;
 /// Further starts are followed as long as the agreement of one of the last is at least this. Chosen by hand, below
 /// every right pose on generated parts except the lowest twentieth.
-const WORTH_MORE: f64 = 0.4;
+const MIN_FURTHER_AGREEMENT: f64 = 0.4;
 /// Parts of one picture: the largest difference of their ln sizes, two steps of scale, and the largest ratio of their
 /// responses. Chosen by hand, for time: of ten photographed clips in a picture all are found.
 const SAME_SIZE: f64 = 0.2;
@@ -359,8 +359,11 @@ impl ShapeSearch {
         let sure = self.config.shape.refinement.sure_agreement;
         let (poor, mut others): (Vec<Found>, Vec<Found>) =
             found.into_iter().partition(|found| (MIN_REFINED..sure).contains(&found.agreement));
-        let count =
-            poor.iter().filter(|found| found.agreement >= WORTH_MORE).count().clamp(MIN_NUM_POLISHED, MAX_NUM_POLISHED);
+        let count = poor
+            .iter()
+            .filter(|found| found.agreement >= MIN_FURTHER_AGREEMENT)
+            .count()
+            .clamp(MIN_NUM_POLISHED, MAX_NUM_POLISHED);
         let (first, rest) = poor.split_at(count.min(poor.len()));
         others.extend(parallel::map(first, |found| self.polished(picture, found)));
         others.extend(rest);

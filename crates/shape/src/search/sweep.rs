@@ -18,7 +18,7 @@ use crate::search::responses::{BLOCK, FULL, Responses};
 /// Places that one thread takes at a time, in blocks of [`BLOCK`]. Chosen for time; it does not change results.
 const STRETCH: usize = 1024;
 /// Reads summed in bytes before they are carried into 16 bits. Derived.
-const LOOKS_PER_BYTE: usize = 255 / FULL as usize;
+const READS_PER_BYTE: usize = 255 / FULL as usize;
 /// Sectors of the turn, each with its own best of every scale. Two would be enough for half a turn; four were chosen by
 /// hand, not measured.
 const NUM_SECTORS: usize = 4;
@@ -174,7 +174,7 @@ impl WithSimd for SweepStretch<'_> {
             let from = (at + start) as isize;
             for (variant_idx, looks) in shifts.iter().enumerate() {
                 let mut sums = [0i16; BLOCK];
-                for some in looks.chunks(LOOKS_PER_BYTE) {
+                for some in looks.chunks(READS_PER_BYTE) {
                     let mut bytes = [0u8; BLOCK];
                     for &(table, shift) in some {
                         let row = &responses.table(table)[(from + shift) as usize..][..BLOCK];

@@ -28,7 +28,7 @@ use crate::web_browser;
 /// Default folder of the pictures.
 const DEFAULT_FOLDER: &str = "calibration-pictures";
 /// Number of pictures after which taking ends, if nothing is missing; docs/calibration.md states both numbers.
-const ENOUGH: usize = 12;
+const MIN_TAKEN: usize = 12;
 /// Number of pictures after which taking ends in any case: more do not improve the result.
 const MAX_TAKEN: usize = 40;
 const BOARD: Color = Color([255, 196, 61]);
@@ -158,7 +158,7 @@ impl<'a> Taking<'a> {
     }
 
     fn is_done(&self) -> bool {
-        self.seen.len() >= MAX_TAKEN || (self.seen.len() >= ENOUGH && self.next.is_empty())
+        self.seen.len() >= MAX_TAKEN || (self.seen.len() >= MIN_TAKEN && self.next.is_empty())
     }
 
     /// Searches a frame for the board, saves the frame if it is useful, and returns the picture for the page and the

@@ -25,7 +25,7 @@ use crate::interrupt::Interrupt;
 use crate::progress::EvaluationProgress;
 
 /// Time between two reads of the folder.
-const WATCH_EVERY: Duration = Duration::from_secs(2);
+const POLL_INTERVAL: Duration = Duration::from_secs(2);
 
 /// The evaluation that the arguments describe.
 struct Asked {
@@ -202,7 +202,7 @@ fn watch(folder: &Path, json: bool) -> Result<Outcome> {
                 missing => Err(anyhow!("{}: {missing} of {} units have no result", folder.display(), progress.units)),
             };
         }
-        std::thread::sleep(WATCH_EVERY);
+        std::thread::sleep(POLL_INTERVAL);
     }
 }
 

@@ -50,7 +50,7 @@ impl Evaluation<'_> {
         let mut wait = || {
             if !is_told {
                 is_told = true;
-                told(&format!("{name}: at work elsewhere{}; waiting for its end", by_whom(&folder)));
+                told(&format!("{name}: at work elsewhere{}; waiting for its end", holder_text(&folder)));
             }
             !is_interrupted()
         };
@@ -158,7 +158,7 @@ impl Evaluation<'_> {
 }
 
 /// The process that runs a unit, if known.
-fn by_whom(folder: &UnitFolder) -> String {
+fn holder_text(folder: &UnitFolder) -> String {
     let running = folder.read().ok().and_then(|state| state.running);
     running.map_or_else(String::new, |running| format!(", by {}", running.by))
 }

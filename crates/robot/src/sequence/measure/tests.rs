@@ -5,7 +5,7 @@ use sdg_kinematics::{ArmGeometry, ready_pose};
 
 use super::*;
 use crate::camera_pose::CameraPose;
-use crate::height::ToldHeight;
+use crate::height::GivenHeight;
 use crate::known_target::KnownTarget;
 use crate::perception::PartFinder;
 use crate::planned_arm::{PlannedAction, PlannedArm};
@@ -56,7 +56,7 @@ fn camera() -> CameraPose {
     CameraPose::OnFlange(ArmGeometry::panda().flange_from_tcp() * tcp_from_camera())
 }
 
-fn config(told: Option<ToldHeight>) -> GraspConfig {
+fn config(told: Option<GivenHeight>) -> GraspConfig {
     let height = HeightMeasurement { told, ..HeightMeasurement::new(HEIGHTS_M[0], HEIGHTS_M[1]) };
     GraspConfig { height: Some(height), ..GraspConfig::default() }
 }
@@ -131,7 +131,7 @@ fn a_picture_that_does_not_show_the_part_is_the_reason() {
 
 #[test]
 fn a_told_height_is_used_where_there_is_no_other_and_refused_where_it_contradicts() {
-    let told = |height_m: f64| Some(ToldHeight { height_m, sigma_m: 0.001 });
+    let told = |height_m: f64| Some(GivenHeight { height_m, sigma_m: 0.001 });
     let (report, ..) = grasped(&config(told(0.030)), &[false], true);
     assert_eq!(report.outcome, GraspOutcome::Held);
     let settled = report.height.unwrap().settled.unwrap();
