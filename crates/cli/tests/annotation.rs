@@ -101,7 +101,7 @@ fn wrong_calls_are_refused_in_one_line() {
     refused(Path::new("/nowhere.json"), "a.json", &[], 1, &["/nowhere.json", "cannot read"]);
 
     fs::copy(&annotation, at("same.json")).unwrap();
-    assert_refused(&convert(&at("same.json"), &at("same.json"), &[]), 2, &["another file to write than to read"]);
+    assert_refused(&convert(&at("same.json"), &at("same.json"), &[]), 2, &["an output file other than the input"]);
 
     fs::copy(foreign("boxes_train.npy"), at("boxes_alone.npy")).unwrap();
     let image = shipped("fuel_line", "image.png");

@@ -214,7 +214,7 @@ fn damaged_results_are_refused(shared: &str) {
     let (file, kept) = (at("cells/S-rod_end.look.json"), at("cells/kept"));
     fs::copy(&file, &kept).unwrap();
     fs::write(&file, fs::read_to_string(&file).unwrap() + "\n").unwrap();
-    is_refused(&["look-rod_end: stale: cells/S-rod_end.look.json is not the file"]);
+    is_refused(&["look-rod_end: stale: cells/S-rod_end.look.json differs from the file"]);
     fs::remove_file(&file).unwrap();
     is_refused(&["look-rod_end: stale: cells/S-rod_end.look.json is gone"]);
     fs::rename(&kept, &file).unwrap();

@@ -285,5 +285,5 @@ fn a_part_is_put_between_parts_that_lie_and_not_onto_one() {
     let onto = GraspConfig { lying: vec![part(&goal)], ..known };
     let report = run(&mut super::tests::cell(Isometry3::identity()), &onto, &goal, &PlacingConfig::default());
     let PlacingOutcome::Failed { step: GraspStep::Detect, why } = &report.outcome else { panic!("{report:?}") };
-    assert!(why.contains("in \"tray, cell 1\" lies a part already"), "{why}");
+    assert!(why.contains("\"tray, cell 1\" already contains a part"), "{why}");
 }
