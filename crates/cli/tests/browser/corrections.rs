@@ -145,7 +145,7 @@ fn a_stroke_that_takes_much_of_the_outline_is_told_and_taken_back() {
     page.browser.drag(&stroke).unwrap();
     page.settle();
     page.screenshot("corrections-2-much");
-    let note = "return document.getElementById('toasts').innerText.includes('took much of the outline')";
+    let note = "return document.getElementById('toasts').innerText.includes('removed much of the outline')";
     page.wait_for("a note", note);
     assert!(page.saved().outline.unwrap().area() < 0.65 * area);
     page.assert_accessible("a stroke that took too much");

@@ -218,7 +218,7 @@ fn try_on_another_picture(page: &Page) {
     page.click(".found button");
     page.wait_for(
         "another demonstration",
-        "return document.getElementById('found').innerText.includes('A demonstration now')",
+        "return document.getElementById('found').innerText.includes('Now a demonstration')",
     );
     let bytes = std::fs::read(page.folder.path().join("other-2.json")).unwrap();
     let facts = sdg_demonstration::ImageFacts { width: 640, height: 480, file_name: None };

@@ -177,7 +177,7 @@ fn a_refused_one_says_why_and_is_learnt_from() {
     page.click(".found button");
     page.wait_for(
         "a demonstration",
-        "return document.getElementById('found').innerText.includes('A demonstration now')",
+        "return document.getElementById('found').innerText.includes('Now a demonstration')",
     );
     // Model S is taught in seconds: it learns at once, and the page reports the effect, even if there is none.
     let told = "const text = document.getElementById('learnt').innerText; return text.startsWith('The new model finds') && text";
@@ -414,7 +414,7 @@ fn that_an_outline_has_no_holes_is_said() {
     assert!((found / area - 1.0).abs() < 0.05, "{found} of {area}");
     page.click("[data-tool=out]");
     page.browser.drag(&[page.on_screen(middle)]).unwrap();
-    page.wait_for("a word of the hole", "return document.getElementById('toasts').innerText.includes('no holes')");
+    page.wait_for("a word of the hole", "return document.getElementById('toasts').innerText.includes('without holes')");
     page.settle();
     let after = page.saved().outline.unwrap().area();
     assert!((after / area - 1.0).abs() < 0.05, "{after} of {area}");

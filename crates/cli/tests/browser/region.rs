@@ -68,12 +68,12 @@ fn a_region_is_drawn_and_typed_and_holds_live_and_in_the_next_model() {
     page.click("#go-try");
     live_found_is(&page, "Found the part");
     page.unfold("#region-fold");
-    assert!(page.text("#region-text").contains("All of the picture is searched"));
+    assert!(page.text("#region-text").contains("The whole picture is searched"));
 
     // Drawn on the live picture, beside the part.
     drag(&page, BESIDE_IT);
     live_found_is(&page, "There is nothing to grasp");
-    assert!(page.text("#region-text").contains("in the frame are found"), "{}", page.text("#region-text"));
+    assert!(page.text("#region-text").contains("are in the frame"), "{}", page.text("#region-text"));
     page.wait_for("the frame", "return document.querySelector('#region-frame .line').getAttribute('d').length > 10");
     page.screenshot("region-1-live");
     page.assert_accessible("a region on the live picture");
