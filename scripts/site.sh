@@ -11,7 +11,7 @@ book=target/site-source
 out=$PWD/target/site
 # What pages link to or show, beside pages.
 files=('*.md' 'docs/*.svg' 'datasets/pictures' 'datasets/models' 'datasets/workcell' 'datasets/demonstrations'
-    crates/capi/include/sdg.h crates/grasp/src/lib.rs fuzz/src/lib.rs python/notebook tests/golden/torchvision/export.py)
+    crates/capi/include/sdg.h crates/grasp/src/lib.rs fuzz/src/lib.rs tests/endurance/src/lib.rs python/notebook tests/golden/torchvision/export.py)
 
 rm -rf "$book" "$out.new"
 mkdir -p "$book/src" "$book/theme/fonts"
