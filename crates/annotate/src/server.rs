@@ -10,7 +10,7 @@
 use std::io;
 use std::net::{Ipv4Addr, TcpListener};
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use http_body_util::{BodyExt, Full};
 use hyper::body::{Body, Bytes, Incoming};
@@ -42,6 +42,8 @@ const MAX_HEAD_BYTES: usize = 16 << 10;
 const MAX_HEADERS: usize = 64;
 /// Maximum number of connections, and of requests answered at a time; the page needs fewer.
 const MAX_CONNECTIONS: usize = 64;
+/// Maximum time without a free descriptor while no connection is open. Chosen by hand.
+const MAX_LACK: Duration = Duration::from_secs(3);
 
 /// A bound port and the service behind it.
 pub struct Server {
@@ -114,19 +116,25 @@ impl Server {
         self.listener.set_nonblocking(true)?;
         let listener = tokio::net::TcpListener::from_std(self.listener)?;
         let connections = Arc::new(Semaphore::new(MAX_CONNECTIONS));
+        let mut lack_since = None;
         while !stop() {
             let Ok(accepted) = timeout(POLL_INTERVAL, listener.accept()).await else { continue };
             let stream = match accepted {
                 Ok((stream, _)) => stream,
                 // A connection that broke before it was accepted must not end the server.
                 Err(error) if error.kind() == io::ErrorKind::ConnectionAborted => continue,
-                // The connections that are open will give some back; the page stays until then.
+                // Open connections return theirs when they close. Without one, nothing may ever be returned.
                 Err(error) if is_out_of_descriptors(&error) => {
+                    let is_idle = connections.available_permits() == MAX_CONNECTIONS;
+                    if is_idle && lack_since.get_or_insert_with(Instant::now).elapsed() > MAX_LACK {
+                        return Err(error);
+                    }
                     tokio::time::sleep(POLL_INTERVAL).await;
                     continue;
                 }
                 Err(error) => return Err(error),
             };
+            lack_since = None;
             let Ok(permit) = Arc::clone(&connections).try_acquire_owned() else { continue };
             let (service, patience) = (self.service.clone(), self.patience);
             tokio::spawn(async move {

@@ -89,12 +89,21 @@ fn nothing_is_kept_open_after_a_refusal_and_after_http_1_0() {
     }
 }
 
+/// A server whose runtime has opened its files, and which has closed the connection that showed it.
+#[cfg(unix)]
+fn served_with_all_it_needs() -> Served {
+    let served = Served::start();
+    assert_eq!(served.ask("GET", "/api/session", b"").status, 200);
+    std::thread::sleep(Duration::from_millis(300));
+    served
+}
+
 /// Runs only as the child of [`a_page_outlives_a_lack_of_descriptors`], where few files may be open.
 #[cfg(unix)]
 #[test]
 #[ignore = "needs few descriptors; another test runs it in a child process"]
 fn child_with_few_descriptors() {
-    let served = Served::start();
+    let served = served_with_all_it_needs();
     let connect = || std::net::TcpStream::connect(served.host());
     // Client and server share what there is: the server lacks a descriptor for the connections that it has not taken yet.
     let held: Vec<_> = std::iter::from_fn(|| connect().ok()).collect();
@@ -104,15 +113,42 @@ fn child_with_few_descriptors() {
     assert_eq!(served.ask("GET", "/api/session", b"").status, 200);
 }
 
+/// As above: nothing will ever be returned, because no connection is open.
 #[cfg(unix)]
 #[test]
-fn a_page_outlives_a_lack_of_descriptors() {
+#[ignore = "needs few descriptors; another test runs it in a child process"]
+fn child_without_descriptors() {
+    use std::io::Read;
+    let served = served_with_all_it_needs();
+    let mut files: Vec<_> = std::iter::from_fn(|| std::fs::File::open("/dev/null").ok()).collect();
+    // One for the client, none for the server.
+    files.pop();
+    let mut client = std::net::TcpStream::connect(served.host()).unwrap();
+    client.set_read_timeout(Some(Duration::from_secs(10))).unwrap();
+    let ended = client.read(&mut [0]).map_err(|error| error.kind());
+    assert!(matches!(ended, Ok(0) | Err(std::io::ErrorKind::ConnectionReset)), "{ended:?}");
+}
+
+#[cfg(unix)]
+fn passes_with_few_descriptors(test: &str) {
     let output = std::process::Command::new("sh")
         .args(["-c", "ulimit -n 24; exec \"$0\" \"$@\""])
         .arg(std::env::current_exe().unwrap())
-        .args(["--ignored", "--exact", "transport::child_with_few_descriptors"])
+        .args(["--ignored", "--exact", test])
         .output()
         .unwrap();
     let printed = String::from_utf8_lossy(&output.stdout);
     assert!(output.status.success() && printed.contains("1 passed"), "{printed}");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_page_outlives_a_lack_of_descriptors() {
+    passes_with_few_descriptors("transport::child_with_few_descriptors");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_page_that_can_never_answer_ends() {
+    passes_with_few_descriptors("transport::child_without_descriptors");
 }

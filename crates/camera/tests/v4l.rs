@@ -183,7 +183,7 @@ fn a_camera_that_is_unplugged_comes_back() {
 fn what_the_camera_does_not_have_is_refused() {
     let refused = |address: &str, options: &OpenOptions| try_open(address, options).err().unwrap().to_string();
     let exposure = OpenOptions { exposure_secs: Some(0.01), ..OpenOptions::default() };
-    assert!(refused("v4l:vivid", &exposure).contains("the setting fixed exposure, found none"));
+    assert!(refused("v4l:vivid", &exposure).contains("the setting fixed exposure, found no V4L2 control"));
     let mjpeg = options(640, 480, Encoding::Mjpeg);
     let error = refused(&format!("v4l:{}", vivid().path.display()), &mjpeg);
     assert!(error.contains("expected the format MJPG") && error.contains("YUYV"), "{error}");
