@@ -184,7 +184,7 @@ fn crates_that_never_see_burn_do_not() {
     }
 }
 
-/// Who changes the weights says where the new ones come from.
+/// A change of the weights must also change their provenance.
 #[test]
 fn the_shipped_weights_are_those_whose_provenance_is_told() {
     let document = fs::read_to_string(root().join("docs/decisions/013-base-weights.md")).unwrap();

@@ -115,7 +115,7 @@ fn pages_are_accessible_at_a_phone_s_width_and_on_a_desk() {
     let axe = fs::read_to_string(root.join("target/browser-test/npm/node_modules/axe-core/axe.min.js")).unwrap();
     let shots = root.join("target/site-test");
     fs::create_dir_all(&shots).unwrap();
-    // A policy of the pages is that they run no script; what the browser is told to run from outside is none of theirs.
+    // The pages' policy forbids scripts; it does not apply to scripts that the WebDriver runs.
     let server = serve_folder(site()).unwrap();
     let browser = Browser::start(&BrowserOptions::default()).unwrap();
     let mut faults = Vec::new();

@@ -147,13 +147,16 @@ impl Drop for LatestFrame {
 }
 
 #[cfg(test)]
+mod schedules;
+
+#[cfg(test)]
 mod tests {
     use super::*;
     use image::RgbImage;
     use std::sync::mpsc::{Receiver, Sender, channel};
 
-    /// Gives a frame for each number that is sent, and a torn one for `None`.
-    struct Driven(Receiver<Option<u64>>, Sender<()>);
+    /// Gives a frame for each number that is sent, and a torn one for `None`; sends a message before each.
+    pub(super) struct Driven(pub(super) Receiver<Option<u64>>, pub(super) Sender<()>);
 
     impl Camera for Driven {
         fn next_frame(&mut self) -> Result<Option<Frame>, CameraError> {

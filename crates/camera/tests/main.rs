@@ -2,7 +2,6 @@
 #![allow(clippy::unwrap_used)]
 
 mod hostile_server;
-mod latest_schedules;
 mod mjpeg_server;
 mod programs;
 mod support;

@@ -9,7 +9,7 @@ use std::path::Path;
 
 use clap::{Arg, Command};
 
-/// What stands above the verbs.
+/// The page's text above the verbs.
 const HEAD: &str = "# Verbs and options
 
 Every verb with its arguments and options, written by a test from the program's own definition. `sdg VERB --help` prints the same. What the verbs share, and what they print: [the command line](command-line.md).

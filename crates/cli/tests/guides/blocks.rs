@@ -5,9 +5,9 @@
 pub struct Block {
     /// The line of its fence, from 1.
     pub line: usize,
-    /// What stands behind the fence: `text`, `yaml`, or nothing for commands.
+    /// The language after the fence: `text`, `yaml`, or none for commands.
     pub language: String,
-    /// What the comment above it says that it needs or how long it takes: `<!-- needs: a camera -->`.
+    /// The comment above the block, which gives its requirements or its duration: `<!-- needs: a camera -->`.
     pub marker: Option<Marker>,
     pub text: String,
 }

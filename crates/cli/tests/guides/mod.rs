@@ -62,7 +62,7 @@ fn documents() -> Vec<(String, String)> {
     documents
 }
 
-/// What is wrong with a call of `sdg`, where something is.
+/// The error in a call of `sdg`, if there is one.
 fn fault(root: &Command, words: &[String]) -> Option<String> {
     let mut command = root;
     let mut rest = words;

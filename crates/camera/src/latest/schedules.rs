@@ -1,12 +1,12 @@
 //! Every order in which a camera's thread and a caller can take turns at the newest frame, up to seven turns, against a model without
-//! threads. Each turn is whole: what is done at the cell is done under one lock.
+//! threads. Turns do not overlap, because every operation on the cell holds one lock.
 
 use std::collections::VecDeque;
-use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::mpsc::channel;
 use std::time::Duration;
 
-use image::RgbImage;
-use sdg_camera::{Camera, CameraError, Fault, Frame, LatestFrame};
+use super::LatestFrame;
+use super::tests::Driven;
 
 /// Longest schedule: 3 + 9 + … + 3⁷ = 3279 of them.
 const MAX_TURNS: u32 = 7;
@@ -23,21 +23,7 @@ enum Turn {
 
 const TURNS: [Turn; 3] = [Turn::Frame, Turn::Torn, Turn::Take];
 
-/// Gives a frame for each number that is sent, an error for `None`, its end when the sender is gone; says before each that it is asked.
-struct Driven(Receiver<Option<u64>>, Sender<()>);
-
-impl Camera for Driven {
-    fn next_frame(&mut self) -> Result<Option<Frame>, CameraError> {
-        let _ = self.1.send(());
-        match self.0.recv() {
-            Ok(Some(number)) => Ok(Some(Frame::new(RgbImage::new(1, 1), number, "test:".into()))),
-            Ok(None) => Err(CameraError::Fault { camera: "test:".into(), fault: Fault::Black }),
-            Err(_) => Ok(None),
-        }
-    }
-}
-
-/// What the cell promises, without threads.
+/// The specification of the cell, without threads.
 #[derive(Default)]
 struct Model {
     newest: Option<u64>,
