@@ -44,8 +44,17 @@ const MAX_CONTACT_SECS: f64 = 0.3;
 const WORKSPACE: WorkspaceBox =
     WorkspaceBox { min_m: Vector3::new(0.05, -0.55, -0.05), max_m: Vector3::new(0.68, 0.55, 0.95) };
 
-/// The largest share of each limit that was seen.
-type Shares = BTreeMap<&'static str, f64>;
+/// The largest share of each limit that was seen, and when.
+type Shares = BTreeMap<&'static str, Largest>;
+
+#[derive(Debug, Clone, Copy, Default)]
+struct Largest {
+    share: f64,
+    /// Since the start of the simulation, s.
+    time_secs: f64,
+    /// Since the last external torque above `UNTOUCHED_NM`, s.
+    untouched_secs: f64,
+}
 
 /// The simulated robot, with what it did beside its limits.
 struct Probed {
@@ -56,6 +65,8 @@ struct Probed {
     velocities: Vec<JointVector>,
     accelerations: Vec<JointVector>,
     contact_secs: f64,
+    time_secs: f64,
+    untouched_secs: f64,
     shares: Arc<Mutex<Shares>>,
 }
 
@@ -63,17 +74,22 @@ impl Probed {
     fn new(plant: PandaPlant, shares: Arc<Mutex<Shares>>) -> Self {
         let panda = ArmGeometry::panda();
         let (velocities, accelerations) = (Vec::new(), Vec::new());
-        Self { plant, limits: panda.limits.clone(), panda, velocities, accelerations, contact_secs: 0.0, shares }
+        let limits = panda.limits.clone();
+        let (contact_secs, time_secs, untouched_secs) = (0.0, 0.0, f64::INFINITY);
+        Self { plant, limits, panda, velocities, accelerations, contact_secs, time_secs, untouched_secs, shares }
     }
 
     fn look(&mut self, torque: &JointVector) {
         let Observation { q, dq, contact_torque, .. } = self.plant.observe();
+        self.time_secs += 1e-3;
+        self.untouched_secs = if contact_torque.amax() > UNTOUCHED_NM { 0.0 } else { self.untouched_secs + 1e-3 };
+        let (time_secs, untouched_secs) = (self.time_secs, self.untouched_secs);
         let mut shares = self.shares.lock().unwrap_or_else(PoisonError::into_inner);
         let mut most = |what: &'static str, share: f64| {
             let found = shares.entry(what).or_default();
             // A NaN would be a broken limit, and is kept.
-            if share > *found || share.is_nan() {
-                *found = share;
+            if share > found.share || share.is_nan() {
+                *found = Largest { share, time_secs, untouched_secs };
             }
         };
         let share = |values: &JointVector, limits: &JointVector| values.component_div(limits).amax();
@@ -251,7 +267,7 @@ fn main() -> Result<(), Failure> {
     let num_attempts: u64 = arguments.next().map_or(Ok(1000), |n| n.parse())?;
     let first_seed: u64 = arguments.next().map_or(Ok(0), |n| n.parse())?;
     let max_secs: u64 = arguments.next().map_or(Ok(u64::MAX), |n| n.parse())?;
-    let (begun, mut shares) = (Instant::now(), Shares::new());
+    let (begun, mut shares) = (Instant::now(), BTreeMap::new());
     // Of each kind: attempts, held, failed at a step, stopped.
     let mut counts: BTreeMap<&str, [u32; 4]> = BTreeMap::new();
     let mut faults = Vec::new();
@@ -264,13 +280,17 @@ fn main() -> Result<(), Failure> {
         let of_attempt = Arc::new(Mutex::new(Shares::new()));
         let ended = attempt(seed, errors, &of_attempt)?;
         println!("{seed}: {kind}: {ended}");
-        for (what, share) in of_attempt.lock().unwrap_or_else(PoisonError::into_inner).iter() {
-            let most = shares.entry(*what).or_insert(*share);
+        for (what, largest) in of_attempt.lock().unwrap_or_else(PoisonError::into_inner).iter() {
+            let Largest { share, time_secs, untouched_secs } = largest;
+            let most: &mut f64 = shares.entry(*what).or_default();
             *most = most.max(*share);
             let tolerance =
                 if ["position of joints", "workspace"].contains(what) { RANGE_TOLERANCE } else { TOLERANCE };
             if share.is_nan() || *share > 1.0 + tolerance {
-                let fault = format!("{seed}: {kind}: {ended}: the limit of the {what} is broken: {share:.3}");
+                let fault = format!(
+                    "{seed}: {kind}: {ended}: the limit of the {what} is broken: {share:.3} at {time_secs:.3} s, \
+                     {untouched_secs:.3} s after the last contact"
+                );
                 println!("  {fault}");
                 faults.push(fault);
             }

@@ -242,21 +242,22 @@ impl RobotCore {
             self.recovery_cycles = self.recovery_cycles.saturating_sub(1);
             self.references.joints = JointReference::at_rest(self.observation.q);
         }
-        let Some(motion) = &mut self.motion else {
-            let joints = &mut self.references.joints;
-            *joints = if joints.is_at_rest() { JointReference::at_rest(joints.q) } else { joints.braked(&self.limits) };
-            self.references.cartesian = CartesianReference::at_rest(at(&joints.q).0, &joints.q);
-            return;
-        };
-        match motion.follow(&self.references, command, &self.limits, &at) {
-            Ok((references, is_finished)) => {
-                self.references = references;
-                if is_finished {
-                    self.end_motion(Status::Success);
+        if let Some(motion) = &mut self.motion {
+            match motion.follow(&self.references, command, &self.limits, &at) {
+                Ok((references, is_finished)) => {
+                    self.references = references;
+                    if is_finished {
+                        self.end_motion(Status::Success);
+                    }
+                    return;
                 }
+                // The arm brakes in this cycle already: a reference that stays in place for one cycle is a jerk.
+                Err(errors) => self.abort(errors),
             }
-            Err(errors) => self.abort(errors),
         }
+        let joints = &mut self.references.joints;
+        *joints = if joints.is_at_rest() { JointReference::at_rest(joints.q) } else { joints.braked(&self.limits) };
+        self.references.cartesian = CartesianReference::at_rest(at(&joints.q).0, &joints.q);
     }
 
     /// Leaves the motion; the Move is answered when the arm is at rest.
@@ -349,4 +350,90 @@ impl RobotCore {
 
 fn outgoing(command_id: u32, command: Command, status: Status) -> Outgoing {
     Outgoing { command_id, command, response: Response { status, rest: Vec::new() } }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::SMatrix;
+
+    use super::*;
+    use crate::wire::{Deviation, MotionCommand};
+
+    /// Joints that do not influence each other, with the inertia of a wrist and its motor, without gravity.
+    struct Wrists {
+        q: JointVector,
+        dq: JointVector,
+    }
+
+    /// kg·m².
+    const INERTIA: f64 = 0.1;
+
+    impl Plant for Wrists {
+        fn observe(&mut self) -> Observation {
+            let zero = JointVector::zeros();
+            Observation {
+                q: self.q,
+                dq: self.dq,
+                mass: SMatrix::identity() * INERTIA,
+                gravity: zero,
+                coriolis: zero,
+                contact_torque: zero,
+                self_collision: false,
+            }
+        }
+
+        fn flange(&self, _: &JointVector) -> (Isometry3<f64>, Jacobian) {
+            (Isometry3::identity(), Jacobian::zeros())
+        }
+
+        fn step(&mut self, torque: &JointVector) -> Result<(), String> {
+            self.dq += torque * (PERIOD_SECS / INERTIA);
+            self.q += self.dq * PERIOD_SECS;
+            Ok(())
+        }
+
+        fn move_hand(&mut self, _: f64, _: f64, _: f64) {}
+
+        fn hand_width(&self) -> (f64, f64) {
+            (0.04, 0.0)
+        }
+    }
+
+    /// A motion of the last joint at 1.5 rad/s whose commands stop arriving.
+    #[test]
+    fn an_aborted_motion_brakes_within_the_limit_of_acceleration() {
+        const JOINT: usize = 6;
+        const ACCELERATION: f64 = 5.0;
+        let mut plant =
+            Wrists { q: JointVector::from([0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.0]), dq: JointVector::zeros() };
+        let mut robot = RobotCore::new(&mut plant, Limits::PANDA);
+        let deviation = Deviation { translation: 10.0, rotation: 3.12, elbow: 6.0 };
+        let request = Request::Move(MoveRequest {
+            controller: ControllerMode::JointImpedance,
+            generator: MotionGeneratorMode::JointPosition,
+            max_path_deviation: deviation,
+            max_goal_deviation: deviation,
+        });
+        robot.request(&plant, 1, &request);
+        let (mut q, mut velocity) = (plant.q, 0.0_f64);
+        let mut largest = 0.0_f64;
+        let mut cycle = |robot: &mut RobotCore, command: Option<&RobotCommand>| {
+            let before = plant.dq;
+            robot.cycle(&mut plant, command).unwrap();
+            largest = largest.max(((plant.dq - before) / PERIOD_SECS)[JOINT].abs());
+            plant.dq[JOINT]
+        };
+        for _ in 0..400 {
+            velocity = (velocity + ACCELERATION * PERIOD_SECS).min(1.5);
+            q[JOINT] += velocity * PERIOD_SECS;
+            let motion = MotionCommand { q: q.into(), ..MotionCommand::default() };
+            cycle(&mut robot, Some(&RobotCommand { motion, ..RobotCommand::default() }));
+        }
+        assert_eq!(robot.mode, RobotMode::Move);
+        let last = (0..300).map(|_| cycle(&mut robot, None)).last().unwrap();
+        assert!(robot.errors().contains(RobotError::CommunicationConstraintsViolation));
+        assert!(last.abs() < STANDING, "{last} rad/s");
+        let limit = Limits::PANDA.acceleration[JOINT];
+        assert!(largest <= limit * 1.05, "{largest} rad/s² of at most {limit}");
+    }
 }
