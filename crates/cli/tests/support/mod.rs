@@ -1,6 +1,8 @@
 //! Shared code of the command line's tests: running `sdg`, the shipped demonstrations, a temporary folder.
 #![allow(missing_docs)]
 
+mod documented;
+
 use std::ffi::OsStr;
 use std::fs::{self, File};
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -11,9 +13,11 @@ use std::process::{Command, Output};
 use image::RgbImage;
 use sdg_demonstration::{Annotation, ImageFacts};
 
-/// Runs `sdg` and waits until it exits.
+/// Runs `sdg` and waits until it exits. Fields of its JSON that no document describes fail the test.
 pub fn sdg(arguments: &[impl AsRef<OsStr>]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_sdg")).args(arguments).output().unwrap()
+    let output = Command::new(env!("CARGO_BIN_EXE_sdg")).args(arguments).output().unwrap();
+    documented::assert_fields_are_documented(arguments, &output.stdout);
+    output
 }
 
 /// Standard output of a call that must succeed.
