@@ -19,66 +19,109 @@ pub enum Age {
     Unknown,
 }
 
-/// The faults of a document's tables, one line each: document, table, fault, remedy.
+/// The faults of a document's tables: document, table, fault, remedy. Tables with the same fault share a line.
 pub fn table_faults(
     name: &str,
     document: &str,
     all: &Measurements,
     age: &mut dyn FnMut(&Measurement) -> Result<Age, String>,
 ) -> Vec<String> {
-    let mut faults = Vec::new();
+    let mut faults: Vec<(String, usize, String)> = Vec::new();
     for table in tables(document) {
-        let place = format!("{name}:{}, section \"{}\"", table.line, table.section);
-        let names = match &table.mark {
-            None if table.has_figures => {
-                faults.push(format!(
-                    "{place}: expected a mark above this table of figures, found none; add <!-- measured: NAME --> with \
-                     a NAME of checks/tables.toml, or <!-- not measured: REASON -->"
-                ));
-                continue;
-            }
-            None => continue,
-            Some(Mark::NotMeasured(reason)) if reason.is_empty() => {
-                faults.push(format!("{place}: expected a reason after \"not measured:\", found none"));
-                continue;
-            }
-            Some(Mark::NotMeasured(_)) => continue,
-            Some(Mark::Measured(names)) => names,
-        };
-        for measured in names {
-            let Some(measurement) = all.measured.get(measured) else {
-                faults.push(format!("{place}: expected a measurement of checks/tables.toml, found {measured}"));
-                continue;
-            };
-            match age(measurement) {
-                Ok(age) => faults.extend(fault(&table, measurement, &age).map(|fault| format!("{place}: {fault}"))),
-                Err(error) => faults.push(format!("{place}: {error}")),
+        for fault in faults_of(&table, all, age) {
+            match faults.iter_mut().find(|(_, _, other)| *other == fault) {
+                Some((_, more, _)) => *more += 1,
+                None => faults.push((format!("{name}:{}, section \"{}\"", table.line, table.section), 0, fault)),
             }
         }
     }
-    faults
+    let line = |(place, more, fault)| match more {
+        0 => format!("{place}: {fault}"),
+        more => format!("{place}, and {more} more tables: {fault}"),
+    };
+    faults.into_iter().map(line).collect()
+}
+
+fn faults_of(
+    table: &Table,
+    all: &Measurements,
+    age: &mut dyn FnMut(&Measurement) -> Result<Age, String>,
+) -> Vec<String> {
+    let names = match &table.mark {
+        None if table.has_figures => {
+            return vec![
+                "expected a mark above this table of figures, found none; add <!-- measured: NAME --> with a NAME of \
+                 checks/tables.toml, or <!-- not measured: REASON -->"
+                    .to_owned(),
+            ];
+        }
+        Some(Mark::NotMeasured(reason)) if reason.is_empty() => {
+            return vec!["expected a reason after \"not measured:\", found none".to_owned()];
+        }
+        None | Some(Mark::NotMeasured(_)) => return Vec::new(),
+        Some(Mark::Measured(names)) => names,
+    };
+    let fault_of = |name: &String| match all.measured.get(name) {
+        None => Some(format!("expected a measurement of checks/tables.toml, found {name}")),
+        Some(measurement) => match age(measurement) {
+            Ok(age) => fault(table, measurement, &age),
+            Err(error) => Some(error),
+        },
+    };
+    names.iter().filter_map(fault_of).collect()
 }
 
 fn fault(table: &Table, measurement: &Measurement, age: &Age) -> Option<String> {
     let Measurement { commit, command, .. } = measurement;
-    let with_commit: Vec<&String> = table.paragraphs.iter().filter(|text| names_commit(text, commit)).collect();
+    let notes: Vec<&str> = table.paragraphs.iter().flat_map(|text| notes_on(text, commit)).collect();
     match age {
         Age::NoCommit => Some(format!("expected a commit that is an ancestor of HEAD, found {commit}")),
-        _ if with_commit.is_empty() => {
+        _ if notes.is_empty() => {
             Some(format!("expected the commit of its measurement, {commit}, in the text of its section, found none"))
         }
-        Age::Old(file) if !with_commit.iter().any(|text| text.contains(CHANGED_SINCE)) => Some(format!(
-            "it was measured at {commit}, and {file} changed since; make it again (`{command}`), or write beside it \
-             what {CHANGED_SINCE} {commit}"
+        Age::Old(file) if !notes.iter().any(|note| note.contains(CHANGED_SINCE)) => Some(format!(
+            "it was measured at {commit}, and {file} changed since; make it again (`{command}`), or write after the \
+             commit beside it what {CHANGED_SINCE}"
         )),
         _ => None,
     }
 }
 
-/// Whether a text has a commit's hash, in any length from seven digits on.
-fn names_commit(text: &str, commit: &str) -> bool {
-    let words = text.split(|c: char| !c.is_ascii_alphanumeric());
-    words.filter(|word| word.len() >= 7).any(|word| commit.starts_with(word) || word.starts_with(commit))
+/// For each place where a text names a commit: the text after it, up to the next commit. Commits with nothing but "and"
+/// or a comma between them have the same note.
+fn notes_on<'a>(text: &'a str, commit: &str) -> Vec<&'a str> {
+    let hashes = hashes(text);
+    let mut notes = Vec::new();
+    for (idx, &(_, end, hash)) in hashes.iter().enumerate() {
+        if !commit.starts_with(hash) && !hash.starts_with(commit) {
+            continue;
+        }
+        let mut note_start = end;
+        let mut note_end = text.len();
+        for &(next_start, next_end, _) in &hashes[idx + 1..] {
+            if !matches!(text[note_start..next_start].trim(), "and" | "," | "" | "(" | ")") {
+                note_end = next_start;
+                break;
+            }
+            note_start = next_end;
+        }
+        notes.push(&text[note_start..note_end]);
+    }
+    notes
+}
+
+/// The words of a text that may be hashes of commits, with their places: hexadecimal, from seven digits on, with a digit
+/// and a letter.
+fn hashes(text: &str) -> Vec<(usize, usize, &str)> {
+    let mut found = Vec::new();
+    for word in text.split(|c: char| !c.is_ascii_alphanumeric()) {
+        let is_hex = word.len() >= 7 && word.chars().all(|c| matches!(c, '0'..='9' | 'a'..='f'));
+        if is_hex && word.contains(|c: char| c.is_ascii_digit()) && word.contains(|c: char| c.is_ascii_lowercase()) {
+            let start = word.as_ptr() as usize - text.as_ptr() as usize;
+            found.push((start, start + word.len(), word));
+        }
+    }
+    found
 }
 
 #[cfg(test)]
@@ -117,8 +160,23 @@ mod tests {
         let marked = |text: &str| format!("# T\n\n{text}\n\n<!-- measured: speed -->\n{TABLE}");
         let found = faults(&marked("Commit abcdef12.\n\nThe search changed since."), &old);
         let expected = "a.md:8, section \"T\": it was measured at abcdef12, and src/a.rs changed since; make it again \
-            (`make bench`), or write beside it what changed since abcdef12";
+            (`make bench`), or write after the commit beside it what changed since";
         assert_eq!(found, [expected]);
         assert!(faults(&marked("Measured at abcdef12;\nthe search changed since."), &old).is_empty());
+    }
+
+    #[test]
+    fn a_note_belongs_to_the_commits_before_it() {
+        let text = "Rows at abcdef12 and 12345ab, others at fedcba1 (the search changed since).";
+        assert_eq!(notes_on(text, "abcdef1"), [", others at "]);
+        assert_eq!(notes_on(text, "12345ab"), [", others at "]);
+        assert_eq!(notes_on(text, "fedcba12"), [" (the search changed since)."]);
+        assert!(notes_on(text, "1234567").is_empty() && notes_on("1000000 pictures", "1000000").is_empty());
+    }
+
+    #[test]
+    fn tables_with_the_same_fault_share_a_line() {
+        let found = faults(&format!("# T\n\n{TABLE}\n{TABLE}\n# U\n\n{TABLE}"), &Age::Current);
+        assert!(found.len() == 1 && found[0].starts_with("a.md:3, section \"T\", and 2 more tables: "), "{found:?}");
     }
 }

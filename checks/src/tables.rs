@@ -17,7 +17,8 @@ pub struct Table {
     pub paragraphs: Vec<String>,
 }
 
-/// A comment that applies to the tables after it, up to the next mark or the end of its section.
+/// A comment about the table on the next line. If no table is there, it applies to the tables of the rest of its section
+/// that have no mark of their own.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Mark {
     /// `<!-- measured: a, b -->`: names of measurements.
@@ -26,7 +27,7 @@ pub enum Mark {
     NotMeasured(String),
 }
 
-/// A section: its level, its title, its own paragraphs, and the last mark in it.
+/// A section: its level, its title, its own paragraphs, and the last mark in it that is not of a single table.
 #[derive(Debug, Default)]
 struct Section {
     level: usize,
@@ -58,7 +59,8 @@ pub fn tables(document: &str) -> Vec<Table> {
         } else if is_code {
         } else if is_row {
             if !is_in_table && lines.get(idx + 1).is_some_and(|next| is_rule(next)) {
-                let mark = open.iter().rev().find_map(|&section| sections[section].mark.clone());
+                let own = idx.checked_sub(1).and_then(|above| mark_of(lines[above]));
+                let mark = own.or_else(|| open.iter().rev().find_map(|&section| sections[section].mark.clone()));
                 let rows = lines[idx + 2..].iter().take_while(|row| row.starts_with('|'));
                 let table = Table {
                     line: idx + 1,
@@ -77,7 +79,9 @@ pub fn tables(document: &str) -> Vec<Table> {
             let title = line.trim_start_matches('#').trim().to_owned();
             sections.push(Section { level, title, ..Section::default() });
         } else if let Some(mark) = mark_of(line) {
-            sections[here].mark = Some(mark);
+            if lines.get(idx + 1).is_none_or(|next| !next.starts_with('|')) {
+                sections[here].mark = Some(mark);
+            }
         } else if is_text {
             paragraph.push_str(line.trim());
             paragraph.push(' ');
@@ -130,13 +134,14 @@ fn mark_of(line: &str) -> Option<Mark> {
 mod tests {
     use super::*;
 
-    const DOCUMENT: &str = "# A\n\nAt abc.\n\n<!-- measured: all -->\n## B\n\n<!-- measured: one, two -->\n\
+    const DOCUMENT: &str = "# A\n\nAt abc.\n\n<!-- measured: all -->\n## B\n\n<!-- measured: one, two -->\n\n\
         | x | ms |\n|---|--:|\n| a | 1 |\n| b | ~2 ms |\n\nText\nof B.\n\n### C\n\nText of C.\n\n| x | y |\n|---|---|\n| a | b |\n\n\
         ## D\n\n| x | ms |\n|---|--:|\n| a | **3** |\n\n<!-- not measured: sizes of parts -->\n| x | mm |\n|---|--:|\n| a | 4 |\n\n\
+        | x | ms |\n|---|--:|\n| a | 5 |\n\n\
         ```\n| x | y |\n|---|---|\n| 1 | 1 |\n```\n";
 
     #[test]
-    fn a_mark_applies_to_the_rest_of_its_section() {
+    fn a_mark_applies_to_the_next_line_s_table_or_to_the_rest_of_its_section() {
         let named = |names: &[&str]| Some(Mark::Measured(names.iter().map(|&name| name.to_owned()).collect()));
         let found: Vec<_> = tables(DOCUMENT).into_iter().map(|t| (t.section, t.has_figures, t.mark)).collect();
         let expected = [
@@ -144,6 +149,7 @@ mod tests {
             ("C".to_owned(), false, named(&["one", "two"])),
             ("D".to_owned(), true, named(&["all"])),
             ("D".to_owned(), true, Some(Mark::NotMeasured("sizes of parts".to_owned()))),
+            ("D".to_owned(), true, named(&["all"])),
         ];
         assert_eq!(found, expected);
     }
@@ -153,7 +159,7 @@ mod tests {
         let found = tables(DOCUMENT);
         assert_eq!(found[0].paragraphs, ["At abc. ", "Text of B. "]);
         assert_eq!(found[1].paragraphs, ["At abc. ", "Text of B. ", "Text of C. "]);
-        assert_eq!(found[1].line, 21);
+        assert_eq!(found[1].line, 22);
     }
 
     #[test]
