@@ -37,7 +37,7 @@ pub fn table_faults(
     }
     let line = |(place, more, fault)| match more {
         0 => format!("{place}: {fault}"),
-        more => format!("{place}, and {more} more tables: {fault}"),
+        more => format!("{place}, and {more} more: {fault}"),
     };
     faults.into_iter().map(line).collect()
 }
@@ -177,6 +177,6 @@ mod tests {
     #[test]
     fn tables_with_the_same_fault_share_a_line() {
         let found = faults(&format!("# T\n\n{TABLE}\n{TABLE}\n# U\n\n{TABLE}"), &Age::Current);
-        assert!(found.len() == 1 && found[0].starts_with("a.md:3, section \"T\", and 2 more tables: "), "{found:?}");
+        assert!(found.len() == 1 && found[0].starts_with("a.md:3, section \"T\", and 2 more: "), "{found:?}");
     }
 }
