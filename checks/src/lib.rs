@@ -1,5 +1,6 @@
 //! Checks of the sources and documents themselves, run by `tests/`: no two files of a crate import from each other,
-//! every link in a document has a target, and the table of crates in ARCHITECTURE.md agrees with `cargo metadata`.
+//! every link in a document has a target, the table of crates in ARCHITECTURE.md agrees with `cargo metadata`, and tables
+//! of figures tell the commit of their measurement and whether the program changed since.
 //!
 //! ```
 //! use sdg_checks::ModuleGraph;
@@ -14,11 +15,21 @@
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod crate_table;
+mod history;
 mod markdown;
+mod measurements;
 mod module_graph;
 mod paths;
 mod source_text;
+mod statements;
+mod table_age;
+mod tables;
 
 pub use crate_table::{CrateRow, crate_rows, names_in_code};
+pub use history::History;
 pub use markdown::{headings, links, named_files};
+pub use measurements::{Measurement, Measurements, SameAt};
 pub use module_graph::ModuleGraph;
+pub use statements::Statements;
+pub use table_age::{Age, CHANGED_SINCE, table_faults};
+pub use tables::{Mark, Table, tables};

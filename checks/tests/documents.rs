@@ -25,12 +25,12 @@ const FOLDERS: [&str; 11] = [
     ".ci",
 ];
 
-fn root() -> PathBuf {
+pub fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..").canonicalize().unwrap()
 }
 
 /// The tracked files that match a pattern, as paths from the root.
-fn tracked(pattern: &str) -> Vec<String> {
+pub fn tracked(pattern: &str) -> Vec<String> {
     let output = Command::new("git")
         .args(["ls-files", "--cached", "--others", "--exclude-standard", "--", pattern])
         .current_dir(root())

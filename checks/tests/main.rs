@@ -4,3 +4,4 @@
 mod documents;
 mod import_cycles;
 mod site;
+mod tables;

@@ -1,4 +1,4 @@
-//! The verbs of the command line. Each verb's arguments and help are in its file in `commands/`.
+//! The commands of the command line. Each command's arguments and help are in its file in `commands/`.
 
 use clap::{Parser, Subcommand};
 

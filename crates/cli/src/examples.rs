@@ -6,7 +6,7 @@ use clap::Command;
 const EXIT_CODES: &str =
     "Exit codes: 0 done, 1 failed, 2 wrong usage, 3 found nothing, 4 poor model (docs/command-line.md)";
 
-/// Two example calls of each verb.
+/// Two example calls of each command.
 const EXAMPLES: &[[&str; 2]] = &[
     ["sdg demo", "sdg demo --object rod_end --attempts 20 --seed 2"],
     ["sdg annotate photo.png", "sdg annotate --from v4l: --size 1280x720"],
@@ -105,7 +105,7 @@ fn with_ending(command: Command, parents: &str) -> Command {
     command.mut_subcommands(|command| with_ending(command, &format!("{path} ")))
 }
 
-/// The examples of the verb with this path, such as `sdg camera grab`.
+/// The examples of the command with this path, such as `sdg camera grab`.
 fn examples_of(path: &str) -> Option<&'static [&'static str; 2]> {
     let path: Vec<_> = path.split(' ').collect();
     EXAMPLES.iter().find(|examples| path.iter().copied().eq(examples[0].split(' ').take(path.len())) && path.len() > 1)

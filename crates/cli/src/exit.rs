@@ -44,7 +44,7 @@ impl fmt::Display for Usage {
 
 impl std::error::Error for Usage {}
 
-/// The error of a verb that needs the simulator, in a build without it.
+/// The error of a command that needs the simulator, in a build without it.
 #[cfg(not(feature = "simulation"))]
 pub fn without_simulator() -> anyhow::Error {
     let needs = "this sdg was built without the simulator, which demo, rehearse and evaluate (except for --pictures) need: \

@@ -1,4 +1,4 @@
-//! Arguments that several verbs share, and their value types.
+//! Arguments that several commands share, and their value types.
 
 use std::path::PathBuf;
 

@@ -1,6 +1,6 @@
-//! docs/reference.md says what the program's definition says: every verb with its arguments and options.
+//! docs/reference.md lists every command with its arguments and options, as the program defines them.
 //!
-//! `SDG_WRITE_REFERENCE=1` writes the page instead of comparing it. Builds with other features have other verbs and are not compared.
+//! `SDG_WRITE_REFERENCE=1` writes the page instead of comparing it. Builds with other features have other commands and are not compared.
 #![cfg(all(feature = "annotate", feature = "simulation", not(feature = "ros2")))]
 
 use std::fmt::Write;
@@ -9,10 +9,11 @@ use std::path::Path;
 
 use clap::{Arg, Command};
 
-/// The page's text above the verbs.
-const HEAD: &str = "# Verbs and options
+/// The page's text above the commands.
+const HEAD: &str = "# Commands and options
 
-Every verb with its arguments and options, written by a test from the program's own definition. `sdg VERB --help` prints the same. What the verbs share, and what they print: [the command line](command-line.md).
+Every command with its arguments and options, written by a test from the program's own definition. `sdg COMMAND --help`
+prints the same. Common rules and output: [the command line](command-line.md).
 ";
 
 #[test]
@@ -70,7 +71,7 @@ fn write_verb(text: &mut String, command: &Command, parents: &str) {
         text.push('\n');
     }
     let ending = command.get_after_long_help().or(command.get_after_help()).map(ToString::to_string);
-    // The exit codes end the help of every verb.
+    // The exit codes end the help of every command.
     let ending = ending.unwrap_or_default();
     let own = ending.split("Exit codes:").next().unwrap_or_default().trim_end();
     if !own.is_empty() {

@@ -140,7 +140,7 @@ fn detections(with_part: &[&Trial], without: &[&Trial]) -> Section {
     let shown = with_part.iter().take(6).chain(without.iter().take(3));
     Section::new("Detections")
         .lead(format!(
-            "On pictures of the simulator with other light, tables and things lying about. Right, that is within \
+            "On pictures of the simulator with other light, tables and objects. Right, that is within \
              {RIGHT_MM:.0} mm and {RIGHT_DEGREES:.0}°: {right} of {}. False alarms without the part: {} of {}.",
             with_part.len(),
             without.iter().filter(|trial| trial.is_false_alarm()).count(),
@@ -156,7 +156,7 @@ fn attempts(page: &RunPage) -> Section {
     };
     Section::new("Attempts")
         .lead(
-            "Random poses of the part, of the robot at the start, of light, table and things lying about. Held means: \
+            "Random poses of the part, of the robot at the start, of light, table and other objects. Held means: \
              at least 10 cm above the table between both fingers, one second after lifting.",
         )
         .matrix(outcome_matrix(&steps, &page.rehearsed.attempts, RIGHT_MM, RIGHT_DEGREES))

@@ -19,7 +19,7 @@ pub struct AnnotationArgs {
     pub command: AnnotationCommand,
 }
 
-/// The verbs of `sdg annotation`.
+/// The commands of `sdg annotation`.
 #[derive(Debug, Subcommand)]
 pub enum AnnotationCommand {
     /// Write the marks on one image in another format
@@ -46,7 +46,7 @@ pub struct ConvertAnnotationArgs {
     pub json: bool,
 }
 
-/// Runs one of the verbs.
+/// Runs one of the commands.
 pub fn run(args: &AnnotationArgs) -> Result<Outcome> {
     match &args.command {
         AnnotationCommand::Convert(convert) => self::convert(convert),

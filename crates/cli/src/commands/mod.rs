@@ -1,4 +1,4 @@
-//! The verbs, one file or folder each: arguments and implementation.
+//! The commands, one file or folder each: arguments and implementation.
 
 pub mod annotate;
 pub mod annotation;

@@ -29,7 +29,7 @@ pub struct WeightsArgs {
     pub command: WeightsCommand,
 }
 
-/// The verbs of `sdg weights`.
+/// The commands of `sdg weights`.
 #[derive(Debug, Subcommand)]
 pub enum WeightsCommand {
     /// Convert a checkpoint to this project's safetensors, with a report on every tensor name
@@ -100,7 +100,7 @@ pub struct VerifyArgs {
     pub json: bool,
 }
 
-/// Runs one of the verbs.
+/// Runs one of the commands.
 pub fn run(args: &WeightsArgs) -> Result<Outcome> {
     match &args.command {
         WeightsCommand::Convert(convert) => self::convert(convert),

@@ -8,7 +8,7 @@ use sdg_cell::{Reach, WorkcellMap};
 
 use crate::exit::Outcome;
 
-/// The verbs of `sdg workcell`.
+/// The commands of `sdg workcell`.
 #[derive(Debug, Subcommand)]
 pub enum WorkcellCommand {
     /// Draw the cell from above: table, workspace, places, obstacles, look-out poses, and the part of the table that

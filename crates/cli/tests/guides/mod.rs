@@ -1,4 +1,4 @@
-//! Guides say what the program does: their calls name verbs and options that there are, their commands run, and the messages that
+//! Guides agree with the program: their calls name existing commands and options, their commands run, and the messages that
 //! the page of symptoms quotes stand in the sources.
 
 mod blocks;
@@ -112,7 +112,7 @@ fn calls_in_documents_name_verbs_and_options_that_there_are() {
     let mut known: BTreeSet<String> = OTHERS.iter().map(|name| (*name).to_owned()).collect();
     known.extend(["--help", "--version"].map(str::to_owned));
     long_options(&program, &mut known);
-    // A build without the feature `ros2` does not know that verb's options; their fields stand in its source.
+    // A build without the feature `ros2` does not know that command's options; their fields stand in its source.
     let ros2_fields = fs::read_to_string(root().join("crates/cli/src/commands/ros2/args.rs")).unwrap();
     let is_of_ros2 = |option: &str| ros2_fields.contains(&format!("pub {}:", option[2..].replace('-', "_")));
     let mut faults = Vec::new();

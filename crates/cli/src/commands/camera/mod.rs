@@ -1,4 +1,4 @@
-//! `sdg camera`: calibration and live pictures. Each verb's arguments are in the verb's file.
+//! `sdg camera`: calibration and live pictures. Each command's arguments are in the command's file.
 
 mod board;
 mod board_in_use;
@@ -15,7 +15,7 @@ use clap::Subcommand;
 
 use crate::exit::Outcome;
 
-/// The verbs of `sdg camera`.
+/// The commands of `sdg camera`.
 #[derive(Debug, Subcommand)]
 pub enum CameraCommand {
     /// List the cameras of this machine
@@ -38,7 +38,7 @@ pub enum CameraCommand {
     HandEye(hand_eye::HandEyeArgs),
 }
 
-/// Runs one of the verbs.
+/// Runs one of the commands.
 pub fn run(command: &CameraCommand) -> Result<Outcome> {
     match command {
         CameraCommand::List(args) => list::run(args),

@@ -1,4 +1,4 @@
-//! The arguments that select an arm, shared by all verbs of `sdg robot`.
+//! The arguments that select an arm, shared by all commands of `sdg robot`.
 
 use std::path::PathBuf;
 
@@ -37,7 +37,7 @@ impl ArmArgs {
         }
     }
 
-    /// Connects without real-time scheduling: the verbs that use this run no control loop.
+    /// Connects without real-time scheduling: the commands that use this run no control loop.
     pub(super) fn connect(&self) -> Result<(FrankaArm, RobotAddress)> {
         let address = self.address()?;
         Ok((FrankaArm::connect(&address, Scheduling::Ordinary)?, address))

@@ -1,4 +1,4 @@
-//! `sdg robot`: manual control of a real arm. Each verb's arguments are in the verb's file.
+//! `sdg robot`: manual control of a real arm. Each command's arguments are in the command's file.
 
 mod arm_args;
 mod hand;
@@ -14,7 +14,7 @@ use arm_args::ArmArgs;
 use crate::exit::Outcome;
 use crate::robots::{Consent, confirm};
 
-/// The verbs of `sdg robot`.
+/// The commands of `sdg robot`.
 #[derive(Debug, Subcommand)]
 pub enum RobotCommand {
     /// Print the state of arm and hand, and whether they can move
@@ -40,7 +40,7 @@ pub struct RecoverArgs {
     yes: bool,
 }
 
-/// Runs one of the verbs.
+/// Runs one of the commands.
 pub fn run(command: &RobotCommand) -> Result<Outcome> {
     match command {
         RobotCommand::State(args) => state::run(args),

@@ -112,8 +112,8 @@ fn found(group: &GroupSummary, way: Way) -> (String, String, Table) {
     }
     let lead = format!(
         "Share of the part's instances that were found within {RIGHT_MM:.0} mm and {RIGHT_DEGREES:.0}°, in percent, with \
-         Wilson's 95 % interval. Where there is one instance, the best detection alone counts; three instances are found one \
-         to one. Each axis has pictures of its own, the same for every model; nothing tells a model how high the camera is."
+         Wilson's 95 % interval. With one instance, only the best detection counts; three instances are matched one to one. \
+         Each axis has its own pictures, the same for every model; models are not given the camera's height."
     );
     (format!("found, {}", way.name()), lead, table)
 }
@@ -138,7 +138,7 @@ fn thirds(group: &GroupSummary) -> (String, String, Table) {
         }
     }
     let lead = "With the check, in the first, the middle and the last third of each axis' pictures, in which the axis changes \
-                more and more: height in shares of the usual one, tilt in degrees, covered in shares of the part, dark in shares \
+                increasingly: height in shares of the usual one, tilt in degrees, covered in shares of the part, dark in shares \
                 of the usual light, blur in pixels; the parameters of the others are counts or ratios.";
     ("found, by how much the axis changes".to_owned(), lead.to_owned(), table)
 }
@@ -177,8 +177,8 @@ fn wrong(group: &GroupSummary) -> (String, String, Table) {
         }
         table = table.row(row);
     }
-    let lead = "Detections that were accepted (score 0.5 and above) and not right: beside the part, turned against it, or \
-                elsewhere. Where there is one instance at most one a picture.";
+    let lead = "Accepted detections (score 0.5 and above) with a wrong position or angle. With one instance, at most one \
+                per picture.";
     ("wrong detections".to_owned(), lead.to_owned(), table)
 }
 
@@ -201,8 +201,8 @@ fn errors(group: &GroupSummary) -> (String, String, Table) {
             table = table.row(row);
         }
     }
-    let lead = "Median and nine tenths of all accepted detections' distances to the truth on the table and of their turns, \
-                right or not; turns that a part's symmetry hides do not count.";
+    let lead = "Median and 90th percentile of the errors of position on the table and of the angle, of all accepted \
+                detections, right or wrong, modulo the part's symmetry.";
     ("errors of detections".to_owned(), lead.to_owned(), table)
 }
 
@@ -230,9 +230,9 @@ fn look_alikes(group: &GroupSummary) -> (String, String, Table) {
         }));
         table = table.row(row);
     }
-    let lead = "Pictures in which another part that resembles the taught one lies in its place, and how often it was \
-                accepted: lower is better. Sums in percent, with Wilson's 95 % interval. What differs in size alone cannot be \
-                told in a picture without a camera, so the two sums stand apart.";
+    let lead = "Pictures with a similar part instead of the taught one, and how often it was accepted: lower is better. \
+                Sums in percent, with Wilson's 95 % interval. A difference in size alone cannot be recognised without a \
+                calibrated camera, so the two sums are separate.";
     ("look-alikes taken for the part".to_owned(), lead.to_owned(), table)
 }
 
@@ -261,8 +261,8 @@ fn grasps(group: &GroupSummary) -> (String, String, Table) {
     }
     let lead = "Grasp attempts with the check, the same scenes and robot starts under every error. Held at the first look: the \
                 part was found in the first picture from the look-out pose and in the first from above it. After further \
-                looks: the camera was moved and looked again at least once. The last column is the median and nine tenths of \
-                the last detection's distance to the truth, as the robot computes it.";
+                looks: the camera was moved for at least one more picture. The last column is the median and 90th percentile \
+                of the last detection's error, as the robot computes it.";
     ("grasps under errors".to_owned(), lead.to_owned(), table)
 }
 
@@ -346,7 +346,8 @@ fn quantities_from_simulator() -> Titled {
     }
     Titled {
         title: "Quantities that the robot gets from the simulator".to_owned(),
-        lead: "Everything that the simulated robot knows exactly and a real one would have to measure.".to_owned(),
+        lead: "All quantities that are exact for the simulated robot and would have to be measured for a real one."
+            .to_owned(),
         table,
     }
 }

@@ -12,10 +12,10 @@ pub fn tables(summary: &CamerasSummary) -> Vec<Titled> {
         Titled {
             title: "By set of pictures".into(),
             lead: "Taught from the wrist camera's photo in its plan view. Webcam, phone and overhead are other cameras with \
-                   lenses, heights and tilts to 25 degrees of their own; the other sets are the wrist camera's, harder along \
-                   an axis; in other-sizes a part of 0.8, 0.9, 1.1 or 1.25 times the size lies there, which is to be refused. \
-                   Errors are of what was found, in the marks' plane; within sigma: how many lie within what the detection \
-                   itself gave for 68 %."
+                   their own lenses, heights and tilts to 25 degrees; the other sets are the wrist camera's, harder along an \
+                   axis; other-sizes shows parts of 0.8, 0.9, 1.1 or 1.25 times the size, which should be refused. Errors are \
+                   of the detected parts, in the marks' plane; within sigma: the share within the detection's own estimate \
+                   for 68 %."
                 .into(),
             table: table(&summary.sets, None),
         },

@@ -83,8 +83,8 @@ pub(super) fn models(summary: &Summary) -> Titled {
     Titled {
         title: "Models".to_owned(),
         lead: format!(
-            "Table I of the paper. Preset {}; networks of preset edge start from weights pretrained on generated parts. A drawn \
-             outline is also what the check lays over the image.",
+            "Table I of the paper. Preset {}; networks of preset edge start from weights pretrained on generated parts. The \
+             check uses a drawn outline, too.",
             summary.settings.preset
         ),
         table,
