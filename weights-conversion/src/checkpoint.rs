@@ -11,8 +11,8 @@ use crate::source::{Source, Span};
 use crate::tensor::StoredTensor;
 use crate::torch::{self, Storages};
 
-/// Keys of the state dict in checkpoints that also contain optimiser and counters: Detectron2 and torchvision; others;
-/// Caffe2.
+/// Keys of the state dict in checkpoints that also contain the optimiser's state and counters: Detectron2 and
+/// torchvision, others, Caffe2.
 const STATE_DICT_KEYS: [&str; 3] = ["model", "state_dict", "blobs"];
 
 /// A file's format, recognised by its content.
@@ -88,7 +88,7 @@ fn describe(start: &[u8]) -> String {
 pub struct Checkpoint {
     /// The file's format.
     pub format: FileFormat,
-    /// Its author, if the file gives one (`__author__`).
+    /// The author, if the file gives one (`__author__`).
     pub author: Option<String>,
     /// Metadata of a safetensors file.
     pub metadata: BTreeMap<String, String>,
@@ -197,7 +197,7 @@ impl Checkpoint {
         Ok(checkpoint)
     }
 
-    /// Many names for the same bytes would make a large result from a small file; a few layers may share.
+    /// A small file must not give a large result by many names for the same bytes; a few layers may use the same bytes.
     fn check_total(&self, file_len: u64) -> Result<()> {
         let bytes = |tensor: &StoredTensor| (tensor.len() as u64).saturating_mul(tensor.element().size() as u64);
         let total = self.tensors.values().map(bytes).fold(0, u64::saturating_add);

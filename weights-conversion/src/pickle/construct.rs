@@ -1,4 +1,4 @@
-//! The results of the allowed globals for their arguments, and the effect of a state on an object.
+//! The results of calls of the allowed globals, and the effect of a state on an object.
 
 use crate::element::ElementType;
 use crate::error::{Result, WeightsError};
