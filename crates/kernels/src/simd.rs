@@ -50,7 +50,7 @@ pub(crate) use widest;
 /// Compiles a kernel over [`Lanes`](lanes::Lanes) for every instruction set and selects one when called, with
 /// the set as first argument.
 ///
-/// Sums may be fused or not, so that the last bits may differ between instruction sets.
+/// Multiplications and additions may be fused, so the last bits may differ between instruction sets.
 macro_rules! lanes_kernel {
     ($(#[$meta:meta])* $vis:vis unsafe fn $name:ident($($arg:ident: $kind:ty),* $(,)?) = $generic:ident) => {
         $(#[$meta])*

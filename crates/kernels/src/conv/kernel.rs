@@ -11,9 +11,9 @@ use crate::parallel::{Output, Raw};
 use crate::product::Epilogue;
 use crate::simd::Isa;
 
-/// Runs a convolution in either direction: `[N, Ho, Wo, Co]` from `x` in the forward direction, `[N, Hi, Wi,
-/// Ci]` from the output's gradient backwards. `filters` contains the packed weight, for Winograd's method or
-/// directly.
+/// Runs a convolution in either direction: `[N, Ho, Wo, Co]` from `x` forwards, `[N, Hi, Wi, Ci]` from the
+/// output's gradient backwards. `filters` contains the packed weight, for Winograd's method or for direct
+/// products.
 pub(crate) fn convolve(
     isa: Isa,
     direction: Direction,

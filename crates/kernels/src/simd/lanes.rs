@@ -1,4 +1,5 @@
-//! Sixteen floats at a time, as one AVX-512 register, two AVX2 registers, four of NEON's or WebAssembly's (quads.rs), or an array.
+//! Sixteen floats at a time, as one AVX-512 register, two AVX2 registers, four registers of NEON or WebAssembly
+//! (quads.rs), or an array.
 //!
 //! Kernels are written once over [`Lanes`] and compiled for every instruction set by
 //! [`lanes_kernel!`](super::lanes_kernel), inside functions with enabled instructions: only there do
@@ -7,7 +8,7 @@
 #[cfg(target_arch = "x86_64")]
 use std::arch::x86_64::*;
 
-/// Floats in a [`Lanes`].
+/// Number of floats in a [`Lanes`].
 pub(crate) const LANES: usize = 16;
 
 /// Sixteen floats.
@@ -24,7 +25,7 @@ pub(crate) trait Lanes: Copy {
     unsafe fn splat(value: f32) -> Self;
     unsafe fn load(from: *const f32) -> Self;
     unsafe fn store(self, to: *mut f32);
-    /// The first `len` of sixteen, followed by zeros.
+    /// Loads the first `len` of sixteen floats, followed by zeros.
     #[inline(always)]
     unsafe fn load_first(from: *const f32, len: usize) -> Self {
         let mut values = [0.0_f32; LANES];
@@ -34,7 +35,7 @@ pub(crate) trait Lanes: Copy {
             Self::load(values.as_ptr())
         }
     }
-    /// The first `len` of sixteen; the memory after them is not changed.
+    /// Stores the first `len` of sixteen floats; the memory after them is not changed.
     #[inline(always)]
     unsafe fn store_first(self, to: *mut f32, len: usize) {
         let mut values = [0.0_f32; LANES];
@@ -121,7 +122,7 @@ impl Lanes for Zmm {
     }
     #[inline(always)]
     unsafe fn relu(self) -> Self {
-        // The second operand is what comes out where either is NaN.
+        // If either operand is NaN, the result is the second operand.
         // SAFETY: the caller promises AVX-512; no memory is touched.
         unsafe { Self(_mm512_max_ps(_mm512_setzero_ps(), self.0)) }
     }
@@ -200,7 +201,7 @@ impl Lanes for Ymm2 {
     }
 }
 
-/// An array, which compilers turn into the vectors of the machine.
+/// An array, which compilers translate to the vectors of the machine.
 #[derive(Clone, Copy)]
 pub(crate) struct Plain([f32; LANES]);
 

@@ -1,5 +1,5 @@
 //! Lanes of four vectors of 128 bits: NEON's on aarch64, and WebAssembly's. Their presence is fixed when a kernel is
-//! compiled, so that their intrinsics need no runtime check.
+//! compiled, so their intrinsics need no runtime check.
 
 use super::lanes::Lanes;
 
@@ -44,7 +44,7 @@ mod vector {
         unsafe { vfmaq_f32(summand, a, factor) }
     }
 
-    /// The instruction gives a NaN if either operand is one.
+    /// ReLU; the instruction gives a NaN if either operand is one.
     #[inline(always)]
     pub(super) fn relu(a: Vector) -> Vector {
         // SAFETY: every aarch64 has NEON; no memory is touched.
