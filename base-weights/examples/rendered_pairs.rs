@@ -46,7 +46,7 @@ fn main() -> Result<()> {
 }
 
 /// The set's part with its pictures, as the fit reads it, and the kind of each picture. `None` without exact ground
-/// truth (`truth.json`).
+/// ground truth (`truth.json`).
 ///
 /// # Errors
 /// A picture that cannot be read.

@@ -1,4 +1,4 @@
-//! Objects identified by numbers, each used only once per process.
+//! Objects identified by numbers, which are used only once per process.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};

@@ -14,7 +14,7 @@ pub struct PpmHead {
     pub width: u32,
     /// Height in pixels.
     pub height: u32,
-    /// Position of the pixels.
+    /// Index of the first byte of the pixels.
     pub start: usize,
 }
 
@@ -25,7 +25,7 @@ impl PpmHead {
     /// Reads a header; `None` while it is incomplete.
     ///
     /// # Errors
-    /// Text that describes the error.
+    /// A text that describes the error.
     pub fn read(bytes: &[u8]) -> Result<Option<Self>, String> {
         let mut numbers = [0_u32; 3];
         let mut at = 2;
@@ -74,7 +74,7 @@ impl PpmHead {
 /// Decodes the picture at the beginning of the bytes.
 ///
 /// # Errors
-/// Text that describes the data found in place of a complete picture.
+/// A text that describes the data found in place of a complete picture.
 pub(crate) fn decode_ppm(bytes: &[u8]) -> Result<RgbImage, String> {
     let short = || format!("a PPM that ends after {} bytes", bytes.len());
     let head = PpmHead::read(bytes)?.ok_or_else(short)?;

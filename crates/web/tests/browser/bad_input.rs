@@ -1,4 +1,5 @@
-//! Errors are shown on the page with the texts of the command line, and nothing else happens.
+//! Tests that errors are shown on the page with the texts of the command line, and that
+//! nothing else happens.
 
 use std::path::PathBuf;
 
