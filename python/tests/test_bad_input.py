@@ -1,4 +1,4 @@
-"""Wrong input: an exception of a specific class, with the expected and the found value."""
+"""Tests that wrong input raises an exception of a specific class, with the expected and the found value."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""The C library: the same detections as from Rust and Python to the bit, no error or leak under valgrind, wrong input, the guide.
+"""Tests the C library: the same detections as from Rust and Python, to the bit; no error or leak under valgrind; wrong input; the guide.
 
 Models and pictures are those of python/tests.
 """

@@ -49,7 +49,7 @@ function drawDetection(brush, detection) {
     dot(brush, [x, y], 1.1 * unit, COLORS.keypoint);
   }
   if (accepted) {
-    drawJaws(brush, detection.grasp); // The robot will not go where the demonstration disagrees.
+    drawJaws(brush, detection.grasp); // The robot does not grasp refused detections.
   }
   drawLabel(brush, detection, color);
 }
