@@ -20,7 +20,10 @@ pub fn status(work: impl FnOnce() -> Result<()>) -> sdg_status {
     let (status, text) = match catch_unwind(AssertUnwindSafe(work)) {
         Ok(Ok(())) => return SDG_OK,
         Ok(Err(fault)) => (fault.kind as sdg_status, fault.text),
-        Err(_) => (SDG_ERROR_INTERNAL, "a fault of libsdg, described on standard error; please report it".to_owned()),
+        Err(_) => (
+            SDG_ERROR_INTERNAL,
+            "an internal error of libsdg, described on standard error; please report it".to_owned(),
+        ),
     };
     // Has no effect in a thread that only runs its destructors.
     _ = LAST_ERROR.try_with(|last| *last.borrow_mut() = text);

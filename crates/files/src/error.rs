@@ -36,7 +36,7 @@ pub enum FileError {
         expected: &'static str,
     },
     /// The output path leads to an input.
-    #[error("{}: expected a name of its own for what is written, found an input of this command", path.display())]
+    #[error("{}: expected an output path that is not an input, found an input of this command", path.display())]
     Input { path: PathBuf },
     /// A file of another kind has the output's name.
     #[error("{}: expected a new name, or {written} to replace, found {found}", path.display())]
@@ -72,7 +72,7 @@ pub enum FileError {
         found: &'static str,
     },
     /// Another process is writing the file.
-    #[error("{}: expected a file that no other process writes, found one of {holder}", path.display())]
+    #[error("{}: expected a file that no other process is writing, found it locked by {holder}", path.display())]
     Held {
         path: PathBuf,
         /// The process, as named in its lock file.

@@ -70,7 +70,7 @@ impl WriterLock {
                 let mut holder = String::new();
                 // The other process may have taken the lock a moment ago, without having written its name.
                 let _ = file.read_to_string(&mut holder);
-                let holder = if holder.is_empty() { "process unknown" } else { holder.trim() }.to_owned();
+                let holder = if holder.is_empty() { "an unknown process" } else { holder.trim() }.to_owned();
                 return Err(FileError::Held { path: written.to_owned(), holder });
             }
             // The previous holder may have removed the file after it was opened here.

@@ -146,7 +146,7 @@ impl OrientationCnn {
     async fn log_probabilities(&self, crops: &[RgbImage]) -> Vec<Vec<f32>> {
         let logits = self.forward(crop_batch(crops, &self.device()));
         let read = activation::log_softmax(logits, 1).into_data_async().await;
-        let values: Vec<f32> = read.expect("what the device computes can be read").iter::<f32>().collect();
+        let values: Vec<f32> = read.expect("expected readable results of the device").iter::<f32>().collect();
         values.chunks_exact(self.config.classes.num_classes).map(<[f32]>::to_vec).collect()
     }
 

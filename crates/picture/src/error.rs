@@ -19,7 +19,7 @@ pub enum PictureError {
     #[error("damaged {format} image: {reason}")]
     DamagedImage { format: &'static str, reason: String },
     /// An unsupported variant of a format, and what the user can do.
-    #[error("{format} image of a kind that is not read: {found}: {remedy}")]
+    #[error("unsupported kind of {format} image: {found}: {remedy}")]
     UnsupportedKind { format: &'static str, found: String, remedy: &'static str },
     /// Width or height is zero.
     #[error("empty image: expected at least 1×1 pixels, found {width}×{height}")]

@@ -169,7 +169,7 @@ pub(crate) fn complete_jpeg(bytes: &[u8]) -> Result<Cow<'_, [u8]>, PictureError>
     if scanner.num_components == Some(4) && !scanner.has_adobe_marker {
         return Err(PictureError::UnsupportedKind {
             format: "JPEG",
-            found: "CMYK inks without Adobe's marker, which says whether they are inverted".to_owned(),
+            found: "CMYK inks without Adobe's marker, so it is unknown whether they are inverted".to_owned(),
             remedy: "export it as RGB",
         });
     }

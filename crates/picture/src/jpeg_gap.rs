@@ -46,7 +46,7 @@ pub(crate) fn check_has_no_gap(jpeg: &[u8]) -> Result<(), PictureError> {
         if !is_in_order || !ends_with_its_blocks(jpeg, stretch) {
             let count = jpeg[at..].iter().take_while(|byte| **byte == 0).count();
             let reason = format!(
-                "{count} zeros in a row from byte {at} on, where a part of the picture was: copy it again from where it came"
+                "{count} zeros in a row from byte {at} in place of picture data: copy the file again from its source"
             );
             return Err(PictureError::DamagedImage { format: "JPEG", reason });
         }
@@ -124,7 +124,7 @@ mod tests {
             let (start, length) = ((data.start + data.end) / 2, (data.end - data.start) / part);
             let mut damaged = original.clone();
             damaged[start..start + length].fill(0);
-            assert!(image::load_from_memory(&damaged).is_ok(), "the decoder does not tell");
+            assert!(image::load_from_memory(&damaged).is_ok(), "expected the decoder to accept it");
             let told = check_has_no_gap(&damaged).unwrap_err().to_string();
             assert!(told.contains("zeros in a row from byte"), "{told}");
         }

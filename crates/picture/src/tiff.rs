@@ -81,8 +81,8 @@ pub(crate) fn full_page(bytes: &[u8]) -> Result<FullPage<'_>, PictureError> {
     // Without a full-size page, the first page is used.
     let Some(page) = page.or(pages.first()) else { return Ok(whole) };
     if further > 0 {
-        let found = format!("{} pages in full size, of which nothing says which is the picture", further + 1);
-        return Err(unsupported(found, "save the page as a file of its own"));
+        let found = format!("{} full-size pages, none of which is marked as the picture", further + 1);
+        return Err(unsupported(found, "save the page in a separate file"));
     }
     let photometric = page.number(&file, PHOTOMETRIC);
     if let Some(COLOR_FILTER_ARRAY | LINEAR_RAW) = photometric {
@@ -366,7 +366,7 @@ mod tests {
     fn several_full_pages_and_raw_photos_are_told() {
         let pages = [rgb([8, 6], [1, 2, 3], 0), rgb([8, 6], [4, 5, 6], 0)];
         let error = decoded(&file(&pages, false)).unwrap_err().to_string();
-        assert!(error.contains("2 pages in full size") && error.contains("save the page"), "{error}");
+        assert!(error.contains("2 full-size pages") && error.contains("save the page"), "{error}");
         let mut raw = rgb([8, 6], [1, 2, 3], 0);
         raw.tags.push((PHOTOMETRIC, vec![COLOR_FILTER_ARRAY as u16]));
         let error = decoded(&file(&[rgb([4, 3], [9, 9, 9], 1), raw], false)).unwrap_err().to_string();

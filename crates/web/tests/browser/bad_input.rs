@@ -58,7 +58,7 @@ fn wrong_files_are_told_apart() {
         assert!(text[idx].as_str().unwrap().contains(part), "{text}");
     }
     let stage = browser.run("return document.getElementById('empty').textContent", &[]).unwrap();
-    assert_eq!(stage, text[0], "the stage shows what is wrong with the chosen picture");
+    assert_eq!(stage, text[0], "expected the error of the chosen picture on the stage");
     assert_quiet(&browser);
 }
 
