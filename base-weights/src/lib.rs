@@ -2,8 +2,8 @@
 //!
 //! ```text
 //! seed ─ Pictures ─┬─ DetectorTask: PretrainNetwork ────┬─ Run: AdamW on one cycle ─ checkpoint ─┐
-//!                  ├─ OrientationTask: OrientationCnn ──┤                                        │
-//!                  └─ ComparisonTask: ComparisonNetwork ──────┘                                        │
+//!                  ├─ OrientationTask: OrientationCnn ────┤                                        │
+//!                  └─ ComparisonTask: ComparisonNetwork ──┘                                        │
 //!                                        BaseWeightsFile (f16): trunk, heads, imprint ─ export ──┘
 //! unseen parts ─ demonstration ─ teach for 15, 30, 60, 120 steps
 //!                                 └ recall and false alarms of the network alone (`compare`)

@@ -51,8 +51,7 @@ fn kib(text: &str) -> Option<f64> {
     text.strip_suffix("kB")?.trim().parse().ok()
 }
 
-/// The model's name with family and model number, because virtual machines give many processors the
-/// same name.
+/// Name, family and model number: virtual machines give many processors the same name.
 fn processor_name(cpuinfo: &str) -> String {
     let of = |key| value(cpuinfo, key).unwrap_or("unknown");
     format!("{} (family {}, model {})", of("model name"), of("cpu family"), of("model"))

@@ -137,7 +137,7 @@ fn height(name: &str, height_m: f64) -> Result<f64> {
 pub fn detection(record: &Record) -> sdg_detection {
     let found = &record.found.detection;
     let mut refused = [0; SDG_REFUSED_BYTES as usize];
-    // SAFETY: the buffer has the length that is given.
+    // SAFETY: the buffer has the length passed with it.
     unsafe { copy_text(found.refused.unwrap_or_default(), refused.as_mut_ptr(), refused.len()) };
     let absent = f64::NAN;
     let pose = record.found.pose.as_ref();

@@ -1,4 +1,4 @@
-//! Samples the matched boxes of a loss.
+//! Samples the matches that enter a loss.
 
 use rand::seq::SliceRandom;
 use rand_pcg::Pcg64Mcg;

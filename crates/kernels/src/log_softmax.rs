@@ -158,7 +158,7 @@ mod tests {
     use super::*;
     use crate::reference::{assert_close, random_values};
 
-    /// Rows of one value, of less than a vector, of all parts of a sum together, and of a keypoint's heatmap.
+    /// One value, less than a vector, a length that uses every part of the sum, and a keypoint's heatmap.
     const ROW_LENS: [usize; 4] = [1, 7, 128 + 40, 3136];
 
     #[test]

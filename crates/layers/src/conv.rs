@@ -258,8 +258,7 @@ mod tests {
 
     #[test]
     fn bilinear_upsampling_by_hand() {
-        // Rows [0, 4] become [0, 1, 3, 4]; columns, whose values differ by 8, become the same with
-        // twice the steps.
+        // Within a row, [0, 4] becomes [0, 1, 3, 4]; within a column, [0, 8] becomes [0, 2, 6, 8].
         let x = tensor(&[0.0, 4.0, 8.0, 12.0], [1, 1, 2, 2]);
         let expected = [0.0, 1.0, 3.0, 4.0, 2.0, 3.0, 5.0, 6.0, 6.0, 7.0, 9.0, 10.0, 8.0, 9.0, 11.0, 12.0];
         assert_eq!(upsample_bilinear_2x(x).into_data().try_to_vec_as::<f32>().unwrap(), expected);

@@ -77,8 +77,9 @@ pub fn decode_image(bytes: &[u8], limits: &ImageLimits) -> Result<RgbImage> {
 /// Floats of 0 to 255 are read like integers. Of a TIFF, the full-size page is read.
 ///
 /// # Errors
-/// Another format (for HEIC photos with the phone's setting that avoids them), a truncated or damaged file, zero width
-/// or height, more than `limits.max_pixels`, a TIFF with several full-size pages, or inks with unknown storage.
+/// Another format (for a HEIC photo, the error names the phone's setting that avoids HEIC), a truncated or damaged
+/// file, zero width or height, more than `limits.max_pixels`, a TIFF with several full-size pages, or inks with unknown
+/// storage.
 pub fn decode_image_in(bytes: &[u8], limits: &ImageLimits, frame: PixelFrame) -> Result<RgbImage> {
     if bytes.starts_with(b"P6") {
         let damaged = |found| PictureError::DamagedImage { format: "PPM", reason: format!("found {found}") };
@@ -113,7 +114,7 @@ pub fn decode_image_in(bytes: &[u8], limits: &ImageLimits, frame: PixelFrame) ->
     let (width, height) = decoder.dimensions();
     check_size(width, height, limits)?;
     let mut allocation = Limits::default();
-    // Photos have at most the pixel size of 16-bit RGBA.
+    // 8 bytes per pixel, as for 16-bit RGBA.
     allocation.max_alloc = Some(limits.max_pixels.saturating_mul(8).saturating_add(1 << 20));
     decoder.set_limits(allocation).map_err(damaged)?;
     // A damaged Exif block is ignored.
@@ -176,7 +177,7 @@ fn iso_media(bytes: &[u8]) -> Option<&'static str> {
              phones switch HEIF pictures off) and take it again, or export it as JPEG",
         ),
         b"avif" | b"avis" => Some("an AVIF picture: export it as JPEG or PNG"),
-        _ => Some("a film or another ISO media file"),
+        _ => Some("a video or another ISO media file"),
     }
 }
 

@@ -17,11 +17,11 @@ const BLURS: [f32; 4] = [0.0, 1.0, 2.7, 6.0];
 pub(crate) struct Lamp {
     /// Unit vector towards the lamp, z up.
     pub direction: [f32; 3],
-    /// Light scattered by a white surface that faces it.
+    /// Light scattered by a white surface that faces the lamp.
     pub color: [f32; 3],
     /// Angular radius of the lamp, in radians.
     pub radius: f32,
-    /// Strength of its reflection in glossy surfaces.
+    /// Strength of the lamp's reflection in glossy surfaces.
     pub glare: f32,
 }
 
@@ -114,7 +114,7 @@ impl Lighting {
     }
 }
 
-/// White, warmer or colder by at most the fraction `share`.
+/// White made warmer or colder by a random fraction of at most `share`.
 fn tint(rng: &mut Pcg64Mcg, share: f32) -> [f32; 3] {
     let warmth = rng.uniform(-1.0, 1.0) * share;
     [1.0 + warmth, 1.0, 1.0 - 1.2 * warmth]
