@@ -39,7 +39,7 @@ function wire() {
   element("refused").onchange = showCurrent;
   element("download").onclick = download;
   element("webgpu").onchange = changeDevice;
-  element("webgpu-choice").hidden = !navigator.gpu; // Only for pages served by https or from this machine.
+  element("webgpu-choice").hidden = !navigator.gpu; // Browsers offer WebGPU only to pages served by https or from this machine.
   watchWidth(element("stage"), showCurrent);
 
   // Dropped anywhere: models and pictures are distinguished by name.

@@ -54,7 +54,7 @@ function drawDetection(brush, detection) {
   drawLabel(brush, detection, color);
 }
 
-/** Two jaws, as long as a gripper's are wide, which close on the part across the taught line. */
+/** Draws the two jaws at the grasp's width; they close across the taught line. */
 function drawJaws(brush, { x, y, angle_deg: degrees, width_px: width }) {
   const angle = (degrees * Math.PI) / 180;
   const along = [Math.cos(angle), Math.sin(angle)];
