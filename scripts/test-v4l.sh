@@ -13,7 +13,7 @@ mkdir -p "$work"
 # Debian's current kernel, or an older one that was already downloaded.
 if [ ! -e "$work/kernel/done" ]; then
     package=$(apt-cache depends linux-image-amd64 | sed -n 's/.*Depends: \(linux-image-[0-9][^ ]*-amd64\)$/\1/p' | head -1)
-    [ -n "$package" ] || { echo "test-v4l: apt knows no linux-image-amd64; run apt-get update" >&2; exit 1; }
+    [ -n "$package" ] || { echo "test-v4l: apt has no linux-image-amd64; run apt-get update" >&2; exit 1; }
     rm -rf "$work/kernel" "$work"/*.deb
     (cd "$work" && apt-get download -qq "$package") || { echo "test-v4l: cannot download $package; run apt-get update" >&2; exit 1; }
     dpkg-deb -x "$work"/linux-image-*.deb "$work/kernel"
@@ -69,4 +69,4 @@ chmod +x "$root/init"
 timeout 120 qemu-system-x86_64 -accel tcg -m 512 -smp 2 -nographic -no-reboot -nic none -kernel "$work/kernel/boot/vmlinuz-$kernel" \
     -initrd "$work/initramfs.gz" -append "console=ttyS0 quiet panic=-1" </dev/null 2>&1 | tr -d '\r' | tee "$work/log" |
     sed -n '/running [0-9]* test/,$p'
-grep -q '^v4l-test ended with 0$' "$work/log" || { echo "test-v4l: failed; all that the machine printed is in $work/log" >&2; exit 1; }
+grep -q '^v4l-test ended with 0$' "$work/log" || { echo "test-v4l: failed; the virtual machine's output is in $work/log" >&2; exit 1; }

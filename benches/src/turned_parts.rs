@@ -91,7 +91,7 @@ pub fn poses(
         .collect()
 }
 
-/// A photo of a different size with the same part alone, and its marks.
+/// Draws the photo's part alone, in the middle of a photo of another size, with its marks.
 pub fn photo_of_size(photo: &Demonstration, size: [u32; 2]) -> Demonstration {
     let outline_there = outline(photo);
     let middle = Point2::new(0.5 * f64::from(size[0]), 0.5 * f64::from(size[1]));
@@ -108,12 +108,13 @@ pub fn photo_of_size(photo: &Demonstration, size: [u32; 2]) -> Demonstration {
     Demonstration { image: picture(photo, size, &[pose]), annotation }
 }
 
-/// Draws dark strokes all over the picture, always the same for the same number: edges that belong to no part.
+/// Draws dark strokes all over the picture: edges that belong to no part. The strokes depend only on `count` and the
+/// picture's size.
 pub fn add_strokes(picture: &mut RgbImage, count: u32) {
     const LENGTH_PX: u32 = 40;
     let (width, height) = picture.dimensions();
     for k in 0..count {
-        // Multiples of irrational numbers are spread evenly.
+        // The fractions of an irrational number's multiples are distributed evenly over 0 to 1.
         let share = |factor: f64| (f64::from(k + 1) * factor).fract();
         let from = [share(0.754_877_67) * f64::from(width), share(0.569_840_29) * f64::from(height)];
         let (sin, cos) = (std::f64::consts::TAU * share(0.618_033_99)).sin_cos();

@@ -26,7 +26,7 @@ if [ -z "${SHOW:-}" ]; then
     # Counters make the program many times slower, so executions that take too long are not counted as failures.
     # shellcheck disable=SC2086 # names of targets
     LLVM_PROFILE_FILE="$PWD/$out/%p.profraw" "$out/hardening" --executions "${EXECUTIONS:-20000}" --seconds "${COVERAGE_SECONDS:-400}" \
-        --out "$out/figures" ${TARGETS:-} || echo "coverage: with failures, above"
+        --out "$out/figures" ${TARGETS:-} || echo "coverage: there are failures, listed above"
     "$tools/llvm-profdata" merge --sparse "$out"/*.profraw --output "$out/all.profdata"
     "$tools/llvm-cov" export "$out/hardening" --instr-profile "$out/all.profdata" --summary-only >"$out/summary.json"
     python3 scripts/hardening/coverage_tables.py "$out/summary.json"

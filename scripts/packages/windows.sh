@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Builds sdg.exe for 64-bit Windows without simulator (teach, detect, annotate) by mingw-w64, and a zip of it with the shipped photos,
-# target/packages/windows/single-demo-grasp-VERSION-windows-x86_64.zip; `make windows`. With TRY=1 it is then used under Wine.
+# target/packages/windows/single-demo-grasp-VERSION-windows-x86_64.zip; `make windows`. With TRY=1 it is then tried under Wine.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 source scripts/other_target.sh

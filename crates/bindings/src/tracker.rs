@@ -55,7 +55,7 @@ impl Tracker {
             return Err(Fault::new(
                 FaultKind::Argument,
                 format!(
-                    "expected captured_s of at least {}, that of the frame before, found {captured_secs}",
+                    "expected captured_s of at least {}, the previous frame's, found {captured_secs}",
                     self.last_secs
                 ),
             ));

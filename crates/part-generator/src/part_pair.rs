@@ -133,7 +133,7 @@ fn look_distance(one: &Material, other: &Material) -> f32 {
 /// The rotations about its centre after which a part looks the same.
 pub(crate) fn symmetry(relief: &Relief, center: [f32; 2]) -> RotationalSymmetry {
     let comparison = PartPair::new(relief, center, relief, center);
-    // Angles that are not multiples of any rotation up to order 40.
+    // Angles that belong to no rotational symmetry of order 2 to 40.
     if [7.0f32, 17.0, 31.0, 53.0, 101.0, 149.0].iter().all(|degrees| comparison.is_same(degrees.to_radians())) {
         return RotationalSymmetry::Full;
     }

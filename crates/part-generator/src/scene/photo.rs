@@ -19,8 +19,8 @@ use crate::random::{Draw, Stream, generator};
 /// Focal length divided by the picture's width: that of the project's wrist camera.
 pub(crate) const FOCAL_OVER_WIDTH: f32 = 0.86;
 
-/// Minimum difference between table and part (sum over channels of square roots of linear values); a table below it is
-/// replaced if there is a better one.
+/// Sufficient difference between table and part (sum over channels of square roots of linear values). If a table has
+/// less, one with more contrast replaces it.
 const MIN_CONTRAST: f32 = 0.5;
 
 /// Settings of the photo.
@@ -110,7 +110,7 @@ impl DemonstrationPhoto {
     }
 }
 
-/// A plain table whose brightness differs from the part's, as users are advised: the best of a few.
+/// Chooses from a few plain tables one that differs in colour from the part, as recommended to users.
 fn contrasting_table(part: &Part, rng: &mut rand_pcg::Pcg64Mcg) -> Table {
     let look: Vec<f32> = {
         let level = &part.relief.levels[2];
