@@ -34,7 +34,7 @@ def onnxruntime_backbone(onnx, threads):
 def openvino_backbone(onnx, threads):
     import openvino
 
-    # Single precision, as everybody else here: OpenVINO would take bfloat16 where the processor has it.
+    # Single precision, like the other runtimes: OpenVINO would use bfloat16 if the processor has it.
     config = {
         "INFERENCE_NUM_THREADS": threads,
         "PERFORMANCE_HINT": "LATENCY",

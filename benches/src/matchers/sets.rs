@@ -1,4 +1,4 @@
-//! The pictures: shipped parts drawn on their tables, and the sets of a split without those of the reported side.
+//! The pictures: shipped parts drawn on their tables, and the sets of a split, except sets of the reported side.
 
 use std::path::{Path, PathBuf};
 

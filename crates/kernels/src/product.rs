@@ -191,7 +191,7 @@ unsafe fn tile<L: Lanes, const R: usize, const V: usize>(
         let mut right_run = right.values.as_ptr().add(column);
         let step = left.step;
         for _ in 0..outer {
-            // Four pointers three rows apart: an address is a pointer plus nothing, one step or two.
+            // Four pointers three rows apart: an address is a pointer plus 0, 1 or 2 steps.
             let mut at = [left_run, left_run, left_run, left_run];
             for (idx, at) in at.iter_mut().enumerate() {
                 *at = left_run.wrapping_add(3 * idx * step);

@@ -28,7 +28,7 @@ pub enum TrainingError {
     #[error(transparent)]
     Demonstration(#[from] sdg_demonstration::Error),
     /// Initial parameters of the orientation CNN that belong to another network.
-    #[error("weights to start the orientation CNN from: expected those of this network, found another {name}")]
+    #[error("initial weights of the orientation CNN: expected those of this network, found a difference in {name}")]
     Start {
         /// The first parameter that does not fit.
         name: String,

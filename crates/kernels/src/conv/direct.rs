@@ -65,10 +65,10 @@ impl DirectConv<'_> {
             && self.grid == self.source.size
             && self.grid == self.target.size;
         if pointwise {
-            // SAFETY: the caller promises that nothing else has the target's pixels of `output`.
+            // SAFETY: the caller promises that nothing else accesses the target's pixels of `output`.
             unsafe { self.run_pointwise(isa, output) };
         } else {
-            // SAFETY: the caller promises that nothing else has the target's pixels of `output`.
+            // SAFETY: the caller promises that nothing else accesses the target's pixels of `output`.
             unsafe { self.run_window(isa, output) };
         }
     }

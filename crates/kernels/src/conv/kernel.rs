@@ -35,14 +35,14 @@ pub(crate) fn convolve(
             Direction::Forward => shape.params.padding,
             Direction::Backward => shape.params.padding.map(|padding| 2 - padding),
         };
-        // SAFETY: nothing else has the output.
+        // SAFETY: nothing else accesses the output.
         if unsafe { winograd::run(isa, source, padding, [to[2], to[3]], &panels, epilogue, output.raw()) } {
             // SAFETY: the tiles together are the whole output.
             return unsafe { output.into_vec() };
         }
     }
     if let Filters::Direct(products) = filters(false) {
-        // SAFETY: nothing else has the output.
+        // SAFETY: nothing else accesses the output.
         unsafe { run_direct(isa, direction, source, &products, epilogue, shape, output.raw()) };
     }
     // SAFETY: the grid, or the phases together, are the whole output.
@@ -71,7 +71,7 @@ unsafe fn run_direct(
             epilogue,
             target: Target { size: shape.out_size, origin: [0, 0], step: [1, 1] },
         };
-        // SAFETY: the caller promises that nothing else has the output, all of which is the target.
+        // SAFETY: the caller promises that nothing else accesses the output; the target is the whole output.
         unsafe { conv.run(isa, output) };
         return;
     }

@@ -52,7 +52,7 @@ pub(crate) trait Lanes: Copy {
     unsafe fn mul_add(self, factor: Self, summand: Self) -> Self;
     /// `max(self, 0)`; a NaN stays NaN.
     unsafe fn relu(self) -> Self;
-    /// Prefetches a cache line that is read soon; a hint that reads nothing, for any pointer.
+    /// Prefetches a cache line that is read soon; a hint only, valid for any pointer.
     #[inline(always)]
     fn prefetch(at: *const f32) {
         #[cfg(target_arch = "x86_64")]

@@ -57,7 +57,7 @@ pub(in crate::conv) fn weight_gradient(
         });
     } else {
         let block = BLOCK_FLOATS / (FREQUENCIES * (x.channels + output_grad.channels));
-        // SAFETY: nothing else has the sums.
+        // SAFETY: nothing else accesses the sums.
         unsafe { sums.add(0..num_tiles, block.max(24), 0, raw, true) };
     }
 
