@@ -46,7 +46,7 @@ fn main() -> Result<()> {
 }
 
 /// The set's part with its pictures, as the fit reads it, and the kind of each picture. `None` without exact ground
-/// ground truth (`truth.json`).
+/// truth (`truth.json`).
 ///
 /// # Errors
 /// A picture that cannot be read.

@@ -1,10 +1,10 @@
 //! Pretraining of preset `edge` on generated parts.
 //!
 //! ```text
-//! seed ─ Pictures ─┬─ DetectorTask: PretrainNetwork ────┬─ Run: AdamW on one cycle ─ checkpoint ─┐
+//! seed ─ Pictures ─┬─ DetectorTask: PretrainNetwork ──────┬─ Run: AdamW on one cycle ─ checkpoint ─┐
 //!                  ├─ OrientationTask: OrientationCnn ────┤                                        │
 //!                  └─ ComparisonTask: ComparisonNetwork ──┘                                        │
-//!                                        BaseWeightsFile (f16): trunk, heads, imprint ─ export ──┘
+//!                                          BaseWeightsFile (f16): trunk, heads, imprint ─ export ──┘
 //! unseen parts ─ demonstration ─ teach for 15, 30, 60, 120 steps
 //!                                 └ recall and false alarms of the network alone (`compare`)
 //! ```

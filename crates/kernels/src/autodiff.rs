@@ -246,7 +246,7 @@ impl<C: CheckpointStrategy> KernelBackend for Autodiff<Flex, C> {
 }
 
 thread_local! {
-    /// Nodes that got a gradient from an operation of this crate that has not been taken yet.
+    /// Nodes whose gradient was given by an operation of this crate and not yet taken.
     static GIVEN: RefCell<HashSet<u64>> = RefCell::default();
 }
 

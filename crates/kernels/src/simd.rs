@@ -54,7 +54,7 @@ pub(crate) use widest;
 macro_rules! lanes_kernel {
     ($(#[$meta:meta])* $vis:vis unsafe fn $name:ident($($arg:ident: $kind:ty),* $(,)?) = $generic:ident) => {
         $(#[$meta])*
-        #[allow(clippy::too_many_arguments)] // Of a kernel's inner loop.
+        #[allow(clippy::too_many_arguments)] // A kernel's inner loop has many.
         $vis unsafe fn $name(isa: $crate::simd::Isa, $($arg: $kind),*) {
             #[cfg(target_arch = "x86_64")]
             #[allow(clippy::too_many_arguments)]

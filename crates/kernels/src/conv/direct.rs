@@ -12,8 +12,8 @@ use crate::simd::Isa;
 
 /// Approximate number of positions per unit of work: 96 rows of 256 floats are 98 KB.
 const UNIT_POSITIONS: usize = 96;
-/// Approximate number of positions per unit that copies the data shared by its rows; larger units are better
-/// then.
+/// Approximate number of positions per unit if the unit copies its input: neighbouring rows share the copy, so larger
+/// units are better.
 const COPYING_UNIT_POSITIONS: usize = 240;
 /// Target number of units, so that no thread waits long for the last.
 const MIN_UNITS: usize = 8;

@@ -106,7 +106,7 @@ pub(super) unsafe fn run(
             unsafe { conv.tiles(unit * per_unit, per_unit.min(num_tiles - unit * per_unit), false) };
         });
     } else {
-        // SAFETY: no other call writes tiles of this output: there is this one call.
+        // SAFETY: this single call writes all tiles of the output.
         unsafe { conv.tiles(0, num_tiles, true) };
     }
     finite.load(Ordering::Relaxed)

@@ -29,7 +29,7 @@ pub(crate) trait Lanes: Copy {
     #[inline(always)]
     unsafe fn load_first(from: *const f32, len: usize) -> Self {
         let mut values = [0.0_f32; LANES];
-        // SAFETY: good for `len` floats, which is at most 16.
+        // SAFETY: valid for `len` floats, which is at most 16.
         unsafe {
             std::ptr::copy_nonoverlapping(from, values.as_mut_ptr(), len);
             Self::load(values.as_ptr())
@@ -39,7 +39,7 @@ pub(crate) trait Lanes: Copy {
     #[inline(always)]
     unsafe fn store_first(self, to: *mut f32, len: usize) {
         let mut values = [0.0_f32; LANES];
-        // SAFETY: good for `len` floats, which is at most 16.
+        // SAFETY: valid for `len` floats, which is at most 16.
         unsafe {
             self.store(values.as_mut_ptr());
             std::ptr::copy_nonoverlapping(values.as_ptr(), to, len);
@@ -82,22 +82,22 @@ impl Lanes for Zmm {
     }
     #[inline(always)]
     unsafe fn load(from: *const f32) -> Self {
-        // SAFETY: the caller promises AVX-512, and `from` is good for 16 floats; the instruction needs no alignment.
+        // SAFETY: the caller promises AVX-512, and `from` is valid for 16 floats; the instruction needs no alignment.
         unsafe { Self(_mm512_loadu_ps(from)) }
     }
     #[inline(always)]
     unsafe fn load_first(from: *const f32, len: usize) -> Self {
-        // SAFETY: the caller promises AVX-512, and `from` is good for `len` floats: the masked load reads no others.
+        // SAFETY: the caller promises AVX-512, and `from` is valid for `len` floats: the masked load reads no others.
         unsafe { Self(_mm512_maskz_loadu_ps(first_mask(len), from)) }
     }
     #[inline(always)]
     unsafe fn store(self, to: *mut f32) {
-        // SAFETY: the caller promises AVX-512, and `to` is good for 16 floats; the instruction needs no alignment.
+        // SAFETY: the caller promises AVX-512, and `to` is valid for 16 floats; the instruction needs no alignment.
         unsafe { _mm512_storeu_ps(to, self.0) }
     }
     #[inline(always)]
     unsafe fn store_first(self, to: *mut f32, len: usize) {
-        // SAFETY: the caller promises AVX-512, and `to` is good for `len` floats: the masked store writes no others.
+        // SAFETY: the caller promises AVX-512, and `to` is valid for `len` floats: the masked store writes no others.
         unsafe { _mm512_mask_storeu_ps(to, first_mask(len), self.0) }
     }
     #[inline(always)]
@@ -226,12 +226,12 @@ impl Lanes for Plain {
     }
     #[inline(always)]
     unsafe fn load(from: *const f32) -> Self {
-        // SAFETY: good for 16 floats by the caller's promise; arrays of floats need no more alignment.
+        // SAFETY: valid for 16 floats by the caller's promise; arrays of floats need no more alignment.
         unsafe { Self(*from.cast::<[f32; LANES]>()) }
     }
     #[inline(always)]
     unsafe fn store(self, to: *mut f32) {
-        // SAFETY: good for 16 floats by the caller's promise.
+        // SAFETY: valid for 16 floats by the caller's promise.
         unsafe { *to.cast::<[f32; LANES]>() = self.0 };
     }
     #[inline(always)]

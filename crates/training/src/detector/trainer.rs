@@ -32,7 +32,6 @@ pub struct Trained {
 /// # Errors
 /// An invalid setting, a loss that is not finite, a batch that the network rejects, or an end before the first
 /// validation.
-/// validation.
 pub fn train(
     detector: GeneralizedRcnn,
     config: &TrainingConfig,
