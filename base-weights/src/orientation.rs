@@ -39,7 +39,7 @@ const SIGMA_DEGREES: f64 = 8.0;
 /// The orientation CNN and its imprint network.
 #[derive(Module, Debug)]
 pub struct OrientationNetwork {
-    /// Its classes are not used.
+    /// The network, whose classes are not used.
     pub network: OrientationCnn,
     /// Computes classes from features.
     pub imprint: ClassImprint,

@@ -20,7 +20,7 @@ const PAUSE: Duration = Duration::from_millis(100);
 pub struct WorkerProcess {
     /// The side that it runs.
     pub side: Side,
-    /// Its first message, sent when it was ready.
+    /// The worker's first message, sent when it was ready.
     pub ready: Ready,
     child: Child,
     requests: Option<ChildStdin>,

@@ -1,4 +1,4 @@
-//! Locks between processes. The system releases a lock when its process ends, in whatever way it ends.
+//! Locks between processes. The system releases a lock when its process ends, however it ends.
 
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{Read, Seek, Write};

@@ -111,7 +111,7 @@ impl PanelProduct<'_> {
         let [scale, bias] = self.epilogue.columns(self.first_column);
         assert!(scale.is_none_or(|scale| scale.len() >= self.columns));
         assert!(bias.is_none_or(|bias| bias.len() >= self.columns));
-        // SAFETY: every access is within what was asserted; `isa` is there.
+        // SAFETY: every access is within the asserted bounds, and the machine has `isa`.
         unsafe { panel(isa, self, output.at(self.at)) };
     }
 }
