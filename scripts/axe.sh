@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Fetches axe-core, which judges our pages' accessibility in the browser tests, from npm into target/browser-test; does
-# nothing when it is there. It is not in this repository: its licence (MPL-2.0) is not ours.
+# Fetches axe-core, which checks the accessibility of our pages in the browser tests, from npm into target/browser-test; does
+# nothing if it is installed. It is not in this repository because of its licence (MPL-2.0).
 set -euo pipefail
 cd "$(dirname "$0")/.."
 

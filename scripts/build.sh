@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# Builds what the arguments name (`--bin sdg`) in the release profile. Called by `make build` and by other scripts.
+# Builds the targets in the arguments (`--bin sdg`) in the release profile. Called by `make build` and by other scripts.
 #
-# Always of the whole workspace and with one example, the smallest: cargo then chooses the libraries' features as it does for
-# `make test`, which so finds burn compiled. With `-p sdg-cli` it would be compiled twice.
+# Always builds from the whole workspace and with the smallest example: cargo then chooses the same features of the libraries as
+# `make test`, so burn is compiled only once. With `-p sdg-cli` it would be compiled twice.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""Prints the lines and regions of crates that tests reached, without the lines of tests themselves.
+"""Prints the lines and regions of crates that tests reached, without the lines of the tests.
 
-coverage.py ROOT LCOV JSON CRATE…: what `llvm-cov export` wrote, as lcov for lines and as JSON for regions.
-FILES=1 in the environment: files, too, with the lines that nothing reached.
+coverage.py ROOT LCOV JSON CRATE…: LCOV and JSON are outputs of `llvm-cov export`, for lines and for regions.
+FILES=1 in the environment: also prints files, with the lines that no test reached.
 """
 import json
 import os
@@ -27,7 +27,7 @@ first_test_line = {}
 
 
 def is_counted(file, line):
-    """Tests stand at the end of a file, in a module under `#[cfg(test)]`."""
+    """Whether a line counts. Tests are at the end of a file, in a module under `#[cfg(test)]`."""
     if file not in first_test_line:
         text = Path(file).read_text()
         found = re.search(r"^#\[cfg\(test\)\]\n(#.*\n)*mod \w+ \{", text, re.M)
@@ -35,7 +35,7 @@ def is_counted(file, line):
     return line < first_test_line[file]
 
 
-# File, line: how often.
+# File and line: number of executions.
 lines = defaultdict(dict)
 file = None
 for row in open(lcov):
@@ -48,7 +48,7 @@ for row in open(lcov):
         if is_counted(file, line):
             lines[file][line] = max(count, lines[file].get(line, 0))
 
-# A generic function is compiled once for each type: a region counts as reached where one of them was.
+# A generic function is compiled once per type: a region counts as reached if it was reached for one type.
 regions = defaultdict(int)
 for function in json.load(open(functions))["data"][0]["functions"]:
     for l1, c1, l2, c2, count, file_idx, _, kind in function["regions"]:

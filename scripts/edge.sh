@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Builds `sdg` for small machines into target/edge/sdg, in the profile of what goes to other machines, and measures it; further
-# arguments go to `sdg-bench edge`. Called by `make edge`.
+# Builds `sdg` for small machines into target/edge/sdg, in the profile for distribution, and measures it; further arguments are passed
+# to `sdg-bench edge`. Called by `make edge`.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -9,7 +9,7 @@ target=${CARGO_TARGET_DIR:-target}
 edge=target/edge
 
 scripts/build.sh --bin sdg-bench
-# Without simulator, which the program does not link.
+# Without the simulator, which the program does not link.
 "$cargo" build --locked --profile ship --no-default-features --package sdg-cli
 mkdir -p "$edge"
 cp "$target/ship/sdg" "$edge/sdg.new"

@@ -1,11 +1,11 @@
-"""Our Panda as franka-sim takes it: heavier motors, and the shapes whose distances it watches. python franka_sim_model.py PANDA_XML FOLDER"""
+"""Converts our Panda for franka-sim: heavier motors, and names for the shapes whose distances it monitors. python franka_sim_model.py PANDA_XML FOLDER"""
 import pathlib, re, sys
 
 text = pathlib.Path(sys.argv[1]).read_text()
 folder = pathlib.Path(sys.argv[2])
-# The gains of franka-sim, made for another model, let ours overshoot its speed by a tenth.
+# The gains of franka-sim, which are for another model, let our model overshoot its speed by a tenth.
 text = text.replace('armature="0.1" damping="0.5"', 'armature="0.3" damping="0.5"')
-# It looks for one shape a link by this name; ours has them without, and never lets two of them touch.
+# franka-sim expects one shape per link with this name; our shapes have no names, and no two of them touch.
 for link in range(8):
     body = text.index(f'<body name="link{link}"')
     at = text.index('<geom class="panda collision"', body)

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Installs those of the named Debian packages that are missing; sudo only when not root.
+# Installs the given Debian packages that are missing; uses sudo only if not root.
 set -euo pipefail
 
 missing=()

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Installs mdBook, which builds the site's pages, into target/tools, or does nothing where it is there. Without its own server and
-# search, which would take most of the compilation. It is a tool of the build alone: its licence (MPL-2.0) is not ours.
+# Installs mdBook, which builds the site's pages, into target/tools; does nothing if it is installed. It is compiled without its server
+# and search, which would take most of the time. It is only a build tool: its licence (MPL-2.0) is not ours.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 

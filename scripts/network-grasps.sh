@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Whole grasps of every shipped part over TCP and UDP, NETWORK_GRASPS (20) attempts each, beside the same attempts in one process:
-# in lockstep, and in real time. The example says what counts as a failure.
+# Complete grasps of every shipped part over TCP and UDP, NETWORK_GRASPS (20) attempts each, compared with the same attempts in one
+# process: in lockstep, and in real time. The example defines a failure.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -10,7 +10,7 @@ example=${CARGO_TARGET_DIR:-target}/release/examples/network_grasps
 
 modes=${NETWORK_MODES:-lockstep realtime}
 
-# A real robot's program runs with real-time priority; without the right to it, the numbers in real time are this machine's.
+# A real robot's program runs with real-time priority; without that permission, the real-time numbers depend on this machine's load.
 realtime=
 if chrt -f 30 true 2>/dev/null; then realtime="chrt -f 30"; fi
 

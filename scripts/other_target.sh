@@ -1,11 +1,11 @@
-# How programs for another kind of machine than this are compiled; to be sourced. Call it as `choose_compiler TARGET`.
+# Chooses the compiler for another kind of machine; to be sourced. Call it as `choose_compiler TARGET`.
 #
-# Rust's targets come from rustup. Where there is none to be had, Debian's compiler is taken, which brings the standard library as
-# source: packages rustc-web, cargo-web, rust-web-src. It then is compiled beside the program, which the compiler allows its own
-# maker only.
+# Rust's targets come from rustup. If rustup is not available, Debian's compiler is used, which has the source of the standard
+# library: packages rustc-web, cargo-web, rust-web-src. The library is then compiled with the program, which the compiler allows only
+# with RUSTC_BOOTSTRAP.
 
-# Sets `cargo_for_target` (a path), `standard_library` (arguments for cargo, none where the target is installed), `compiled_by` (rustup or
-# debian: neither takes what the other compiled), and exports RUSTC where cargo does not find it by itself.
+# Sets `cargo_for_target` (a path), `standard_library` (arguments for cargo, empty if the target is installed), `compiled_by` (rustup or
+# debian, which cannot use each other's output), and exports RUSTC if cargo does not find it by itself.
 choose_compiler() {
     local target=$1 unwinding=${2:-panic_unwind}
     cargo_for_target=$(command -v "${CARGO:-cargo}")

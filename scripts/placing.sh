@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Parts placed in a tray of 20 cells, and grasps from a table that is 5 mm higher than told, with 1 Nm of friction in every joint: in one
-# process, and over TCP and UDP in lockstep. The example says what counts as a failure.
+# Parts placed in a tray of 20 cells, and grasps from a table that is 5 mm higher than configured, with 1 Nm of friction in every joint: in
+# one process, and over TCP and UDP in lockstep. The example defines a failure.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 

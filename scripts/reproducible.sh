@@ -12,7 +12,7 @@ commit=$(git rev-parse HEAD)
 for folder in first a/second/longer/folder; do
     mkdir -p "$work/$folder"
     git archive "$commit" | tar -x -C "$work/$folder"
-    # The folder's own name is no part of the program.
+    # The folder's name must not become part of the program.
     (cd "$work/$folder" && RUSTFLAGS="--remap-path-prefix=$work/$folder=." CARGO_TARGET_DIR="$work/$folder/target" \
         cargo build --quiet --release --locked "${arguments[@]}")
     (cd "$work/$folder/target/release" && find . -maxdepth 2 -type f -executable -not -path './build/*' -not -path './deps/*' \

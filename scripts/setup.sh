@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Installs what the build and the simulator need from Debian, and nothing that is already there.
-# Uses sudo only when not root. Called by every make target; finishes in milliseconds when there is nothing to do.
+# Installs the missing Debian packages for the build and the simulator.
+# Uses sudo only if not root. Called by every make target; finishes in milliseconds if there is nothing to do.
 set -euo pipefail
 
 packages=(gcc libc6-dev libmujoco-dev libegl1 libgl1-mesa-dri)
@@ -11,7 +11,7 @@ if ! command -v cargo >/dev/null; then
 fi
 if ! command -v dpkg-query >/dev/null; then
     echo "setup: this is not Debian; the build needs MuJoCo 2.2.2 (libmujoco.so and headers), EGL and Mesa's software" >&2
-    echo "setup: renderer. Carrying on in the hope that they are installed." >&2
+    echo "setup: renderer. Continuing without checking for them." >&2
     exit 0
 fi
 

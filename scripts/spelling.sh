@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Words of the documents that neither a British dictionary nor docs/site/words.txt knows, with the documents that have them; none is expected.
-# Code, addresses, paths, names with digits and comments are left out. Called by `make lint`. `scripts/spelling.sh FILE …` looks at those files.
+# Lists the words of the documents that are neither in a British dictionary nor in docs/site/words.txt, and fails if there are any.
+# Code, addresses, paths, names with digits and comments are left out. Called by `make lint`. `scripts/spelling.sh FILE …` checks these files.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -17,6 +17,6 @@ for file in "${files[@]}"; do
     [ -z "$words" ] || { echo "$file: $words"; unknown=1; }
 done
 if [ "$unknown" = 1 ]; then
-    echo "spelling: expected words of the dictionary or of docs/site/words.txt, found those above" >&2
+    echo "spelling: expected words of the dictionary or of docs/site/words.txt, found the words above" >&2
     exit 1
 fi

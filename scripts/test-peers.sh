@@ -1,14 +1,14 @@
 #!/usr/bin/env bash
-# Programs of others against ours: libfranka 0.9.2 (panda-python) drives `sdg simulate --fci`; our client drives franka-sim.
+# Tests our programs against other software: libfranka 0.9.2 (panda-python) drives `sdg simulate --fci`; our client drives franka-sim.
 # `make test-peers` runs this; everything is installed below target/peers. test-peers.sh [lockstep|realtime|franka-sim|checks]…
-# or PEERS="lockstep checks" runs these parts alone.
+# or PEERS="lockstep checks" runs only these parts.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
 target=${CARGO_TARGET_DIR:-target}
 peers=$target/peers
 mkdir -p "$peers"
-# franka-sim and panda-python want different versions of numpy: an environment each.
+# franka-sim and panda-python need different versions of numpy, so each has its own environment.
 install() {
     local environment=$peers/$1
     shift
@@ -22,7 +22,7 @@ install v10 pylibfranka==0.21.3
 scripts/build.sh --bin sdg --example hand_checks --example limit_checks --example loop_times
 examples=$target/release/examples
 
-# A real robot's program runs with real-time priority; without the right to it, the numbers in real time are this machine's.
+# A real robot's program runs with real-time priority; without that permission, the real-time numbers depend on this machine's load.
 realtime=
 if chrt -f 30 true 2>/dev/null; then realtime="chrt -f 30"; fi
 echo "== real-time priority: ${realtime:-none}"
@@ -40,7 +40,7 @@ fail() {
 }
 
 server=
-# Python in the background ignores the interrupt that ends ours.
+# Python in the background ignores the interrupt that ends our program.
 stop_server() {
     [ -z "$server" ] || kill "-${1:-INT}" "$server" 2>/dev/null || true
     [ -z "$server" ] || wait "$server" 2>/dev/null || true
@@ -48,7 +48,7 @@ stop_server() {
 }
 trap "stop_server TERM" EXIT
 
-# The last argument is the address: each server has its own, so that none waits for another's ports.
+# The last argument is the address: each server has its own, so none waits for the ports of another server.
 serve() {
     local address=$1
     shift
@@ -89,7 +89,7 @@ in_real_time() {
     cat "$peers/server.log"
 }
 
-# Further arguments are those of franka-sim.
+# Further arguments are passed to franka-sim.
 serve_franka_sim() {
     mkdir -p "$peers/model"
     : >"$peers/franka-sim.log"
@@ -106,7 +106,7 @@ serve_franka_sim() {
 
 over_franka_sim() {
     echo "== our client against franka-sim: limits and communication constraints enforced"
-    # Its hand is always on port 1338, with something of 30 mm between the fingers.
+    # The hand of franka-sim is always on port 1338, with an object of 30 mm between the fingers.
     serve_franka_sim --gripper-object-width 0.03
     "$examples/hand_checks" 127.0.0.1 30 || fail "hand of franka-sim"
     : >"$peers/rates.txt"
@@ -129,7 +129,7 @@ PYTHON
 
 checks_of_franka_sim() {
     echo "== every check of franka-sim, one motion just inside and one just outside"
-    # Poses within the Cartesian limits need joint accelerations beyond an FR3's; to tell the two apart, those may be larger.
+    # Poses within the Cartesian limits need joint accelerations beyond an FR3's; these may be larger here, to test the limits separately.
     serve_franka_sim --no-gripper --joint-discontinuity-scale 3
     $realtime "$examples/limit_checks" 127.0.0.1:11337 fr3 3 || fail "limits of franka-sim"
     stop_server TERM

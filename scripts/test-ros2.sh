@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# ROS 2 of others against ours on loopback: Cyclone DDS (PyPI) and Fast DDS (Debian), with rosbags' bytes.
-# `make test-ros2` runs this; everything is installed below target/ros2. TESTS="pictures latency" runs some only.
+# Tests our ROS 2 code against other implementations on the loopback interface: Cyclone DDS (PyPI), Fast DDS (Debian) and rosbags' bytes.
+# `make test-ros2` runs this; everything is installed below target/ros2. TESTS="pictures latency" runs only these.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -15,7 +15,7 @@ if [ ! -x "$peers/fast_peer" ] || [ "$source/fast_peer.cpp" -nt "$peers/fast_pee
     g++ -O1 -std=c++17 "$source/fast_peer.cpp" -o "$peers/fast_peer" -lfastrtps -lfastcdr
 fi
 
-# The whole workspace with the feature: burn is compiled once more, since some crates below it have other features with it.
+# The whole workspace with the feature: burn is compiled once more, because some of its dependencies then have other features.
 scripts/build.sh --bin sdg --features sdg-cli/ros2 --example cdr_round_trip --example arm_against_peer --example ros2_cell
 examples=$target/release/examples
 

@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# An evaluation on Slurm beside the same on one machine: Debian's slurm-wlm and munge, a controller and two node daemons here, no
-# systemd. A sweep of parts x models S and C x seeds runs as job arrays; meanwhile one node's daemon is killed, one unit is made
-# to fail, and the controller is restarted. The tables must be those of the serial run but for times.
-# Everything lies in target/slurm; the processes end with the script.
+# Compares an evaluation on Slurm with the same evaluation on one machine: Debian's slurm-wlm and munge, a controller and two node
+# daemons on this machine, without systemd. A sweep of parts x models S and C x seeds runs as job arrays; meanwhile one node's daemon is
+# killed, one unit is made to fail, and the controller is restarted. The tables must equal those of the serial run except for times.
+# All files are in target/slurm; the processes end with the script.
 #
-#   PARTS=8 SEEDS=2 STEPS=2     how large the sweep is
+#   PARTS=8 SEEDS=2 STEPS=2     size of the sweep
 #   SDG=target/release/sdg      the program
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -26,7 +26,7 @@ chmod 700 "$work/munge"
 say() { printf '%s %s\n' "$(date +%T)" "$*"; }
 die() { echo "test-slurm: $*" >&2; tail -n 20 "$work"/log/*.log >&2 || true; exit 1; }
 
-# Ends what this script started: the tasks first, then the daemons by the process ids that they wrote down.
+# Ends the processes of this script: first the tasks, then the daemons by the process ids in their files.
 stop() {
     jobs=$(squeue --noheader --format %A 2>/dev/null | sort -u) || jobs=
     if [ -n "$jobs" ]; then
@@ -53,7 +53,7 @@ SlurmUser=root
 SlurmdUser=root
 SlurmctldPort=$port
 AuthType=auth/munge
-# A task that is put back waits for as long as its credential is valid: two minutes unless said otherwise.
+# A requeued task waits as long as its credential is valid: two minutes by default.
 AuthInfo=socket=$work/munge/socket,cred_expire=10
 CredType=cred/munge
 StateSaveLocation=$work/state
@@ -91,7 +91,7 @@ say "Slurm $(slurmd -V | cut -d ' ' -f 2) runs with two nodes"
 
 sweep=(--models "$models" --objects "$list" --attempts 1 --views 1 --scenes 1 --steps "${STEPS:-2}")
 for seed in $seeds; do
-    # One unit cannot write its result: a folder stands in its place, until it has failed.
+    # One unit cannot write its result, because a folder has the result's name until the unit has failed.
     if [ "$seed" = 1 ]; then
         mkdir -p "$work/1/cells/S-${parts[1]}.look.json"
     fi
@@ -101,7 +101,7 @@ done
 began=$(date +%s)
 folders=$(for seed in $seeds; do echo "$work/$seed"; done)
 
-# The state of all folders as one line; the events are brought about meanwhile.
+# Prints the state of all folders in one line, and triggers the events.
 killed= restarted= failed= node2_back=
 while :; do
     sleep 2
@@ -114,7 +114,7 @@ while :; do
         rmdir "$work/1/cells/S-${parts[1]}.look.json"
     fi
     if [ -z "$restarted" ] && [ "$done_units" -ge 3 ]; then
-        # Not by SIGKILL: Slurm 22.05 writes its state every few seconds, and starts a task twice that it forgot.
+        # Not by SIGKILL: Slurm 22.05 writes its state every few seconds, and starts a forgotten task twice.
         controller=$(cat "$work/run/slurmctld.pid")
         say "the controller is ended (process $controller) and started again"
         kill "$controller"
@@ -123,7 +123,7 @@ while :; do
         restarted=yes
     fi
     if [ -z "$killed" ] && [ "$done_units" -ge 5 ]; then
-        # Not before a unit of this node is at work.
+        # Only after a unit of this node has started.
         if grep -l '"host": "n2"' $work/*/units/*/running.json >"$work/at-work" 2>/dev/null; then
             say "the daemon of n2 is killed (process $(cat "$work/run/slurmd-n2.pid")) while at work: $(head -1 "$work/at-work")"
             kill -9 "$(cat "$work/run/slurmd-n2.pid")"

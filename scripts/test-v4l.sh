@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Reads cameras of Video4Linux 2 without a camera and without root: QEMU boots Debian's stock kernel from an initramfs with the
-# test binary of crates/camera/tests/v4l.rs, the driver vivid, and a USB camera that the test itself plays over USB/IP.
+# Tests Video4Linux 2 cameras without a camera and without root: QEMU boots Debian's stock kernel from an initramfs with the test
+# binary of crates/camera/tests/v4l.rs, the driver vivid, and a USB camera that the test itself simulates over USB/IP.
 # Kernel and initramfs stay in target/v4l.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -10,10 +10,10 @@ target=${CARGO_TARGET_DIR:-target}
 work=$target/v4l
 mkdir -p "$work"
 
-# The kernel that Debian has today; an older one that is here already does as well.
+# Debian's current kernel, or an older one that was already downloaded.
 if [ ! -e "$work/kernel/done" ]; then
     package=$(apt-cache depends linux-image-amd64 | sed -n 's/.*Depends: \(linux-image-[0-9][^ ]*-amd64\)$/\1/p' | head -1)
-    [ -n "$package" ] || { echo "test-v4l: apt knows no linux-image-amd64; run apt-get update" >&2; exit 1; }
+    [ -n "$package" ] || { echo "test-v4l: apt has no linux-image-amd64; run apt-get update" >&2; exit 1; }
     rm -rf "$work/kernel" "$work"/*.deb
     (cd "$work" && apt-get download -qq "$package") || { echo "test-v4l: cannot download $package; run apt-get update" >&2; exit 1; }
     dpkg-deb -x "$work"/linux-image-*.deb "$work/kernel"
@@ -32,7 +32,7 @@ rm -rf "$root"
 mkdir -p "$root"/{bin,dev,proc,sys,tmp,modules}
 cp /bin/busybox "$root/bin/"
 cp "$binary" "$root/bin/v4l-test"
-# What the binary is linked against, where it looks for it.
+# The libraries of the binary, at the paths where it searches them.
 ldd "$binary" | grep -o '/[^ ]*' | while read -r library; do
     mkdir -p "$root$(dirname "$library")"
     cp -L "$library" "$root$library"
@@ -54,7 +54,7 @@ mount -t devtmpfs dev /dev
 cd /modules
 while read -r module; do
     parameters=
-    # One node that captures, as a webcam does.
+    # One node that captures, like a webcam.
     [ "$module" != vivid.ko ] || parameters="n_devs=1 node_types=0x1 num_inputs=1 input_types=0x0"
     insmod "$module" $parameters || echo "cannot load $module"
 done <order
@@ -65,8 +65,8 @@ INIT
 chmod +x "$root/init"
 (cd "$root" && find . | cpio --quiet -o -H newc | gzip -1) >"$work/initramfs.gz"
 
-# Not KVM: it is missing or broken where machines run within machines, and the boot takes seconds without it, too.
+# Not KVM, which is missing or broken in virtual machines; without it the boot also takes only seconds.
 timeout 120 qemu-system-x86_64 -accel tcg -m 512 -smp 2 -nographic -no-reboot -nic none -kernel "$work/kernel/boot/vmlinuz-$kernel" \
     -initrd "$work/initramfs.gz" -append "console=ttyS0 quiet panic=-1" </dev/null 2>&1 | tr -d '\r' | tee "$work/log" |
     sed -n '/running [0-9]* test/,$p'
-grep -q '^v4l-test ended with 0$' "$work/log" || { echo "test-v4l: failed; all that the machine printed is in $work/log" >&2; exit 1; }
+grep -q '^v4l-test ended with 0$' "$work/log" || { echo "test-v4l: failed; the virtual machine's output is in $work/log" >&2; exit 1; }

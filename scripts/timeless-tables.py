@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Prints the tables of an evaluation's folder without what differs from run to run: times, and sizes of files with times in them."""
+"""Prints the tables of an evaluation's folder without the values that differ from run to run: times, and sizes of files with times."""
 import json
 import sys
 from pathlib import Path

@@ -21,7 +21,7 @@ CARGO_TARGET_DIR=$build/bindgen env -u RUSTC -u RUSTC_BOOTSTRAP \
 build_module() {
     local folder=$1
     shift
-    # Vectors of 128 bits: every browser has them (Chrome 91, Firefox 89, Safari 16.4); the page tells those that do not.
+    # Vectors of 128 bits: all current browsers have them (from Chrome 91, Firefox 89, Safari 16.4); the page informs users of others.
     RUSTFLAGS="-Ctarget-feature=+simd128" CARGO_TARGET_DIR=$build \
         "$cargo_for_target" rustc --locked --profile web --package sdg-web --lib --crate-type cdylib --target "$target" \
         "${standard_library[@]}" "$@"
@@ -33,10 +33,10 @@ rm -rf "$out.new"
 build_module "$out.new"
 build_module "$out.new/webgpu" --features webgpu
 cp crates/web/page/* "$out.new"
-# Whole or not at all: a page that is open meanwhile never sees half of it.
+# Replaced at once, so an open page never loads half of it.
 rm -rf "$out"
 mv "$out.new" "$out"
 
 compressed() { find "$@" -type f -exec gzip -9 -c {} + | wc -c; }
 echo "$out: $(($(compressed "$out" -maxdepth 1) / 1024)) KiB to download compressed, and $(($(compressed "$out/webgpu") / 1024)) KiB" \
-    "more for who computes on the graphics card; for one, python3 -m http.server --directory $out"
+    "more for the graphics card; to view it: python3 -m http.server --directory $out"

@@ -1,7 +1,7 @@
-//! Writes pictures to look at: `pictures FOLDER [SEED]`.
+//! Writes example pictures: `pictures FOLDER [SEED]`.
 //!
-//! `pretrain-N.png` are pictures that are learnt from, with boxes and the ends of the grasp lines (start red, end green);
-//! `trial-PART-*.png` the photo and pictures of the first parts that weights are compared on.
+//! `pretrain-N.png` are training pictures, with boxes and the ends of the grasp lines (start red, end green);
+//! `trial-PART-*.png` are the photo and pictures of the first parts on which weights are compared.
 
 use std::path::PathBuf;
 

@@ -1,7 +1,8 @@
-//! Photo and picture laid over each other on the tuned sets of a split that have exact truth: what the likeness is trained on besides
-//! generated parts.
+//! Aligned pairs of photo and picture from the tuned sets of a split that have exact ground truth: training data of the
+//! likeness network, in addition to generated parts.
 //!
-//! `rendered_pairs SPLIT SETS OUT`: `train_likeness --rendered OUT` reads the file. A part's index is its place in the split.
+//! `rendered_pairs SPLIT SETS OUT`: `train_likeness --rendered OUT` reads the file. A part's index is its position in
+//! the split.
 
 use std::path::Path;
 
@@ -12,7 +13,7 @@ use sdg_files::write_atomically;
 use sdg_geometry::{PlanarGrasp, PlanarSimilarity};
 use sdg_grasp::fitting::{FitInstance, FitPart, FitPicture, PairFacts, append_pair, likeness_examples};
 
-/// Kinds of pictures in which other things cover the part.
+/// Kind of the pictures in which other objects cover the part.
 const COVERING: &str = "clutter";
 
 fn main() -> Result<()> {
@@ -44,7 +45,8 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// The set as constants and networks are fitted on it: its pictures with the kind of each. `None` without exact truth, which `truth.json` has.
+/// The set's part with its pictures, as the fit reads it, and the kind of each picture. `None` without exact ground
+/// truth (`truth.json`).
 ///
 /// # Errors
 /// A picture that cannot be read.

@@ -44,10 +44,11 @@ class Body:
 
 
 def grasp_ends(body, spec):
-    """Ends (2, 3) of the grasp line in the body's frame, on its upper face.
+    """Ends (2, 3) of the grasp line in the body's frame, on the body's upper face.
 
-    A part of revolution has it on its axis, and `lift` brings it to the upper side. Without `grasp` in the spec the line is a third of the body's length, along x; a part without symmetry gets it
-    at the y nearest to the middle where the body is solid and not low under both ends.
+    A part of revolution has the line on its axis, and `lift` moves it to the upper side. Without `grasp` in the spec the line
+    is a third of the body's length, along x; for a part without symmetry it is at the y nearest to the middle where the
+    body is solid and not low under both ends.
     """
     if spec.get("roll"):
         return np.array([[-body.size[0] / 6, 0, 0], [body.size[0] / 6, 0, 0]])
@@ -69,7 +70,7 @@ def grasp_ends(body, spec):
 
 
 def lift(body, spec):
-    """How far above the axis of a part of revolution its upper side lies, about the grasp line; 0 for other parts."""
+    """Height of the upper side of a part of revolution above its axis, near the grasp line; 0 for other parts."""
     if not spec.get("roll"):
         return 0.0
     near = np.abs(body.v[:, 0]) < body.size[0] / 6
@@ -77,14 +78,14 @@ def lift(body, spec):
 
 
 def rest(angle, x, y):
-    """world_from_body of a body that lies on the table, turned by `angle` degrees."""
+    """world_from_body of a body on the table, rotated by `angle` degrees."""
     m = meshes.rot("z", angle)
     m[:3, 3] = [x, y, 0.06]
     return m
 
 
 def lying(body, angle, roll, x, y):
-    """world_from_body of a part of revolution, rolled by `roll` degrees about its axis, resting on the two places it touches."""
+    """world_from_body of a part of revolution at rest on two contact points, rolled by `roll` degrees about its axis."""
     m = meshes.rot("x", roll)
     side = (body.hull.vertices @ m[:3, :3].T)[:, [0, 2]]
     q = np.array(MultiPoint(side).convex_hull.exterior.coords)

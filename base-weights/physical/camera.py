@@ -21,7 +21,7 @@ class Camera:
     """A perspective camera with radial distortion (coefficient `k1`) that looks at `target` on the table.
 
     `height` mm times `dist` is its distance from the target, `fov` the horizontal field of view in degrees, `tilt` the
-    angle from the vertical, `azimuth` the tilt's direction, `roll` the turn about the optical axis, all in degrees.
+    angle from the vertical, `azimuth` the tilt's direction, `roll` the rotation about the optical axis, all in degrees.
     """
 
     def __init__(self, height, fov, k1, tilt=0.0, azimuth=0.0, dist=1.0, target=(0, 0), roll=0.0):
@@ -65,7 +65,7 @@ class Camera:
         return np.stack([-x, -y, np.ones_like(x)], -1) @ self.world_from_camera[:3, :3].T
 
     def table(self, margin):
-        """Polygon on the table that the camera sees, less a margin in pixels."""
+        """Visible polygon of the table, without a margin in pixels."""
         u = np.array([margin, WIDTH - margin, WIDTH - margin, margin], float)
         v = np.array([margin, margin, HEIGHT - margin, HEIGHT - margin], float)
         d = self.directions(u, v)
@@ -91,7 +91,7 @@ def cast(cam, items, step):
 
 
 def hidden(cam, items, ids, step=2):
-    """For each index: the fractions covered by other items, outside the picture, and not visible in all."""
+    """For each index: the fractions covered by other items, outside the picture, and invisible in total."""
     seen = cast(cam, items, step)
     frame = box(0, 0, WIDTH, HEIGHT)
     out = []

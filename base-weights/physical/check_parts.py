@@ -2,8 +2,8 @@
 
 Usage: check_parts.py GROUP [part,part] [--sheet FILE.png]
 
-Prints sizes, triangles and grasp lines, and how much of the plan view differs between the part and each look-alike
-after the best turn. The sheet shows each part and its look-alikes from above, with the ends of the grasp line.
+Prints sizes, triangles and grasp lines, and the fraction of the plan view that differs between the part and each
+look-alike at the best rotation. The sheet shows each part and its look-alikes from above, with the ends of the grasp line.
 """
 
 import argparse
@@ -63,7 +63,7 @@ def plan(body, cell, mm_per_px):
 
 
 def difference(a, b, picture_a, picture_b):
-    """Smallest share of the two plan views' union that differs in outline, height or colour, over all turns."""
+    """Minimum over all rotations of the fraction of the two plan views' union that differs in outline, height or colour."""
     least = 1.0
     n = a.shape[0]
     for turn in range(0, 360, 3):

@@ -1,8 +1,7 @@
 """Checks rendered sets. Usage: check_sets.py SETS_DIR [--sheets DIR]
 
 Every picture of truth.json exists and can be read, instances lie inside the picture unless optional, the outline of
-demo.json is valid, and as many look-alikes are mirrored as there should be. A sheet shows a set's pictures with
-their truth.
+demo.json is valid, and enough look-alikes are mirrored. A sheet shows a set's pictures with their ground truth.
 """
 
 import argparse
@@ -37,7 +36,7 @@ def draw_truth(picture, entry):
 
 
 def check(folder):
-    """Returns the number of pictures, the faults, and the pictures with their truth drawn."""
+    """Returns the number of pictures, the faults, and the pictures with their ground truth drawn."""
     with open(os.path.join(folder, "truth.json")) as f:
         truth = json.load(f)
     with open(os.path.join(folder, "set.json")) as f:

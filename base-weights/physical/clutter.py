@@ -1,4 +1,4 @@
-"""Loose things that lie about and are never taught. The two groups share none."""
+"""Loose objects that are never taught. No object is in both groups."""
 
 import build123d as b
 
@@ -23,7 +23,7 @@ from meshes import rot, transform
 
 
 def lying(groups):
-    """A thing drawn along z, laid along x."""
+    """An object drawn along z, rotated to lie along x."""
     return transform(groups, rot("y", 90))
 
 

@@ -14,7 +14,7 @@ SIDE = 160  # S
 DEMO, RIGHT, RIVAL, ELSEWHERE = range(4)  # kinds, as in pack_train.py
 TABLE, SELF, OTHER, OUTSIDE = range(4)  # ids, as in pack_train.py
 SAME, DIFFERENT, UNKNOWN = range(3)  # labels of pixels of look-alikes
-HELD_OUT_EVERY = 10  # every tenth part is not trained on
+HELD_OUT_EVERY = 10  # every tenth part is not used for training
 
 
 def expose(x, inside, valid):
@@ -37,13 +37,13 @@ class Rows:
         self.count = torch.from_numpy(count).to(device)  # [P]
 
     def pick(self, p):
-        """A random crop of each part of `p` ([B]); any crop where a part has none."""
+        """A random crop of each part of `p` ([B]); any crop for a part without one."""
         k = (torch.rand(len(p), device=p.device) * self.count[p]).long()
         return self.table[p, k.clamp(max=self.table.shape[1] - 1)]
 
 
 class Crops:
-    """All crops: images [n, 3, S, S], ids and labels [n, S, S], masks [P, S, S] on the device; the rest numpy, [n]."""
+    """All crops: images [n, 3, S, S], ids and labels [n, S, S], masks [P, S, S] on the device; other arrays numpy, [n]."""
 
     def __init__(self, paths, device):
         self.device = device
@@ -57,7 +57,7 @@ class Crops:
             parts += list(z["parts"] + len(masks))
             kinds += list(z["kinds"])
             visible += list(z["visible"])
-            # A look-alike that the program found has the name of its difference alone.
+            # A look-alike that the program found has only the name of its difference.
             what += [str(v).replace("found ", "") for v in z["what"]]
             pictures += list(z["pictures"] + num_pictures)
             num_pictures += z["pictures"].max() + 1
@@ -75,9 +75,9 @@ class Crops:
         return Rows(selected, self.parts, self.num_parts, self.device)
 
     def label_rivals(self):
-        """Labels [n, S, S] of pixels: where a look-alike differs from the part beside it in the same picture.
+        """Labels [n, S, S] of pixels: where a look-alike differs from the part in the same picture.
 
-        A picture shows the part twice: two crops of it show how much light and view alone change.
+        A picture shows the part twice: its two crops show how much light and view change by themselves.
         """
         labels = torch.full((len(self.parts), SIDE, SIDE), UNKNOWN, dtype=torch.uint8, device=self.device)
         rights = {}
@@ -112,7 +112,7 @@ class Crops:
 
 
 def decoded(joined, starts, mode):
-    """The picture files that stand one after the other in `joined`, decoded."""
+    """Decodes the picture files that are concatenated in `joined`."""
 
     def decode(k):
         return cv2.imdecode(joined[starts[k] : starts[k + 1]], mode)

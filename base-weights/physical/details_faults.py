@@ -1,6 +1,6 @@
 """Random changes of pictures on the device: edits of one place, bars across the part, camera faults.
 
-Legend: B pairs, M of them, N = 128 pixels of the side of the network's input. Colours [., 3, N, N] from 0 to 1.
+Legend: B pairs, M of these pairs, N = 128 pixels per side of the network's input. Colours [., 3, N, N] from 0 to 1.
 """
 
 import math
@@ -10,7 +10,7 @@ import torch.nn.functional as F
 
 SIDE = 128  # N
 CELL = 8  # pixels of a cell's side
-EDITS = range(5)  # smoothed, moved from far, again moved from far, moved from near, of another part
+EDITS = range(5)  # smoothed, moved from far (twice as often), moved from near, from another part
 SMOOTHED, NEAR, FOREIGN = 0, 3, 4
 
 
@@ -19,7 +19,7 @@ def uniform(n, device, lo=0.0, hi=1.0):
 
 
 def column(v):
-    """[n] as [n, 1, 1, 1]."""
+    """Reshapes [n] to [n, 1, 1, 1]."""
     return v[:, None, None, None]
 
 
@@ -67,7 +67,7 @@ def smoothed(x):
 
 
 def edit(x, inside):
-    """Changes one place of each picture; returns the pictures and how much each pixel [M, N, N] has changed."""
+    """Changes one place of each picture; returns the pictures and the change of each pixel [M, N, N]."""
     n, device = len(x), x.device
     cx, cy = edit_place(x, inside)
     m = blob(cx, cy, uniform(n, device, 5, 20))[:, None]
@@ -90,7 +90,7 @@ def edit(x, inside):
 
 
 def bar(n, device):
-    """Round bars across the picture: their colours [M, 3, N, N] and where they are [M, N, N]."""
+    """Round bars across the picture: their colours [M, 3, N, N] and their coverage [M, N, N]."""
     yy, xx = pixel_axes(-SIDE / 2, SIDE / 2 - 1, device)
     turn = uniform(n, device, 0, math.pi)
     offset = uniform(n, device, -45, 45)[:, None, None]
@@ -104,7 +104,7 @@ def bar(n, device):
 
 
 def camera(x):
-    """Contrast, exposure, white balance, a slope of light, blur and noise."""
+    """Changes contrast, exposure, white balance and the gradient of light, and adds blur and noise."""
     n, device = len(x), x.device
     y = x.clamp(1e-4, 1)
     y = y ** column(torch.exp(torch.randn(n, device=device) * 0.25))

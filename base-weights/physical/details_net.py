@@ -1,13 +1,13 @@
 """The network of the details, and its export for crates/shape. Usage: details_net.py FILE.pt... OUT.safetensors [--parity]
 
-Writes the weights of train_details.py in half precision, batch norms folded in; of several trainings their mean, which
-works where one began from the other's weights. `--parity` prints the log-odds that the test of
+Writes the weights of train_details.py in half precision, with batch norms folded in; for several trainings their mean,
+which is valid if one started from the weights of the other. `--parity` prints the log-odds that the test of
 crates/shape/src/details/network.rs expects: of two inputs of numbers, with the weights in half and the sums in double
 precision.
 
-Legend: B pairs, N = 128 pixels of the input's side, C = 16 cells a side. The input [B, 8, N, N] is photo RGB, picture
-RGB, in the outline (0 or 1), picture valid (0 or 1). The answer [B] is the log-odds that the picture shows the part;
-those of the cells [B, C, C] are that the two differ there.
+Legend: B pairs, N = 128 pixels per side of the input, C = 16 cells per side. The input [B, 8, N, N] is photo RGB, picture
+RGB, in the outline (0 or 1), picture valid (0 or 1). The answer [B] has the log-odds that the picture shows the part;
+the cells [B, C, C] have the log-odds that photo and picture differ there.
 """
 
 import argparse
@@ -17,7 +17,7 @@ import torch.nn.functional as F
 from torch import nn
 
 CELL = 8  # pixels of a cell's side
-MIN_INSIDE = 0.3  # a cell counts from this share of it on that lies in the outline
+MIN_INSIDE = 0.3  # minimum fraction of a counted cell inside the outline
 TOWER_CHANNELS = (16, 32, 24)
 COMPARED_CHANNELS = (48, 48, 64, 64)
 NUM_HIDDEN = 64
@@ -38,12 +38,12 @@ class ConvNorm(nn.Module):
 
 
 def cells_inside(inside):
-    """Whether cells lie in the outline: [B, N, N] to [B, C, C]."""
+    """Whether cells are in the outline: [B, C, C] from [B, N, N]."""
     return F.avg_pool2d(inside[:, None], CELL)[:, 0] > MIN_INSIDE
 
 
 def pooled(x, cells, inside):
-    """What the answer is made of: mean and maximum of each channel, the largest log-odds and the mean odds of cells."""
+    """Inputs of the answer: mean and maximum of each channel, the largest log-odds and the mean odds of cells."""
     m = cells_inside(inside)
     largest = torch.where(m, cells, torch.full_like(cells, NO_CELL)).flatten(1).amax(1)
     count = m.flatten(1).sum(1).clamp(min=1)
@@ -52,7 +52,7 @@ def pooled(x, cells, inside):
 
 
 class Head(nn.Module):
-    """The answers: of the cells, from the channels before, and of the pair, from the last channels and the cells."""
+    """The answers: of the cells from the previous channels, of the pair from the last channels and the cells."""
 
     def __init__(self, channels, cell_channels):
         super().__init__()
@@ -68,7 +68,7 @@ class Head(nn.Module):
 
 
 class Siam(nn.Module):
-    """Two towers of the same weights, a convolution of their difference, and the head."""
+    """Two towers with the same weights, convolutions of their difference, and the head."""
 
     def __init__(self):
         super().__init__()
@@ -84,7 +84,7 @@ class Siam(nn.Module):
     def forward(self, x):
         """The answer [B] and the cells [B, C, C]."""
         inside, about = x[:, 6], x[:, 6:8]
-        # Photos and pictures in one batch: they share the batch norms.
+        # Photos and pictures are in one batch, so they have the same batch norms.
         both = torch.cat([torch.cat([x[:, 0:3], about], 1), torch.cat([x[:, 3:6], about], 1)])
         a, b = self.tower(both).split(len(x))
         x = self.c2(self.c1(torch.cat([(a - b).abs(), a, b], 1)))

@@ -1,7 +1,7 @@
 """Random pairs of a photo and a picture for the training of the network of the details.
 
-Legend: B pairs, N = 128 pixels of the network's input, C = 16 cells of 8 pixels a side. A pair's transforms take pixels
-of the network's input to those of the crops, both from the middle.
+Legend: B pairs, N = 128 pixels per side of the network's input, C = 16 cells of 8 pixels per side. A pair's transforms
+map pixels of the network's input to pixels of the crops, both relative to the centre.
 """
 
 import math
@@ -15,15 +15,15 @@ import details_crops as crops_
 from details_crops import expose
 from details_faults import CELL, SIDE, bar, camera, column, edit, uniform
 
-# What the picture of a pair shows: the part, a look-alike, the part (it or the photo edited), the part turned or
-# shifted, something else; and how often.
+# Content of a pair's picture: the part, a look-alike, the part (with the picture or the photo edited), the part rotated
+# or shifted, something else; and the fraction of each kind.
 RIGHT, RIVAL, EDITED, TURNED, SHIFTED, ELSE = range(6)
 MIX = (0.40, 0.30, 0.16, 0.04, 0.05, 0.05)
-MIN_INSIDE = 0.3  # a cell counts from this share of it on that lies in the outline
-MIN_CHANGE = 0.05  # mean change from which on an edited cell differs
-MIN_DOUBT = 0.015  # mean change from which on an edited cell is not known to be the same
+MIN_INSIDE = 0.3  # minimum fraction of a counted cell inside the outline
+MIN_CHANGE = 0.05  # minimum mean change of an edited cell that counts as different
+MIN_DOUBT = 0.015  # minimum mean change of an edited cell that does not count as the same
 BAR_SHARE = 0.08  # of right pairs and look-alikes
-THING_SHARE = 0.15  # of right pairs and look-alikes: something else lies on the part
+THING_SHARE = 0.15  # of right pairs and look-alikes: another object covers the part
 COARSE_SHARE = 0.25  # of pairs whose picture is small, half of them with a small photo
 SHADE_SHARE = 0.15  # of pictures with the edge of a shadow
 MAX_RIVAL_COVER = 0.12  # of a look-alike: more may hide the difference
@@ -33,7 +33,7 @@ LARGE_ERROR_SHARE, LARGE_ERROR = 0.25, 2.5  # of poses
 
 @dataclass
 class Batch:
-    """`weight` and `cell_weight` are 0 where the truth is not known; a target of a cell is 1 where it differs."""
+    """`weight` and `cell_weight` are 0 where the ground truth is unknown; the target of a cell is 1 where it differs."""
 
     x: torch.Tensor  # [B, 8, N, N]: photo RGB, picture RGB, in the outline, picture valid
     target: torch.Tensor  # [B], 1: the picture shows the part
@@ -50,14 +50,14 @@ def affine(angle, scale, shear, tx, ty, flip):
 
 
 def sample(x, a, t, mode="bilinear"):
-    """The network's input [B, ., N, N] out of crops [B, ., S, S]; 0 outside."""
+    """The network's input [B, ., N, N] from crops [B, ., S, S]; 0 outside."""
     theta = torch.cat([a * (SIDE / crops_.SIDE), t[:, :, None] / (crops_.SIDE / 2)], 2)
     grid = F.affine_grid(theta, (len(x), 1, SIDE, SIDE), align_corners=False)
     return F.grid_sample(x, grid, mode=mode, padding_mode="zeros", align_corners=False)
 
 
 def sample_numbers(x, a, t):
-    """Whole numbers [B, N, N] out of crops [B, S, S]; -1 outside."""
+    """Integers [B, N, N] from crops [B, S, S]; -1 outside."""
     return sample((x + 1)[:, None].float(), a, t, "nearest")[:, 0] - 1
 
 
@@ -68,12 +68,12 @@ def coarse(x, side):
 
 
 def cell_means(x):
-    """[B, N, N] to [B, C, C]."""
+    """Means over cells: [B, C, C] from [B, N, N]."""
     return F.avg_pool2d(x[:, None], CELL)[:, 0]
 
 
 class Pairs:
-    """Draws batches from the parts that are not held out."""
+    """Samples batches from the parts that are not held out."""
 
     def __init__(self, crops):
         self.crops, self.device = crops, crops.device
@@ -100,7 +100,7 @@ class Pairs:
         demo, clean = self.demo.pick(p), self.clean.pick(p)
         photo = torch.where(self.uniform(n) < 0.5, demo, clean)
         picture = self.right.pick(p)
-        # A photo is not compared with itself: one more try, then the demonstration.
+        # A photo is not compared with itself: sample once more, then use the demonstration.
         picture = torch.where(picture == photo, self.right.pick(p), picture)
         photo = torch.where(picture == photo, demo, photo)
         picture = torch.where(kind == RIVAL, self.rival.pick(p), picture)
@@ -110,7 +110,7 @@ class Pairs:
         return kind, p, photo, torch.where(kind == ELSE, other, picture)
 
     def transforms(self, n, kind):
-        """Transforms of the photos and the pictures: the same turn and flip for both, and an error of the pose."""
+        """Transforms of the photos and the pictures: the same rotation and flip for both, and an error of the pose."""
         turn = torch.randint(4, (n,), device=self.device) * (math.pi / 2) + torch.randn(n, device=self.device) * 0.12
         flip = torch.where(self.uniform(n) < 0.5, -1.0, 1.0)
         none = torch.zeros(n, device=self.device)
@@ -144,7 +144,7 @@ class Pairs:
         return change
 
     def cover_pairs(self, kind, picture):
-        """Lays bars over some right pairs and look-alikes in place; returns where they are [B, N, N]."""
+        """Covers some right pairs and look-alikes with bars, in place; returns the coverage [B, N, N]."""
         cover = torch.zeros_like(picture[:, 0])
         i = ((self.uniform(len(kind)) < BAR_SHARE) & (kind <= RIVAL)).nonzero()[:, 0]
         if len(i):
@@ -154,7 +154,7 @@ class Pairs:
         return cover
 
     def lay_things(self, kind, picture, cover):
-        """Lays other parts on some right pairs and look-alikes in place; adds where they are to `cover`."""
+        """Covers some right pairs and look-alikes with other parts, in place; adds them to `cover`."""
         i = ((self.uniform(len(kind)) < THING_SHARE) & (kind <= RIVAL)).nonzero()[:, 0]
         if not len(i):
             return
@@ -179,7 +179,7 @@ class Pairs:
                 photo[j] = coarse(photo[j], side)
 
     def shade(self, x):
-        """Darkens what lies beyond a line in some pictures, in place."""
+        """Darkens one side of a line in some pictures, in place."""
         i = (self.uniform(len(x)) < SHADE_SHARE).nonzero()[:, 0]
         if len(i):
             m = len(i)
@@ -205,7 +205,7 @@ class Pairs:
         cell_weight = torch.where(in_doubt, torch.zeros_like(cell_weight), cell_weight)
         is_known = (kind == RIGHT) | (is_edited & ~is_weak)
         cell_weight = cell_weight * is_known.float()[:, None, None]
-        # Look-alikes differ beside the outline as well: a longer part, a lug.
+        # Look-alikes also differ outside the outline: a longer part, a lug.
         different = cell_means((labels == crops_.DIFFERENT).float()) > 0.5
         same = cell_means((labels == crops_.SAME).float()) > 0.9
         near = F.max_pool2d(inside[:, None], 13, 1, 6)[:, 0]

@@ -1,6 +1,6 @@
-"""Tools to draw parts with build123d. Lengths in mm, angles in degrees; a part lies as it rests on a table, z up.
+"""Tools to draw parts with build123d. Lengths in mm, angles in degrees; a part is drawn as it rests on a table, z up.
 
-A hole is (x, y, radius); a slot is (x, y, length, width, turn).
+A hole is (x, y, radius); a slot is (x, y, length, width, angle).
 """
 
 import math
@@ -27,7 +27,7 @@ def polygon(*points):
 
 
 def spline(*points):
-    """A closed smooth curve's face."""
+    """The face inside a closed smooth curve."""
     return b.make_face(b.Spline(*points, periodic=True))
 
 
@@ -42,13 +42,13 @@ def rounded(sketch, r):
     for radius in (r, r * 0.6, r * 0.3):
         try:
             return b.fillet(sketch.vertices(), radius)
-        except Exception:  # OpenCASCADE raises several types where a radius does not fit
+        except Exception:  # OpenCASCADE raises several types if a radius does not fit
             continue
     return sketch
 
 
 def edged(solid, d):
-    """Chamfers the upper edges, if they can be."""
+    """Chamfers the upper edges, if possible."""
     try:
         return b.chamfer(solid.edges().group_by(b.Axis.Z)[-1], d)
     except Exception:  # as above
@@ -66,7 +66,7 @@ def plate(sketch, t, holes=(), slots=(), edge=0.25, z=0.0):
 
 
 def block(x, y, z, dx, dy, dz, r=0.0):
-    """A box on its lower face's middle, with vertical edges rounded."""
+    """A box at the centre of its lower face, with rounded vertical edges."""
     solid = b.Pos(x, y, z + dz / 2) * b.Box(dx, dy, dz)
     return b.fillet(solid.edges().filter_by(b.Axis.Z), r) if r else solid
 
@@ -82,7 +82,7 @@ def drill(solid, holes):
 
 
 def profile(points, width, y=0.0):
-    """A polygon in x, z extruded along y, `y` being the middle of its width."""
+    """A polygon in x, z extruded along y; `y` is the centre of its width."""
     face = b.make_face(b.Plane.XZ * b.Polyline(*points, close=True))
     return b.Pos(0, y, 0) * b.extrude(face, width / 2, dir=(0, 1, 0), both=True)
 
@@ -95,7 +95,7 @@ def wire(path, r):
 
 
 def gear_outline(teeth, module, root=1.25, tip=1.0):
-    """Straight-sided teeth, close to involute ones at this size."""
+    """A gear with straight-sided teeth, close to involute ones at this size."""
     pitch = teeth * module / 2
     points = []
     for k in range(teeth):
@@ -112,7 +112,7 @@ def ring_of(count, radius, r, start=0.0):
 
 
 def moved(holes, index, dx, dy):
-    """The holes with one of them moved."""
+    """The holes with one hole moved."""
     return [(h[0] + dx, h[1] + dy, *h[2:]) if i == index else h for i, h in enumerate(holes)]
 
 
@@ -121,7 +121,7 @@ def without(holes, index):
 
 
 def body(*solids):
-    """Joins (solid, material) pairs to one body, its box's middle at x = y = 0, its bottom at z = 0."""
+    """Joins (solid, material) pairs to one body, with the centre of its box at x = y = 0 and its bottom at z = 0."""
     return settle([g for solid, mat in solids for g in cad(solid, mat)])
 
 
@@ -130,7 +130,7 @@ def part(draw, cam, chiral, looks, longer=None, sym=1, grasp=None, table=None):
 
     `draw` makes the part; `cam` is (camera height in mm, horizontal field of view in degrees); `looks` are look-alikes
     (difference, draw); `longer` is the region (x0, x1) that is stretched to make the part 20 % longer; `sym` is the
-    number of turns that look the same; `grasp` is (x0, y0, x1, y1).
+    number of angles at which the part looks the same; `grasp` is (x0, y0, x1, y1).
     """
     looks = list(looks)
     if chiral:

@@ -3,8 +3,8 @@
 A recipe is a dictionary, made by `parts_train.py`; lengths are in mm, angles in degrees, and the part lies on z = 0:
 
     outline   kind, size (x, y) and `numbers`, 6 to 10 random numbers from 0 to 1 that shape the outline of the kind
-    thick     height in z; a bent part takes its own from its numbers
-    rise      factor of the heights of ribs, bosses, fins and bends
+    thick     height in z; the thickness of a bent part comes from its numbers
+    rise      factor on the heights of ribs, bosses, fins and bends
     edge      size of the chamfer at the upper edges, 0 to 1
     mat       material (materials.py)
     features  list of dictionaries: type, x, y, lengths a and b, turn, deep (0 to 1), possibly mat
@@ -52,7 +52,7 @@ def link_outline(n, lx, ly):
 
 
 def disc_outline(n, lx, ly):
-    """A disc, possibly with a bar at its right and a notch below."""
+    """A disc, possibly with a bar on the right and a notch below."""
     s = disc(0, 0, ly / 2)
     if n[0] > 0.4:
         s = s + bar(ly / 2, 0, ly * (0.3 + 0.5 * n[1]), ly * (0.2 + 0.3 * n[2]))
@@ -107,7 +107,7 @@ def outline(r):
 
 
 def bent(r):
-    """A bent sheet (one or two bends) with its notches, and the sheet's thickness."""
+    """A bent sheet (one or two bends) with its notches, and the thickness of the sheet."""
     lx, ly = r["outline"]["size"]
     n = r["outline"]["numbers"]
     up = (4 + 14 * n[0]) * r["rise"]
@@ -151,7 +151,7 @@ def draw_print(name, r):
 
 
 def carve_and_raise(r, solid, t):
-    """The solid with pockets and sinks, and the ribs and bosses on it as (solid, material); `t` is its thickness."""
+    """The solid with pockets and sinks, and its ribs and bosses as (solid, material); `t` is the solid's thickness."""
     raised = []
     for f in r["features"]:
         x, y, a, c = f["x"], f["y"], f["a"], f["b"]
@@ -177,7 +177,7 @@ def carve_and_raise(r, solid, t):
 
 
 def through_cut(f):
-    """What a hole or slot takes away."""
+    """The solid that a hole or slot removes."""
     if f["type"] == "hole":
         return post(f["x"], f["y"], -1, f["a"] / 2, THROUGH)
     s = slot(f["x"], f["y"], max(f["a"], f["b"] * 1.3), f["b"], f["turn"])
@@ -206,7 +206,7 @@ def build(r, name):
     if not is_bent:
         try:
             solid = b.chamfer(solid.edges().group_by(b.Axis.Z)[-1], 0.25 + 0.3 * r["edge"])
-        except Exception:  # OpenCASCADE raises several types where a chamfer does not fit
+        except Exception:  # OpenCASCADE raises several types if a chamfer does not fit
             pass
     groups = []
     for s, m in [(solid, r["mat"]), *extra]:

@@ -1,9 +1,9 @@
-"""Fits what a close look adds to the score, on candidates with truth. Usage: fit_score.py RECORDS.jsonl ...
+"""Fits the score's terms of the close comparison, on candidates with ground truth. Usage: fit_score.py RECORDS.jsonl ...
 
 `sdg evaluate --split FILE --sets DIR --tuned --records RECORDS.jsonl` writes the records. A logistic regression combines
-the sum of the bounded terms with the five terms of the close look; each set has the same weight, and so have its right
-and its wrong poses. What is printed was fitted without the set that is judged; the last line is the fit on all sets.
-Look-alikes other than mirror images are judged, but not fitted on: no term tells them yet.
+the sum of the bounded terms with the five terms of the close comparison; each set has the same weight, and so have its
+right and its wrong poses. Each printed line is fitted without the set that it judges; the last line is the fit on all
+sets. Look-alikes other than mirror images are judged but not used for fitting, because no term recognises them yet.
 
 Needs numpy and scikit-learn.
 """
@@ -18,7 +18,7 @@ CLOSE = ["table", "rim", "added", "mirror", "details"]
 
 
 def read(paths):
-    """Per candidate: its set, whether it is right, its kind, and the values of the regression."""
+    """For each candidate: its set, whether it is right, its kind, and the values of the regression."""
     for path in paths:
         with open(path) as lines:
             for record in map(json.loads, lines):

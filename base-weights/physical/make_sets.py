@@ -1,8 +1,8 @@
-"""Renders sets of pictures of parts, with exact truth. Usage:
+"""Renders sets of pictures of parts, with exact ground truth. Usage:
 
     make_sets.py GROUP OUT_DIR [--sets a,b] [--only demo,plain_0,...] [--spp 10] [--resume]
 
-GROUP is `tune`, `roll` or `untuned`. The list of parts and the group's seed decide everything that is drawn.
+GROUP is `tune`, `roll` or `untuned`. The list of parts and the group's seed determine everything.
 """
 
 import argparse
@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 from shapely.geometry import Polygon
 
-import camera  # noqa: F401 (sets Mitsuba's variant: before everything else that uses Mitsuba)
+import camera  # noqa: F401 (sets Mitsuba's variant; must precede everything that uses Mitsuba)
 import clutter
 import materials
 import parts_roll
@@ -31,7 +31,7 @@ from scene import SLOTS, Scene, make_light, stream
 
 MAX_OUTLINE_POINTS = 60
 MAX_COVERED = 0.25  # of a part, by clutter
-OPTIONAL_HIDDEN = 0.4  # an instance of which more than this is not visible counts as optional
+OPTIONAL_HIDDEN = 0.4  # an instance is optional if more than this fraction of it is invisible
 
 
 @dataclass
@@ -71,7 +71,7 @@ GROUPS = dict(
 
 
 def choose_table(rng, body):
-    """A plain table that the part stands out from."""
+    """A plain table that contrasts with the part."""
     area = {}
     for g in body.groups:
         a, b, c = (g["v"][g["f"][:, k]] for k in range(3))
@@ -97,7 +97,7 @@ def outline(mask):
         if len(poly) <= MAX_OUTLINE_POINTS and Polygon(poly).is_valid:
             return poly
         if len(poly) < 24:
-            break  # the simplified outline crosses itself: simplify with its topology kept
+            break  # the simplified outline crosses itself: simplify with preserved topology
         tolerance *= 1.15
     g = Polygon(contour[:, 0].astype(float) + 0.5).buffer(0)
     g = max(g.geoms, key=lambda q: q.area) if hasattr(g, "geoms") else g
@@ -113,7 +113,7 @@ def write_json(path, value):
 
 
 class Setting:
-    """What a picture's kind decides: camera, light, table, number of instances."""
+    """The settings that depend on a picture's kind: camera, light, table, number of instances."""
 
     def __init__(self, cam, ground):
         self.cam, self.ground = cam, ground
@@ -124,7 +124,7 @@ class Setting:
 
 
 class SetMaker:
-    """Renders one part's set. `index` is the part's number in its group: it shifts the variants of the kinds."""
+    """Renders one part's set. `index` is the part's number in its group; it shifts the variants of the kinds."""
 
     scene_type = Scene
 
@@ -169,9 +169,9 @@ class SetMaker:
         )
 
     def place(self, rng, cam, body, taken=(), where=None, touch=0.0):
-        """A pose inside the picture, apart from the footprints `taken`; (None, None) if there is none.
+        """A pose inside the picture that does not overlap the footprints `taken`; (None, None) if there is none.
 
-        With the probability `touch` a body may almost touch another.
+        With the probability `touch` the body may almost touch another one.
         """
         x0, y0, x1, y1 = cam.table(26).bounds
         for attempt in range(400):
@@ -220,7 +220,7 @@ class SetMaker:
         )
 
     def instance(self, cam, m, hid=(0.0, 0.0, 0.0)):
-        """The truth of one instance: its grasp line's ends through the true camera."""
+        """The ground truth of one instance: its grasp line's ends through the true camera."""
         ends = self.ends(m)
         p = cam.project(ends)
         scale = cam.f / cam.depth(ends.mean(0)) / self.demo_scale
@@ -338,7 +338,7 @@ class SetMaker:
         return cam.target[0] + r * math.cos(a), cam.target[1] + 0.8 * r * math.sin(a)
 
     def look_alike(self, k):
-        """Every second one is the mirror image where the part is chiral."""
+        """A look-alike; every second one is the mirror image if the part is chiral."""
         mirrored = [x for x in self.looks if x[0] == "mirror image"]
         rest_ = [x for x in self.looks if x[0] != "mirror image"]
         if mirrored and k % 2 == 0:
@@ -346,7 +346,7 @@ class SetMaker:
         return rest_[((k // 2 if mirrored else k) + self.index) % len(rest_)]
 
     def loose_things(self, rng, kind, variant, cam, items):
-        """Things around the items that cover at most MAX_COVERED of each, if seven attempts find such."""
+        """Objects around the items that cover at most MAX_COVERED of each, if seven attempts find such objects."""
         count = {"clutter": int(rng.integers(8, 17)), "several": 2, "neg_other": [1, 4, 9, 12][variant]}[kind]
         area = cam.table(0).area
         small = self.pool + [b for b in self.others if max(b.size[:2]) < 75]
@@ -419,8 +419,8 @@ def main():
     args.add_argument("group", choices=GROUPS)
     args.add_argument("out")
     args.add_argument("--sets", help="names of parts, separated by commas (default: all)")
-    args.add_argument("--only", help="demo, plain_0, ...: these pictures alone, without truth.json")
-    args.add_argument("--spp", type=int, default=10, help="samples a pixel")
+    args.add_argument("--only", help="demo, plain_0, ...: only these pictures, without truth.json")
+    args.add_argument("--spp", type=int, default=10, help="samples per pixel")
     args.add_argument("--resume", action="store_true", help="keep pictures that exist")
     args = args.parse_args()
     group = GROUPS[args.group]

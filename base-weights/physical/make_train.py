@@ -1,13 +1,13 @@
-"""Renders pictures of random parts and their look-alikes for the training of the comparer of details. Usage:
+"""Renders pictures of random parts and their look-alikes for training the details network. Usage:
 
     make_train.py OUT FIRST LAST [--pictures 6] [--spp 8]
 
 Part N of FIRST to LAST - 1 gets the folder OUT/r_N with `demo.jpg`, `demo.json` and `set.json` (as `make_sets.py`
-writes them), pictures `mixed_K.jpg` that show the part and its look-alikes apart from each other, `ids_K.png` (the
-thing at each pixel: 0 the table, k + 1 the k-th thing) and `pairs.json`: for each thing in a picture the ends of the
-grasp line, in pixels, where the part would be laid on it, at the turn and place at which the two look most alike from
-above, and its difference from the part (null: it is the part). A part whose folder has `pairs.json` is not rendered
-again. The number decides the part; from 1000 on parts are tall.
+writes them), pictures `mixed_K.jpg` that show the part and its look-alikes separately, `ids_K.png` (the object at each
+pixel: 0 the table, k + 1 the k-th object) and `pairs.json`: for each object in a picture the ends of the grasp line, in
+pixels, of the part aligned with the object (at the angle and position at which the two look most alike from above), and
+the object's difference from the part (null: it is the part). A part whose folder has `pairs.json` is not rendered
+again. The number determines the part; parts from number 1000 are tall.
 """
 
 import argparse
@@ -18,7 +18,7 @@ import time
 import cv2
 import numpy as np
 
-import camera  # noqa: F401 (sets Mitsuba's variant: before everything else that uses Mitsuba)
+import camera  # noqa: F401 (sets Mitsuba's variant; must precede everything that uses Mitsuba)
 import clutter
 import parts_train
 import photo
@@ -37,17 +37,17 @@ SEED = "train 2026-1"
 STYLES = ["soft", "plain", "plain", "sun", "lamp", "glare", "dark", "colour"]
 TALL_FROM = 1000  # parts from this number on are tall
 NUM_CHANGED = 7  # look-alikes with one thing changed
-MIN_LOOKS = 4  # look-alikes that differ enough: a part with fewer is drawn anew
+MIN_LOOKS = 4  # look-alikes that differ enough; a part with fewer is replaced by a new one
 MAX_ATTEMPTS = 20
 MIN_PLAN_PIXELS = 900  # area of the part in its plan view
-MIN_TURNED_SHARE = 0.035  # a part that differs less from itself at another turn has no certain pose
-MIN_RIVAL_SHARE = 0.008  # a look-alike that differs less cannot be told apart from above
+MIN_TURNED_SHARE = 0.035  # a part that differs less from itself at another angle has an ambiguous pose
+MIN_RIVAL_SHARE = 0.008  # a look-alike that differs less cannot be distinguished from above
 MIRROR_TURNS = range(0, 360, 4)
 CHANGED_TURNS = range(-6, 7, 2)
 
 
 def limit_lamps():
-    """Leaves 15 of the 28 lamps: Dr.Jit compiles its kernels for each."""
+    """Keeps 15 of the 28 lamps, because Dr.Jit compiles its kernels for each."""
     scene.SIDE_LAMPS = scene.SIDE_LAMPS[:12]
     scene.OVERHEAD_LAMPS = scene.OVERHEAD_LAMPS[:3]
 
@@ -57,12 +57,12 @@ def material_names(items):
 
 
 class TrainMaker(SetMaker):
-    """Draws and renders one random part with its look-alikes."""
+    """Generates and renders one random part with its look-alikes."""
 
     scene_type = quotas.QuotaScene
 
     def __init__(self, number, root, spp, pictures):
-        # Not the parent's: that takes its part from a list.
+        # The parent's initialiser is not called, because it takes its part from a list.
         self.group = Group("train", {}, clutter.TUNE, SEED, {})
         self.name, self.spp, self.only, self.resume = f"r_{number:04d}", spp, None, True
         self.index, self.count = number, pictures
@@ -85,7 +85,7 @@ class TrainMaker(SetMaker):
         self.diag_px = self.demo_scale = None
 
     def draw_part(self, number):
-        """Draws parts until one has a certain pose and enough look-alikes; returns the random generator it left."""
+        """Generates parts until one has an unambiguous pose and enough look-alikes; returns the random generator."""
         for attempt in range(MAX_ATTEMPTS):
             rng = stream(SEED, number, attempt)
             r = parts_train.recipe(rng, number >= TALL_FROM)
@@ -101,12 +101,12 @@ class TrainMaker(SetMaker):
                 self.looks = self.rivals(rng, r, name)
                 if len(self.looks) >= MIN_LOOKS:
                     return rng
-            except Exception as e:  # OpenCASCADE raises several types where a drawing is impossible
+            except Exception as e:  # OpenCASCADE raises several types if a drawing is impossible
                 print(f"{name}: {e!r}", flush=True)
         raise SystemExit(f"{self.name}: no attempt gave a part")
 
     def rivals(self, rng, r, name):
-        """(difference, body, part's pose on the rival); those that cannot be told apart from above are left out."""
+        """(difference, body, part's pose on it) of the look-alikes that can be distinguished from above."""
         out = []
         for k, (what, make) in enumerate(parts_train.looks(rng, r, name, NUM_CHANGED)):
             try:
@@ -136,14 +136,14 @@ class TrainMaker(SetMaker):
         return s
 
     def choose_things(self, rng, k):
-        """(difference or None, body, part's pose on it): the part twice and three look-alikes."""
+        """Objects of a picture as (difference or None, body, part's pose on it): the part twice and three look-alikes."""
         chosen = list(rng.permutation(len(self.looks))[:3])
         if k % 2 == 0 and 0 not in chosen and self.looks[0][0] == "mirror image":
             chosen[0] = 0
         return [(None, self.body, np.eye(4))] * 2 + [self.looks[c] for c in chosen]
 
     def add_clutter(self, rng, cam, items):
-        """Items with loose things scattered among them, as far as the scene has slots for their materials."""
+        """The items with loose objects scattered among them, as far as the scene has slots for their materials."""
         small = [b for b in self.pool if max(b.size[:2]) < 45] or self.pool
         out = items + scatter(rng, cam, items, small, 6, 3)
         while not quotas.fits(material_names(out)) and len(out) > len(items):
@@ -188,8 +188,8 @@ def main():
     args.add_argument("out")
     args.add_argument("first", type=int)
     args.add_argument("last", type=int)
-    args.add_argument("--pictures", type=int, default=6, help="pictures a part")
-    args.add_argument("--spp", type=int, default=8, help="samples a pixel")
+    args.add_argument("--pictures", type=int, default=6, help="pictures per part")
+    args.add_argument("--spp", type=int, default=8, help="samples per pixel")
     args = args.parse_args()
     limit_lamps()
     for number in range(args.first, args.last):

@@ -4,8 +4,8 @@ A material's name is one of `NAMES`, or `KIND:R,G,B` with an sRGB colour from 0 
 plastic, rubber, board (solder mask), metal, glass, blank (an empty print, grey by R); or `print:NAME`, a picture drawn
 by `prints.py`.
 
-Numbers that differ between materials are pictures of one size, not numbers in the dictionary: so Dr.Jit compiles its
-kernels once for all scenes.
+Numbers that differ between materials are stored in pictures of one size instead of the dictionary, so Dr.Jit compiles
+its kernels once for all scenes.
 """
 
 import os
@@ -17,7 +17,7 @@ from PIL import Image, ImageDraw
 import meshes
 from surfaces import noise
 
-# A scene has at least one of each: a scene with another set of BSDF types is compiled anew.
+# A scene has at least one of each, because a scene with another set of BSDF types needs a new compilation.
 FILLER = "plastic:0.1,0.1,0.1"
 ONE_OF_EACH_TYPE = ("zinc", "blackox", FILLER, "paint:0.4,0.4,0.4", "blank")
 
@@ -54,7 +54,7 @@ def bitmap(a, raw=False, wrap="repeat"):
 
 
 class Painter:
-    """Makes the BSDFs of one set; `rng` belongs to the set and the material, so a part keeps its surface."""
+    """Makes the BSDFs of one set; `rng` depends on the set and the material, so a part keeps its surface."""
 
     def __init__(self, rng):
         self.rng = rng
@@ -164,7 +164,7 @@ def material(name, rng):
 
 
 def lightness(name):
-    """About how light a material is, 0 to 1: the table is chosen by it."""
+    """Approximate lightness of a material, 0 to 1; the choice of the table depends on it."""
     if ":" in name and not name.startswith("print:"):
         c = linear([float(x) for x in name.split(":")[1].split(",")])
         return float(np.dot(c, (0.25, 0.65, 0.1))) ** (1 / 2.2)

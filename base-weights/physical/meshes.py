@@ -3,7 +3,7 @@
 A body is a list of groups, one per material. A group is a dict:
 
   v    (N, 3)  vertices in mm          n    (N, 3)  unit normals, smooth inside a CAD face, sharp between faces
-  f    (M, 3)  triangles               uv   (N, 2)  texture coordinates, 50 mm a tile
+  f    (M, 3)  triangles               uv   (N, 2)  texture coordinates, 50 mm per tile
   mat          name of a material in `materials.py`
 """
 
@@ -88,7 +88,7 @@ def verts(groups):
 
 
 def settle(groups):
-    """Moves the bounding box's middle to x = y = 0 and its bottom to z = 0."""
+    """Moves the centre of the bounding box to x = y = 0 and its bottom to z = 0."""
     v = verts(groups)
     lo, hi = v.min(0), v.max(0)
     m = np.eye(4)
@@ -97,12 +97,12 @@ def settle(groups):
 
 
 def mirror(groups):
-    """The mirror image, as the part looks turned over if it is flat."""
+    """The mirror image; for a flat part, the view of its lower side."""
     return settle(transform(groups, scale(1, -1, 1)))
 
 
 def lengthen(groups, x0, x1, factor=1.2):
-    """Makes a body longer by stretching only the region x0 < x < x1: what lies outside keeps its shape."""
+    """Makes a body longer by stretching only the region x0 < x < x1; the rest keeps its shape."""
     x = verts(groups)[:, 0]
     add = (factor - 1) * (x.max() - x.min())
 

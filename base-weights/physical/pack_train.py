@@ -1,15 +1,15 @@
-"""Cuts the things in the rendered pictures out in the frame of the part's photo. Usage: pack_train.py RENDERED OUT.npz
+"""Crops the objects of the rendered pictures in the frame of the part's photo. Usage: pack_train.py RENDERED OUT.npz
 
-RENDERED has the folders of make_train.py. The frame is the comparer's (128 pixels, the part 128 / 1.2 long) with 16
-pixels of margin on each side, for random shifts. A crop is the picture where the part would be laid on a thing: at the
-pose that is known from the rendering, and at those that the program found (search_train.py). The file's arrays, one row
-a crop:
+RENDERED has the folders of make_train.py. The frame is that of the network's input (128 pixels, the part 128 / 1.2
+long) with a margin of 16 pixels on each side, for random shifts. A crop shows the picture at a pose of the part on an
+object: the pose known from the rendering, and the poses that the program found (search_train.py). The file's arrays,
+one row per crop:
 
-    images, images_at   WebP files one after the other, and where each begins; ids, ids_at: PNG files likewise
-                        (of a pixel: 0 the table, 1 the thing itself, 2 another thing, 3 outside the picture)
+    images, images_at   concatenated WebP files, and the start of each; ids, ids_at: the same for PNG files
+                        (of a pixel: 0 the table, 1 the object itself, 2 another object, 3 outside the picture)
     parts               number of the part, a row of `masks` (bits of the frame in the part's outline) and `names`
-    kinds               0 the demonstration, 1 the part, 2 a look-alike, 3 elsewhere or turned
-    visible, what       visible share of the thing; the difference of a look-alike ("found " before it: by the program)
+    kinds               0 the demonstration, 1 the part, 2 a look-alike, 3 elsewhere or rotated
+    visible, what       visible fraction of the object; the difference of a look-alike (after "found " if by the program)
     pictures            number of the picture
 """
 
@@ -25,7 +25,7 @@ SIDE, PART_SIDE = 160, 128 / 1.2
 DEMO, RIGHT, RIVAL, ELSEWHERE = range(4)  # kinds
 TABLE, SELF, OTHER, OUTSIDE = range(4)  # ids
 WEBP_QUALITY = 88
-# A found pose belongs to a thing that is NEAR (distance as a share of the diagonal), and is elsewhere if no thing
+# A found pose belongs to an object that is NEAR (distance as a fraction of the diagonal), and is elsewhere if no object
 # is within FAR.
 NEAR, NEAR_TURN_DEG = 0.05, 8
 FAR, FAR_TURN_DEG = 0.15, 17
@@ -36,7 +36,7 @@ def complex_points(points):
 
 
 def similarity(a, b):
-    """The similarity, as a 2 x 3 matrix, that takes the two points `a` to `b`."""
+    """The similarity, as a 2 x 3 matrix, that maps the two points `a` to `b`."""
     a, b = complex_points(a), complex_points(b)
     m = (b[1] - b[0]) / (a[1] - a[0])
     t = b[0] - m * a[0]
@@ -44,7 +44,7 @@ def similarity(a, b):
 
 
 class Frame:
-    """The square of a photo about the part's outline: its `centre` in the photo and pixels of the photo a `step`."""
+    """The square of a photo around the part's outline: its `centre` in the photo, and `step`, photo pixels per pixel."""
 
     def __init__(self, outline):
         lo, hi = outline.min(0), outline.max(0)
@@ -56,10 +56,10 @@ class Frame:
         cv2.fillPoly(self.inside, [np.round(corners * 16).astype(int)], 1, shift=4)
 
     def matrix(self, image_from_photo, step):
-        """Takes pixels of the frame, each `step` pixels of the photo, to those of the image."""
+        """Maps pixels of the frame, each `step` pixels of the photo, to pixels of the image."""
         corner = self.centre - self.step * SIDE / 2
         m = image_from_photo @ np.array([[step, 0, corner[0]], [0, step, corner[1]], [0, 0, 1]])
-        m[:, 2] += m[:, :2] @ [0.5, 0.5] - 0.5  # pixel middles lie at .5, those of OpenCV at whole numbers
+        m[:, 2] += m[:, :2] @ [0.5, 0.5] - 0.5  # pixel centres are at .5, in OpenCV at integers
         return m
 
     def cut(self, image, image_from_photo):
@@ -70,7 +70,7 @@ class Frame:
         return cv2.resize(large, (SIDE, SIDE), interpolation=cv2.INTER_AREA)
 
     def cut_ids(self, ids, image_from_photo, own_id):
-        """The frame's pixels of what is seen at each pixel: TABLE, SELF, OTHER, OUTSIDE."""
+        """The id at each pixel of the frame: TABLE, SELF, OTHER, OUTSIDE."""
         k = cv2.warpAffine(
             ids,
             self.matrix(image_from_photo, self.step),
@@ -83,7 +83,7 @@ class Frame:
 
 
 def found_things(folder, picture, diagonal):
-    """(ends of the grasp line, kind, nearest thing) of what the program found in a picture."""
+    """The program's detections in a picture as (ends of the grasp line, kind, nearest object)."""
     path = os.path.join(folder, "found.jsonl")
     if not os.path.exists(path):
         return

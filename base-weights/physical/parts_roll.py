@@ -1,8 +1,8 @@
-"""Parts of revolution, of the group `roll`: they rest on the table at any angle about their axis. Choices of the program may depend on
-them.
+"""Parts of revolution, the group `roll`: they rest on the table at any angle about their axis. Choices of the program may
+depend on them.
 
-A part is turned on a lathe: sections along x, each with a radius as a function of the place along the axis and the angle about
-it, which gives threads their helix and heads their hexagon. The axis is y = z = 0.
+A part is made on a lathe: sections along x, each with a radius as a function of the position along the axis and the
+angle about it, which gives threads their helix and heads their hexagon. The axis is y = z = 0.
 """
 
 import numpy as np
@@ -29,7 +29,7 @@ def hexagon(across_flats):
 
 
 def thread(radius, pitch, depth, starts=1, left=False, flat=0.1):
-    """A thread with straight flanks; `flat` is the share of the pitch that crest and root take each."""
+    """A thread with straight flanks; `flat` is the fraction of the pitch for the crest, and for the root."""
 
     def at(x, angle, share):
         phase = (x / pitch - starts * (-1 if left else 1) * angle / (2 * np.pi)) % 1.0
@@ -49,7 +49,7 @@ def rings(radius, pitch, depth):
 
 
 def lathe(*sections):
-    """Sections (length, radius function, material) one after the other along x, closed by rings and discs."""
+    """Sections (length, radius function, material) in sequence along x, closed by rings and discs."""
     groups, x = {}, 0.0
     angle = np.linspace(0, 2 * np.pi, ANGLES, endpoint=False)
     ends = np.zeros(ANGLES)

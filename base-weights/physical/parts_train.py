@@ -1,4 +1,4 @@
-"""Random parts of the group `train`: the comparer of details is trained on them, and nothing is measured on them.
+"""Random parts of the group `train`, which are used only for training the details network.
 
 A part is a recipe (drawings_train.py), a dictionary of an outline and a list of features; a look-alike is the same
 recipe with one thing changed, so the difference is known, and a new seed is a new part.
@@ -28,7 +28,7 @@ METALS = [
     "galv",
 ]
 COATINGS = ["plastic", "paint", "rubber", "board"]
-# Repeated names are drawn more often.
+# Repeated names are chosen more often.
 OUTLINES = ["polygon", "polygon", "spline", "link", "disc", "tool", "ell", "ell", "rect", "rect", "rect", "bent"]
 FEATURES = ["hole"] * 4 + ["slot", "pocket", "sink", "rib", "boss", "lug", "notch"]
 TALL_FEATURES = FEATURES + ["fins", "boss", "rib"]
@@ -44,7 +44,7 @@ def draw(rng, names):
 
 
 def colour(rng, lo=0.03, hi=0.9):
-    """An sRGB colour as materials.py reads it."""
+    """An sRGB colour in the form that materials.py reads."""
     return ",".join(f"{v:.2f}" for v in rng.uniform(lo, hi, 3) ** 1.3)
 
 
@@ -111,7 +111,7 @@ def element(rng, w, h):
 
 
 def tile(rng, w, h):
-    """Pips in two halves, as on dominoes, or in a grid."""
+    """Dots in two halves, as on dominoes, or in a grid."""
     out = []
     if rng.random() < 0.5:
         places = [(a, c) for a in (-1, 0, 1) for c in (-1, 0, 1)]
@@ -154,7 +154,7 @@ def printed_face(rng, lx, ly):
 
 
 def heights(rng, ly, is_tall):
-    """Thickness of a part in mm, and the factor of what is raised on it. Tall parts show their sides to the camera."""
+    """Thickness of a part in mm, and the factor on raised features. The sides of tall parts are visible to the camera."""
     thin = float(rng.choice([1.5, 2.5, 4, 6, 9]) * rng.uniform(0.8, 1.2))
     if not is_tall:
         return thin, 1.0
@@ -217,7 +217,7 @@ def change_print(rng, q):
 
 
 def changed(rng, r):
-    """A recipe with one thing changed, and the difference in words."""
+    """A recipe with one change, and the difference in words."""
     q = copy.deepcopy(r)
     if q.get("print") and rng.random() < 0.7:
         what = change_print(rng, q)
@@ -243,7 +243,7 @@ def changed(rng, r):
 
 
 def looks(rng, r, name, count):
-    """Look-alikes (difference, draw): the mirror image, one longer, and `count` with one thing changed."""
+    """Look-alikes (difference, draw): the mirror image, a longer part, and `count` parts with one change."""
     out = [("mirror image", lambda: mirror(build(r, name)))]
     lx = r["outline"]["size"][0]
     x = float(rng.uniform(-0.25, 0.15) * lx)

@@ -1,4 +1,4 @@
-"""Parts of the group `untuned`: reported only, nothing is chosen by them."""
+"""Parts of the group `untuned`, which are only reported: no choice depends on them."""
 
 import drawings_untuned as d
 from drawing import moved, part, ring_of, without

@@ -1,4 +1,4 @@
-"""What a phone or webcam does to the picture: distortion, vignetting, exposure, white balance, blur, noise, tone curve,
+"""Effects of a phone or webcam on the picture: distortion, vignetting, exposure, white balance, blur, noise, tone curve,
 sharpening, JPEG."""
 
 from dataclasses import dataclass
@@ -32,14 +32,14 @@ class Faults:
         )
 
 
-MAX_ITEM_LUMINANCE = 0.65  # of the 60th percentile over the things on the table, 1 being the sensor's limit
+MAX_ITEM_LUMINANCE = 0.65  # of the 60th percentile over the objects on the table; 1 is the sensor's limit
 
 
 def develop(rng, cam, x, faults, ground, things, coloured_light=False, exposure=None, noise_gain=1.0):
     """8-bit RGB (HEIGHT, WIDTH, 3) of a rendered picture.
 
-    `exposure` is its mean; without it the mean follows from the table, but is lower where the things on the table,
-    where the mask `things` is true, would be overexposed.
+    `exposure` is the picture's mean; without it the mean follows from the table, but is lower if the objects on the
+    table (the mask `things`) would be overexposed.
     """
     u, v = np.meshgrid(np.arange(WIDTH) + 0.5, np.arange(HEIGHT) + 0.5)
     xn, yn = (u - WIDTH / 2) / cam.f, (v - HEIGHT / 2) / cam.f

@@ -1,7 +1,7 @@
-"""Plan views of bodies, and where a part covers a look-alike best.
+"""Plan views of bodies, and the pose at which a part covers a look-alike best.
 
-A plan view is a pair (height, value) of CELL x CELL pictures from straight above, its middle at the body's origin, its
-rows towards -y: height over the table in mm (0: the table) and lightness of the material or print, 0 to 1.
+A plan view is a pair (height, value) of CELL x CELL pictures from straight above, with the body's origin at the centre
+and rows towards -y: height above the table in mm (0: the table) and lightness of the material or print, 0 to 1.
 """
 
 import cv2
@@ -11,14 +11,14 @@ from trimesh.ray.ray_pyembree import RayMeshIntersector
 
 import materials
 
-CELL = 160  # pixels of a plan view's side
-MIN_STEP_MM = 0.8  # a smaller difference in height is not seen
-MIN_VALUE_STEP = 0.15  # a smaller difference in lightness is not seen
-EDGE_WEIGHT = 0.6  # of equal edges against equal area
+CELL = 160  # pixels per side of a plan view
+MIN_STEP_MM = 0.8  # a smaller difference in height is invisible
+MIN_VALUE_STEP = 0.15  # a smaller difference in lightness is invisible
+EDGE_WEIGHT = 0.6  # weight of equal edges relative to equal area
 
 
 def print_values(group, faces, points):
-    """Lightness of a printed group at points (x, y) on its faces (indices into the group's own)."""
+    """Lightness of a printed group at points (x, y) on faces, given by their indices in the group."""
     picture = cv2.imread(materials.print_path(group["mat"].removeprefix("print:")), 0) / 255.0
     f = group["f"][faces]
     a, b, c = (group["v"][f[:, k], :2] for k in range(3))
@@ -63,7 +63,7 @@ def plan_view(body, mm):
 
 
 def differs(a, b):
-    """Where two plan views differ to the eye."""
+    """The pixels at which two plan views differ visibly."""
     step = np.abs(a[0] - b[0]) > MIN_STEP_MM
     outside = (a[0] > 0) != (b[0] > 0)
     value = (np.abs(a[1] - b[1]) > MIN_VALUE_STEP) & (a[0] > 0) & (b[0] > 0)
@@ -72,7 +72,7 @@ def differs(a, b):
 
 
 def moved(view, turn, dx, dy):
-    """A plan view turned about its middle, in degrees counter-clockwise, and then shifted, in pixels."""
+    """A plan view rotated about its centre, in degrees counter-clockwise, and then shifted, in pixels."""
     m = cv2.getRotationMatrix2D((CELL / 2 - 0.5, CELL / 2 - 0.5), turn, 1)
     m[:, 2] += [dx, dy]
     return [cv2.warpAffine(x, m, (CELL, CELL), flags=cv2.INTER_NEAREST) for x in view]
@@ -84,7 +84,7 @@ def edges(view):
 
 
 def best_cover(part, rival, turns):
-    """(share that differs, turn in degrees, dx, dy in pixels) at which the part covers the rival best, of `turns`."""
+    """(differing fraction, angle in degrees, dx, dy in pixels) of the best cover of the look-alike, over `turns`."""
     rival_area = np.fft.rfft2(rival[0] > 0)
     rival_edges = edges(rival)
     rival_edges_fft = np.fft.rfft2(rival_edges)

@@ -1,4 +1,4 @@
-"""Printed faces: pictures that lie on a body's upper face."""
+"""Printed faces: pictures on a body's upper face."""
 
 import os
 
@@ -17,7 +17,7 @@ def font(size):
 
 
 class Print:
-    """A picture of w x h mm, drawn in mm with the origin at its middle, y up."""
+    """A picture of w x h mm, drawn in mm with the origin at its centre, y up."""
 
     def __init__(self, w, h, ground):
         self.w, self.h = w, h
@@ -28,7 +28,7 @@ class Print:
         return (x + self.w / 2) * PX, (self.h / 2 - y) * PX
 
     def box(self, x, y, dx, dy, fill=None, outline=None, width=0.0, r=0.0):
-        """A rectangle about its middle."""
+        """A rectangle around its centre."""
         (x0, y0), (x1, y1) = self.at(x - dx / 2, y + dy / 2), self.at(x + dx / 2, y - dy / 2)
         self.d.rounded_rectangle((x0, y0, x1, y1), r * PX, fill=fill, outline=outline, width=int(width * PX))
 
@@ -43,7 +43,7 @@ class Print:
         self.d.polygon([self.at(*p) for p in points], fill=fill)
 
     def text(self, x, y, text, size, fill):
-        """Text of `size` mm about its middle."""
+        """Text of `size` mm around its centre."""
         self.d.text(self.at(x, y), text, fill=fill, font=font(int(size * PX)), anchor="mm")
 
     def save(self, name):
@@ -52,7 +52,7 @@ class Print:
 
 
 def on_top(groups, name, w, h):
-    """Gives the groups of the material print:NAME the texture coordinates of a print of w x h mm about the origin."""
+    """Gives the groups of the material print:NAME the texture coordinates of a print of w x h mm around the origin."""
     for g in groups:
         if g["mat"] == f"print:{name}":
             g["uv"] = g["v"][:, :2] / [w, h] + 0.5

@@ -1,8 +1,8 @@
 """Scenes with a fixed number of slots for the materials of each BSDF type.
 
-Dr.Jit compiles the kernels anew for a scene with other numbers of BSDF types, which takes longer than the rendering.
-The random parts (make_train.py) have too many mixtures of materials to compile for each; so every scene of theirs has
-the same slots, and unused ones are filled with a mesh below the table.
+Dr.Jit compiles the kernels again for a scene with other numbers of BSDF types, which takes longer than the rendering.
+The random parts (make_train.py) have too many combinations of materials to compile for each, so all their scenes have
+the same slots, and unused slots are filled with a mesh below the table.
 """
 
 from scene import Scene
@@ -21,7 +21,7 @@ FILLERS = dict(
 
 
 def bsdf_type(name):
-    """The key of QUOTAS of a material's name."""
+    """The key of QUOTAS for a material's name."""
     kind = name.split(":")[0]
     if kind in ("print", "blank"):
         return "printed"

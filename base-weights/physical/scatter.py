@@ -1,4 +1,4 @@
-"""Loose things fall in Bullet around and on the bodies that lie on the table (mm, z up)."""
+"""Drops loose objects around and on the bodies on the table, simulated by Bullet (mm, z up)."""
 
 import numpy as np
 import pybullet as pb
@@ -10,7 +10,7 @@ UNIT = 0.1  # Bullet's lengths are cm: its contact margins suit bodies of about 
 
 
 def scatter(rng, cam, fixed, pool, count, near):
-    """Drops `count` things of the pool, the first `near` of them at the fixed items; returns items (body, pose)."""
+    """Drops `count` objects of the pool, the first `near` of them near the fixed items; returns items (body, pose)."""
     client = pb.connect(pb.DIRECT)
     pb.setGravity(0, 0, -981, physicsClientId=client)
     pb.setTimeStep(1 / 400, physicsClientId=client)
@@ -55,7 +55,7 @@ def drop_place(rng, area, fixed):
 
 
 def drop(rng, client, body, x, y, z):
-    """Creates a falling body, in most cases about upright; returns Bullet's handle."""
+    """Creates a falling body, usually nearly upright; returns Bullet's handle."""
     q = rng.standard_normal(4) * ([0.15, 0.15, 1, 1] if rng.random() < 0.7 else [1, 1, 1, 1])
     q /= np.linalg.norm(q)
     handle = pb.createMultiBody(

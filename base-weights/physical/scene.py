@@ -1,7 +1,7 @@
 """Light and scenes for Mitsuba, path tracing and denoising.
 
-What differs between scenes is a picture of one size or a mesh, never a number that Dr.Jit compiles in, the lamp stands
-in one of 28 places, and every scene has the same number of meshes: so the kernels are compiled once.
+Scenes differ only in pictures of one size and in meshes, never in a number that Dr.Jit compiles in; the lamp has one of
+28 positions, and every scene has the same number of meshes. So the kernels are compiled once.
 """
 
 import hashlib
@@ -20,7 +20,7 @@ import surfaces
 from camera import HEIGHT, WIDTH
 
 PLY = os.environ.get("PHYS_PLY", "scratch/ply")
-PAD = 16  # pixels rendered beyond each edge: the distortion needs them
+PAD = 16  # pixels rendered beyond each edge, which the distortion needs
 SLOTS = 26  # materials in a scene besides table, sheet, phone and lamp
 
 ROOMS = dict(
@@ -49,13 +49,13 @@ LAMP_COLOURS = [(1, 0.6, 0.25), (0.45, 0.65, 1.0), (0.7, 1.0, 0.6), (1.0, 0.5, 0
 
 
 def stream(*key):
-    """A random generator that depends on the key alone."""
+    """A random generator that depends only on the key."""
     digest = hashlib.sha256("|".join(map(str, key)).encode()).digest()
     return np.random.default_rng(int.from_bytes(digest[:8], "little"))
 
 
 def lamps():
-    """Places and half sides of 20 lamps at the side and 8 overhead, which are seen in the table."""
+    """Positions and half sides of 20 lamps at the side and 8 overhead, which are reflected by the table."""
     r = stream("lamps")
     side, overhead = [], []
     for k in range(20):
@@ -228,7 +228,7 @@ class Scene:
         )
 
     def sheet(self, rng, near, visible):
-        """A sheet of paper or card on the table; below the table where there is none."""
+        """A sheet of paper or card on the table; below the table if it is not visible."""
         w, h = [(105, 148), (74, 105), (148, 210)][rng.integers(3)]
         place = near + rng.uniform(-70, 70, 2)
         if visible:
@@ -240,7 +240,7 @@ class Scene:
         self.rectangle("sheet", m, w / 2, h / 2, table_bsdf(surfaces.Table(t.colour, 0.7)))
 
     def phone(self, cam, phone):
-        """The phone or webcam that takes the picture throws its shadow and is seen in shiny faces."""
+        """The phone or webcam that takes the picture: it casts a shadow and is reflected by shiny faces."""
         forward = (cam.target - cam.pos) / np.linalg.norm(cam.target - cam.pos)
         right, up = cam.world_from_camera[:3, 0], cam.world_from_camera[:3, 1]
         place = cam.pos - forward * 9 + (right * 26 - up * 58 if phone else 0)

@@ -1,8 +1,8 @@
-"""Lets the program look for the random parts in their rendered pictures. Usage: search_train.py RENDERED SDG
+"""Searches the random parts in their rendered pictures with the program. Usage: search_train.py RENDERED SDG
 
-RENDERED has the folders of make_train.py, SDG is the program. Writes FOLDER/found.jsonl, all that
-`sdg detect --all --json` finds in the pictures: what model S accepts and what it refuses. These are the poses that the
-comparer is asked about. A folder that has `found.jsonl` is left out.
+RENDERED has the folders of make_train.py, SDG is the program. Writes FOLDER/found.jsonl with all
+detections of `sdg detect --all --json` in the pictures, accepted and refused by model S. The details network compares
+at these poses. A folder that has `found.jsonl` is skipped.
 """
 
 import argparse
@@ -15,7 +15,7 @@ TAUGHT = (0, 4)  # exit statuses of `sdg teach` with which it has written a mode
 
 
 def search(folder, sdg):
-    """Teaches the part from its demonstration and looks for it in the folder's pictures."""
+    """Teaches the part from its demonstration and searches it in the folder's pictures."""
     with tempfile.TemporaryDirectory() as scratch:
         model = os.path.join(scratch, "part.sdg")
         demo = f"{folder}/demo.jpg:{folder}/demo.json"
@@ -28,7 +28,7 @@ def search(folder, sdg):
         detect = [sdg, "detect", "--grasp-model", model, "--json", "--all", *pictures]
         found = subprocess.run(detect, capture_output=True, text=True)
     out = os.path.join(folder, "found.jsonl")
-    # Renamed when complete: an interrupted run leaves no half file.
+    # Renamed when complete, so an interrupted run leaves no incomplete file.
     with open(out + ".tmp", "w") as file:
         file.write(found.stdout)
     os.replace(out + ".tmp", out)

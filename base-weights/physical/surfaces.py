@@ -9,7 +9,7 @@ from PIL import Image, ImageDraw, ImageFont
 PLAIN = ["white", "grey", "black", "bluemat", "woodlight", "wooddark", "cardboard", "felt", "concrete", "greenmat"]
 BUSY = ["cutting", "print", "brushed", "fabric", "plywood", "gravel", "newspaper", "granite"]
 
-# About how light the plain tables are: the exposure depends on it.
+# Approximate lightness of the plain tables, on which the exposure depends.
 LIGHTNESS = dict(
     white=0.85,
     grey=0.5,
@@ -28,7 +28,7 @@ SIZE = 1024  # pixels of a table's picture
 
 @dataclass
 class Table:
-    """`width_mm` of the table fit into the pictures, which repeat; `bump_mm` is the bump picture's height."""
+    """The pictures show `width_mm` of the table and repeat; `bump_mm` is the bump picture's height."""
 
     colour: Image.Image
     rough: float = 0.5
@@ -240,7 +240,7 @@ TABLES = dict(
 
 
 def room(rng, style):
-    """A room as seen from the table, 128 x 256, z up: ceiling, walls with furniture, windows or lamps.
+    """A room seen from the table, 128 x 256, z up: ceiling, walls with furniture, windows or lamps.
 
     Linear radiance, scaled so that the irradiance on the table is about 1.
     """

@@ -1,14 +1,14 @@
-"""Trains the network of the details on packs of pack_train.py. Usage:
+"""Trains the details network on packs of pack_train.py. Usage:
 
     train_details.py OUT.pt PACK.npz... [--init FILE.pt] [--minutes 8] [--max-steps N] [--batch 256] [--lr 2e-3]
         [--seed 1]
 
-Runs on CUDA, or on the CPU where there is none. It ends after the minutes or the steps, whichever comes first, and the
-learning rate falls to nearly 0 by then. OUT.pt gets the mean weights of the last steps, which `--init` begins from and
+Runs on CUDA, or on the CPU without CUDA. It ends after the minutes or the steps, whichever is earlier, and the learning
+rate falls to nearly 0 by then. OUT.pt gets the mean weights of the last steps, from which `--init` starts and which
 details_net.py exports.
 
-Printed: the areas under the ROC curve of right poses against wrong ones of the held-out parts, all together, by the
-difference of the look-alikes, and within each part (mean). The held-out parts choose nothing but when to stop.
+Printed: the areas under the ROC curve of right against wrong poses of the held-out parts, in total, by the difference of
+the look-alikes, and within each part (mean). The held-out parts only determine when to stop.
 """
 
 import argparse
@@ -32,13 +32,13 @@ WEIGHT_DECAY = 0.02
 MAX_NORM = 5.0  # of the gradient
 WARM_UP_STEPS = 300
 MIN_LR = 1e-5
-MEAN_DECAY = 0.998  # of the mean weights, a step
+MEAN_DECAY = 0.998  # of the mean weights, per step
 REPORT_SECS = 25
 CPU_OR_CUDA = "cuda" if torch.cuda.is_available() else "cpu"
 
 
 def auc(right, wrong):
-    """The area under the ROC curve; NaN where there is none of one kind."""
+    """The area under the ROC curve; NaN if one kind is missing."""
     if not len(right) or not len(wrong):
         return float("nan")
     ranks = np.concatenate([right, wrong]).argsort().argsort()[: len(right)]
@@ -70,7 +70,7 @@ def answers(net, crops, demo, rows):
 
 
 def evaluate(net, crops, demo):
-    """The areas under the ROC curve of the held-out parts, as a line."""
+    """The areas under the ROC curve of the held-out parts, as a line of text."""
     is_clear = (crops.visible > 0.6) | (crops.kinds == crops_.ELSEWHERE)
     rows = np.nonzero((crops.kinds != crops_.DEMO) & crops.held_out[crops.parts] & is_clear)[0]
     if not len(rows):
@@ -107,7 +107,7 @@ def losses(answer, cells, batch):
 
 @torch.no_grad()
 def follow(mean, net, step):
-    """Moves the mean weights towards those of the network; in the first steps faster."""
+    """Moves the mean weights towards the network's weights, faster in the first steps."""
     decay = min(MEAN_DECAY, (1 + step) / (10 + step))
     for m, n in zip(mean.parameters(), net.parameters()):
         m.lerp_(n, 1 - decay)
@@ -155,7 +155,7 @@ def train(crops, args):
         optimizer.step()
         step += 1
         follow(mean, net, step)
-        if step % 20 == 0:  # not each step: reading a number waits for the device
+        if step % 20 == 0:  # not in each step, because reading a number waits for the device
             recent = [*recent, (of_pairs.item(), of_cells.item())][-20:]
         if time.time() - last > REPORT_SECS or step == 50:
             last = time.time()
@@ -170,11 +170,11 @@ def main():
     args = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     args.add_argument("out")
     args.add_argument("packs", nargs="+")
-    args.add_argument("--init", help="weights to begin from")
+    args.add_argument("--init", help="weights to start from")
     args.add_argument("--minutes", type=float, default=8)
     args.add_argument("--max-steps", type=int, default=10**9)
     args.add_argument("--batch", type=int, default=256)
-    args.add_argument("--lr", type=float, default=2e-3, help="largest learning rate")
+    args.add_argument("--lr", type=float, default=2e-3, help="maximum learning rate")
     args.add_argument("--seed", type=int, default=1)
     args = args.parse_args()
     torch.manual_seed(args.seed)

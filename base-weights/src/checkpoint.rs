@@ -1,4 +1,5 @@
-//! What a stopped run goes on from: all parameters and moments in full precision, and the settings of the run.
+//! The state from which a stopped run resumes: all parameters and moments in full precision, and the settings
+//! of the run.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -12,21 +13,21 @@ use sdg_training::AdamWState;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-/// A run after some steps.
+/// The state of a run after a number of steps.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Checkpoint<S> {
-    /// What the run was started with.
+    /// The settings that the run was started with.
     pub settings: S,
-    /// Steps done.
+    /// Number of steps done.
     pub step: usize,
     /// The network's parameters.
     pub parameters: StateDict,
-    /// The optimiser's state between steps; empty where every episode has an optimiser of its own.
+    /// The optimiser's state between steps; empty where each episode has its own optimiser.
     pub optimizer: AdamWState,
 }
 
 impl<S: Serialize + DeserializeOwned> Checkpoint<S> {
-    /// Writes the file whole: under a temporary name, synced, renamed.
+    /// Writes the file atomically: under a temporary name, synced, then renamed.
     ///
     /// # Errors
     /// A folder that cannot be written.
@@ -54,10 +55,10 @@ impl<S: Serialize + DeserializeOwned> Checkpoint<S> {
         Ok(write_atomically(path, &bytes)?)
     }
 
-    /// Reads a file.
+    /// Reads a checkpoint.
     ///
     /// # Errors
-    /// A file that cannot be read or is no checkpoint with such settings.
+    /// A file that cannot be read or is not a checkpoint with settings of this type.
     pub fn read(path: &Path) -> Result<Self> {
         let named = || path.display().to_string();
         let bytes = std::fs::read(path).with_context(named)?;

@@ -1,7 +1,8 @@
-//! How much base weights help: model C taught from them for a few steps on parts unseen in pretraining, check off.
+//! Measures how much base weights help: model C is taught from them for a few steps on parts unseen in pretraining,
+//! without verification.
 //!
-//! Each part is taught from its photo and then shown pictures with it, pictures with other parts alone, and pictures with
-//! its mirror image or itself with one feature moved. The network alone answers.
+//! Each part is taught from its photo. The model then gets pictures with the part, pictures with other parts only, and
+//! pictures with the part's mirror image or with a copy in which one feature is moved. Only the network decides.
 
 use std::fs::OpenOptions;
 use std::io::Write;
@@ -19,15 +20,15 @@ use sdg_part_generator::{LookAlike, OtherKind, Part, PhotoConfig, Sample, SceneC
 use crate::outcome::{Outcome, outcomes};
 use crate::pictures::FIRST_PART_SEED;
 
-/// A detection farther from the truth is another thing: 10 mm at the paper's camera, which has 0.92 px a millimetre in
-/// 640 px of width; pictures here have 320.
+/// Maximum error of a correct detection. It corresponds to 10 mm at the paper's camera, which has 0.92 px per
+/// millimetre at a width of 640 px; the pictures of this comparison are 320 px wide.
 const MAX_ERROR_PX: f64 = 4.6;
 const MAX_ERROR_DEGREES: f64 = 10.0;
 
-/// Pictures of each kind a part.
+/// Number of pictures per part: with the part, without it, with look-alikes.
 const PICTURES: [usize; 3] = [10, 10, 5];
 
-/// One part to measure on: its photo and its pictures.
+/// A part to measure on: its photo and its pictures.
 pub struct Trial {
     part: Part,
     demonstration: Demonstration,
@@ -36,7 +37,7 @@ pub struct Trial {
     look_alikes: Vec<Sample>,
 }
 
-/// Pictures as the wrist camera takes them: from the height of the photo, with a little of everything.
+/// Pictures as the wrist camera takes them: from the height of the photo, with a small amount of every variation.
 fn scene_config() -> SceneConfig {
     SceneConfig {
         photo: PhotoConfig { fill: [0.14, 0.42], ..PhotoConfig::default() },
@@ -54,7 +55,7 @@ fn scene_config() -> SceneConfig {
     }
 }
 
-/// The surest detection in a picture, and its error in pixels of the photo where it is right.
+/// The detection with the highest score in a picture, and its error in pixels of the photo if it is correct.
 struct Best {
     is_accepted: bool,
     score: f64,
@@ -62,10 +63,10 @@ struct Best {
 }
 
 impl Trial {
-    /// Draws the part of a seed, below [`FIRST_PART_SEED`], and its pictures.
+    /// Generates the part with seed `part_seed` modulo [`FIRST_PART_SEED`], and its pictures.
     ///
     /// # Errors
-    /// A scene configuration that the generator refuses.
+    /// A scene configuration that the generator rejects.
     pub fn new(part_seed: u64) -> Result<Self> {
         let seed = part_seed % FIRST_PART_SEED;
         let part = Part::generate(seed);
@@ -76,7 +77,8 @@ impl Trial {
         let without = scenes(absent.clone(), 2)?;
         let look_alikes = scenes(SceneConfig { look_alike_share: 1.0, others: [1, 2], ..absent }, 3)?;
         let draw = |scenes: &Scenes, count| (0..count as u64).map(|i| scenes.sample(i)).collect();
-        // The part itself in another size is the part nearer to the camera: nobody can tell.
+        // A copy of the part in another size looks like the part at another distance from the camera, so it is left
+        // out.
         let is_another = |sample: &Sample| {
             let other =
                 |kind: &OtherKind| matches!(kind, OtherKind::LookAlike(LookAlike::Mirrored | LookAlike::FeatureMoved));
@@ -92,7 +94,7 @@ impl Trial {
         })
     }
 
-    /// The photo and the pictures, each with a name; to look at.
+    /// The photo and the pictures, each with a name, for inspection.
     pub fn pictures(&self) -> Vec<(String, &RgbImage)> {
         let kinds = [("with", &self.with), ("without", &self.without), ("look-alikes", &self.look_alikes)];
         let of_kind = kinds.into_iter().flat_map(|(kind, samples)| {
@@ -101,10 +103,10 @@ impl Trial {
         std::iter::once(("photo".to_owned(), &self.demonstration.image)).chain(of_kind).collect()
     }
 
-    /// Teaches the part and shows the model its pictures.
+    /// Teaches the part and runs the model on its pictures.
     ///
     /// # Errors
-    /// What teaching refuses, but for a part that was not learnt, which is an outcome.
+    /// All errors of teaching except [`GraspError::NotLearnt`], which becomes an outcome.
     pub fn run(&self, weights: &str, part_seed: u64, options: &TeachOptions) -> Result<Outcome> {
         let (wall, cpu) = (Instant::now(), cpu_seconds());
         let taught = teach(std::slice::from_ref(&self.demonstration), options, &mut |_| ControlFlow::Continue(()));
@@ -164,7 +166,7 @@ impl Trial {
         Ok(outcome)
     }
 
-    /// The surest detection.
+    /// The detection with the highest score.
     fn best(&self, model: &GraspModel, sample: &Sample) -> Result<Option<Best>> {
         let found = model.detect(&sample.image, Verification::Off)?;
         Ok(found.first().map(|best| Best {
@@ -176,7 +178,8 @@ impl Trial {
         }))
     }
 
-    /// The distance to the truth, where distance and turn are small enough; turns that look the same are none.
+    /// The distance to the ground truth, in pixels of the photo; `None` if the distance or the angle is too large. A
+    /// rotation by the part's symmetry counts as no error.
     fn error(
         &self,
         grasp: &PlanarGrasp,
@@ -196,35 +199,35 @@ impl Trial {
     }
 }
 
-/// Processor time of this process so far, in seconds; `None` where the system does not say.
+/// Processor time of this process so far, in seconds; `None` where the system does not report it.
 fn cpu_seconds() -> Option<f64> {
-    // Behind the program's name, which may hold blanks: fields 14 and 15 are user and system time in ticks of 10 ms.
+    // The program's name may contain blanks. After it, fields 14 and 15 are user and system time in ticks of 10 ms.
     let stat = std::fs::read_to_string("/proc/self/stat").ok()?;
     let fields: Vec<&str> = stat.rsplit(')').next()?.split_whitespace().collect();
     let ticks = |idx: usize| fields.get(idx)?.parse::<f64>().ok();
     Some((ticks(11)? + ticks(12)?) / 100.0)
 }
 
-/// Which parts are taught, how, and where outcomes go.
+/// The parts that are taught, how they are taught, and where the outcomes are written.
 pub struct Trials<'a> {
     /// The name of the weights in the outcomes.
     pub name: &'a str,
-    /// The weights; `None` to teach from nothing.
+    /// The weights; `None` to teach from random parameters.
     pub weights: Option<BaseWeights>,
     /// Seeds of the parts.
     pub parts: std::ops::Range<u64>,
-    /// Steps of teaching, one model each.
+    /// Numbers of teaching steps; one model is taught for each.
     pub steps: &'a [usize],
     /// Seed of teaching.
     pub seed: u64,
-    /// JSON lines; what stands there already is not measured again.
+    /// Output file, as JSON lines; trials that it already contains are not measured again.
     pub out: &'a Path,
-    /// How parts are taught; `None` for as from nothing.
+    /// How the weights are fine-tuned; `None` trains them like random parameters.
     pub fine_tuning: Option<FineTuning>,
 }
 
 impl Trials<'_> {
-    /// The file's text; none where there is no file yet.
+    /// The file's text; empty if the file does not exist yet.
     fn text(&self) -> Result<String> {
         if !self.out.exists() {
             return Ok(String::new());
@@ -232,10 +235,10 @@ impl Trials<'_> {
         std::fs::read_to_string(self.out).with_context(|| self.out.display().to_string())
     }
 
-    /// Measures what is not in the file yet.
+    /// Measures the trials that are not in the file yet.
     ///
     /// # Errors
-    /// Files that cannot be read or written, and what teaching refuses.
+    /// Files that cannot be read or written, and errors of teaching.
     pub fn run(&self, observe: &mut dyn FnMut(&Outcome)) -> Result<()> {
         let named = || self.out.display().to_string();
         let text = self.text()?;
@@ -331,7 +334,7 @@ mod tests {
             fine_tuning: None,
         };
         comparison(1).run(&mut |outcome| panic!("measured again: {outcome:?}")).unwrap();
-        // What follows a torn line begins a line of its own.
+        // The text after a torn line begins on a line of its own.
         let text = std::fs::read_to_string(&out).unwrap();
         assert_eq!(outcomes(&format!("{text}{line}\n")), [outcome.clone(), outcome]);
     }

@@ -1,10 +1,11 @@
-//! The comparison network's task: a demonstration and a place of a picture, the same part in the same pose or not.
+//! The comparison network's task: to decide whether a demonstration and a place in a picture show the same part in the
+//! same pose.
 //!
 //! ```text
-//! picture ─ every visible part ─┬─ its own demonstration, or another picture of it, in a pose nearly right  same
-//!                               ├─ the same in a wrong pose                                                 not
-//!                               ├─ its look-alike's demonstration where the look-alike would lie            not
-//!                               └─ another part's demonstration, fitted to its box                          not
+//! picture ─ every visible part ─┬─ its demonstration, or another picture of it, in nearly its pose   same
+//!                               ├─ the same in a wrong pose                                          different
+//!                               ├─ its look-alike's demonstration, in the look-alike's pose          different
+//!                               └─ another part's demonstration, fitted to its box                   different
 //! ```
 
 use anyhow::Result;
@@ -25,49 +26,50 @@ use crate::network::pretrain_config;
 use crate::pictures::{Pictures, look_alike_of};
 use crate::run::{Settings, Task};
 
-/// Share of a part that must be seen to ask whether it is the part.
+/// Minimum visible fraction of a part about which a pair asks.
 const MIN_VISIBLE_SHARE: f64 = 0.6;
-/// Only what is seen as a whole can stand for the demonstration.
+/// Minimum visible fraction of a part whose picture replaces the demonstration.
 const WHOLE_SHARE: f64 = 0.97;
-/// Pairs where another picture of the part stands for the demonstration, and where its box for its outline.
+/// Probability that another picture of the part replaces the demonstration.
 const OTHER_PICTURE_PROBABILITY: f64 = 0.35;
 const BOX_PROBABILITY: f64 = 0.1;
 
-/// How far a pose that counts as right may be off: shift in sides of the outline's box, turn, factor of size.
+/// Maximum errors of a pose that counts as correct: the shift as a fraction of the longer side of the outline's box,
+/// the angle, and the logarithm of the scale.
 const MAX_SHIFT: f64 = 0.1;
 const MAX_TURN_DEGREES: f64 = 12.0;
 const MAX_SIZE: f64 = 0.12;
-/// What counts as wrong is off by at least this much.
+/// Minimum errors of a pose that counts as wrong, in the same units.
 const MIN_WRONG_SHIFT: f64 = 0.25;
 const MIN_WRONG_TURN_DEGREES: f64 = 30.0;
 const MIN_WRONG_SIZE: f64 = 0.35;
 
-/// Turns that another part's demonstration is tried in.
+/// Number of angles at which another part's demonstration is tried.
 const NUM_TURNS: usize = 12;
 
 /// The comparison network of preset `edge`.
 pub struct ComparisonTask {
     config: ComparisonConfig,
     pictures: Pictures,
-    /// The parameters of an orientation CNN, whose first stages look at each side.
+    /// The parameters of an orientation CNN; its first stages are the trunk.
     trunk: StateDict,
 }
 
-/// A question and its answer.
+/// One training example with its label.
 struct Pair {
     view: View,
-    /// Whether it shows the part in that pose.
+    /// Whether the view shows the part in the pose of the pair.
     is_same: bool,
 }
 
 impl ComparisonTask {
-    /// Pictures a step: about ninety questions.
+    /// Pictures per step; they give about ninety pairs.
     pub const BATCH_SIZE: usize = 3;
 
     /// Prepares the pictures of a run.
     ///
     /// # Errors
-    /// Settings that the generator refuses.
+    /// Settings that the generator rejects.
     pub fn new(settings: &Settings, config: ComparisonConfig, orientation: StateDict) -> Result<Self> {
         let pictures = Pictures::new(settings.num_parts, &pretrain_config(), settings.seed)?;
         Ok(Self { config, pictures, trunk: orientation })
@@ -91,7 +93,7 @@ impl ComparisonTask {
     }
 }
 
-/// What stands for the demonstration, and the way from it to the part as the photo shows it.
+/// The picture that is used as the demonstration, and the transform from it to the part's photo.
 struct Shown {
     reference: Reference,
     photo_from_shown: PlanarSimilarity,
@@ -141,7 +143,7 @@ impl Asked<'_> {
         pairs
     }
 
-    /// The part's photo, or now and then another picture of it.
+    /// The part's photo, or with [`OTHER_PICTURE_PROBABILITY`] another picture of the part.
     fn shown(&mut self, part_idx: usize, but_not: Option<&RgbImage>) -> Option<Shown> {
         let photo = &self.task.pictures.photo(part_idx).demonstration;
         let mut image = &photo.image;
@@ -181,7 +183,7 @@ impl Asked<'_> {
         most * (2.0 * self.rng.random::<f64>() - 1.0)
     }
 
-    /// A pose that is off by no more than a share of what counts as right.
+    /// A random pose near `pose`: at most `share` of the errors of a correct pose away from it.
     fn near(&mut self, shown: &Shown, pose: &PlanarSimilarity, share: f64) -> PlanarSimilarity {
         let reach = share * MAX_SHIFT * shown.length;
         let shift = Vector2::new(self.within(reach), self.within(reach));
@@ -190,7 +192,7 @@ impl Asked<'_> {
         pose.compose(&PlanarSimilarity::about(shown.center, shown.center + shift, turn, scale))
     }
 
-    /// A pose that is off by too much in one respect.
+    /// A random pose that counts as wrong because of one of its angle, scale and shift.
     fn wrong(&mut self, shown: &Shown, pose: &PlanarSimilarity, has_turn: bool) -> PlanarSimilarity {
         let near = self.near(shown, pose, 1.0);
         let (mut shift, mut turn, mut scale) = (Vector2::zeros(), 0.0, 1.0);
@@ -210,8 +212,8 @@ impl Asked<'_> {
         near.compose(&PlanarSimilarity::about(shown.center, shown.center + shift, Angle::from_degrees(turn), scale))
     }
 
-    /// Another part's demonstration as a network would lay it over this one: in the turn in which it fills the box best, or
-    /// in any.
+    /// Another part's demonstration as a network would align it with this one: at the angle at which it fills the box
+    /// best, or at a random angle.
     fn fitted(&mut self, other: &Shown, nominal: &PlanarSimilarity, instance: &Instance) -> PlanarSimilarity {
         let first: f64 = self.rng.random_range(0.0..360.0);
         let count = if self.rng.random_bool(0.7) { NUM_TURNS } else { 1 };
@@ -234,7 +236,7 @@ impl Task for ComparisonTask {
 
     fn network(&self, settings: &Settings, device: &Device) -> Result<ComparisonNetwork> {
         let network = self.config.init(device, settings.seed)?;
-        // The names of the stages that both networks have.
+        // Only the names of the stages that both networks have.
         let trunk: StateDict = self
             .trunk
             .iter()
@@ -274,7 +276,7 @@ mod tests {
         let settings = Settings { batch_size: ComparisonTask::BATCH_SIZE, ..Settings::new(3, 16, 100) };
         let config = ComparisonConfig::edge();
         let task = ComparisonTask::new(&settings, config.clone(), StateDict::new()).unwrap();
-        // The mean of what differs in normalised colour on the part.
+        // The mean difference of the normalised colours on the part.
         let cells = config.trunk_map_px().pow(2);
         let difference = |pair: &Pair| {
             let of = |channels: std::ops::Range<usize>| {
@@ -292,7 +294,8 @@ mod tests {
         }
         let [not, same] = means.map(|values| (values.len(), sdg_geometry::median(values).unwrap()));
         assert!(same.0 > 40 && not.0 > same.0, "{same:?} {not:?}");
-        // Look-alikes and turned parts differ little, and light makes the same part differ: the two medians are 1.9 and 2.3.
+        // Look-alikes and rotated parts differ little, and light makes the same part differ: the two medians are 1.9
+        // and 2.3.
         assert!(same.1 < 0.92 * not.1, "{same:?} {not:?}");
     }
 }

@@ -1,4 +1,4 @@
-//! The detector's task: several parts a picture, told apart by other views of them.
+//! The detector's task: pictures of several parts, each identified by other views of it.
 
 use anyhow::Result;
 use burn::tensor::{Device, Tensor};
@@ -10,7 +10,7 @@ use crate::network::PretrainNetwork;
 use crate::pictures::Pictures;
 use crate::run::{Settings, Task};
 
-/// The detector of a configuration, see [`crate::network`].
+/// Pretraining of the detector of a configuration; see [`crate::network`].
 pub struct DetectorTask {
     config: RcnnConfig,
     pictures: Pictures,
@@ -20,7 +20,7 @@ impl DetectorTask {
     /// Prepares the pictures of a run for a network.
     ///
     /// # Errors
-    /// Settings that the generator refuses.
+    /// Settings that the generator rejects.
     pub fn new(settings: &Settings, config: RcnnConfig) -> Result<Self> {
         Ok(Self { pictures: Pictures::new(settings.num_parts, &config, settings.seed)?, config })
     }

@@ -1,4 +1,5 @@
-//! What teaching starts from: the trunk and all heads but what is a part's own, and what makes that of its views.
+//! Writes the base weights: the trunk, all heads except a part's own layers, and the imprint networks that
+//! compute those layers from views of the part.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -12,7 +13,7 @@ use crate::checkpoint::Checkpoint;
 use crate::network::pretrain_config;
 use crate::run::Settings;
 
-/// A file with a comparison network added, or another in place of the one it has.
+/// Adds a comparison network to a file, or replaces the one that it has.
 ///
 /// # Errors
 /// A checkpoint of another network.
@@ -26,7 +27,7 @@ pub fn with_comparison(
         .iter()
         .all(|(name, blank)| comparison.parameters.get(name).is_some_and(|found| found.shape == blank.shape));
     if !same_shapes || wanted.len() != comparison.parameters.len() {
-        bail!("expected a checkpoint of the comparison network of preset edge, found one of another");
+        bail!("expected a checkpoint of the comparison network of preset edge, found one of a different network");
     }
     file.parameters.retain(|name, _| !name.starts_with("comparison."));
     take(&comparison.parameters, "", "comparison.", &mut file.parameters)?;
@@ -34,14 +35,14 @@ pub fn with_comparison(
     Ok(file)
 }
 
-/// How a network was made.
+/// A description of how a checkpoint was trained.
 fn origin_of(
     Checkpoint { settings: Settings { seed, num_parts, batch_size, .. }, step, .. }: &Checkpoint<Settings>,
 ) -> String {
     format!("seed {seed}, {step} steps, {num_parts} parts, {} pictures", step * batch_size)
 }
 
-/// The file of a detector's checkpoint and, for model A, of an orientation CNN's.
+/// Makes the file from a detector's checkpoint and, for model A, an orientation CNN's checkpoint.
 ///
 /// # Errors
 /// A checkpoint of another network.
@@ -84,7 +85,7 @@ pub fn export(
     Ok(BaseWeightsFile { preset: "edge".into(), reinitialized, parameters, origin })
 }
 
-/// Takes the parameters of one name under another.
+/// Copies the parameters that begin with `name`, renamed to begin with `other_name`.
 fn take(from: &StateDict, name: &str, other_name: &str, to: &mut StateDict) -> Result<()> {
     let before = to.len();
     let named = from.iter().filter_map(|(key, tensor)| Some((key.strip_prefix(name)?, tensor)));

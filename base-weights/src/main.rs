@@ -1,4 +1,4 @@
-//! `sdg-base-weights`: pretrains preset `edge`, exports what teaching starts from, and compares weights.
+//! `sdg-base-weights`: pretrains preset `edge`, exports the weights from which teaching starts, and compares weights.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -32,81 +32,81 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Pretrains, or goes on where a run was stopped.
+    /// Pretrains, or resumes a stopped run.
     Pretrain {
-        /// The detector, the orientation CNN of model A, or the comparison network.
+        /// Network to pretrain: the detector, the orientation CNN of model A, or the comparison network.
         #[arg(long, value_enum, default_value_t = Pretrained::Detector)]
         network: Pretrained,
-        /// Decides parts, pictures and every random choice.
+        /// Determines parts, pictures and every random choice.
         #[arg(long, default_value_t = 1)]
         seed: u64,
-        /// Parts that are drawn from.
+        /// Number of generated parts.
         #[arg(long, default_value_t = 1024)]
         parts: usize,
-        /// Steps of the whole run.
+        /// Number of steps of the whole run.
         #[arg(long, default_value_t = 8000)]
         steps: usize,
-        /// Base weights with an orientation CNN, whose first stages the comparison network's trunk starts from.
+        /// Base weights with an orientation CNN; its first stages initialise the comparison network's trunk.
         #[arg(long)]
         trunk: Option<PathBuf>,
         #[command(flatten)]
         pace: PaceArguments,
     },
-    /// Writes what teaching starts from, in half precision.
+    /// Writes the weights from which teaching starts, in half precision.
     Export {
-        /// A checkpoint of a detector.
+        /// Checkpoint of a detector.
         #[arg(long, required_unless_present = "base", conflicts_with = "base")]
         detector: Option<PathBuf>,
-        /// Weights to take all other networks from.
+        /// Base weights whose other networks are kept.
         #[arg(long)]
         base: Option<PathBuf>,
-        /// A checkpoint of an orientation CNN; none for weights that model A cannot start from.
+        /// Checkpoint of an orientation CNN; without it, model A cannot start from the weights.
         #[arg(long)]
         #[arg(conflicts_with = "base")]
         orientation: Option<PathBuf>,
-        /// A checkpoint of a comparison network; none for weights whose models do not compare.
+        /// Checkpoint of a comparison network; without it, models taught from the weights do not compare.
         #[arg(long)]
         comparison: Option<PathBuf>,
         /// The file to write.
         #[arg(long)]
         out: PathBuf,
-        /// The commit that the checkpoint was made with.
+        /// Commit that the checkpoints were made with.
         #[arg(long)]
         commit: String,
     },
     /// Teaches unseen parts for a few steps and measures the network alone.
     Compare {
-        /// Weights to start from; none for nothing.
+        /// Weights to start from; random parameters without it.
         #[arg(long)]
         weights: Option<PathBuf>,
-        /// Their name in the outcomes.
+        /// Name of the weights in the outcomes.
         #[arg(long)]
         name: String,
         /// Seed of the first part.
         #[arg(long, default_value_t = 9000)]
         first: u64,
-        /// How many parts.
+        /// Number of parts.
         #[arg(long, default_value_t = 8)]
         parts: u64,
-        /// Steps of teaching, one model each.
+        /// Numbers of teaching steps, separated by commas; one model is taught for each.
         #[arg(long, value_delimiter = ',', default_value = "15,30,60,120")]
         steps: Vec<usize>,
         /// Seed of teaching.
         #[arg(long, default_value_t = 1)]
         seed: u64,
-        /// JSON lines; what stands there is not measured again.
+        /// Output file, as JSON lines; trials that it already contains are not measured again.
         #[arg(long)]
         out: PathBuf,
-        /// What differs from the default fine-tuning, as JSON, such as {"freeze": "FirstStage"}; null to teach as from
-        /// nothing.
+        /// Changes to the default fine-tuning, as JSON, such as {"freeze": "FirstStage"}; null trains the weights like
+        /// random parameters.
         #[arg(long, default_value = "{}")]
         fine_tuning: String,
     },
-    /// Outcomes as a table, over the parts that every row has.
+    /// Prints the outcomes as a table, over the parts that every row has.
     Table {
         /// JSON lines of `compare`.
         outcomes: PathBuf,
-        /// Names of weights; all where none is given.
+        /// Names of weights; all by default.
         weights: Vec<String>,
     },
 }
@@ -118,24 +118,24 @@ enum Pretrained {
     Comparison,
 }
 
-/// How a run is kept, and how long it goes on.
+/// Where a run is kept, and when it ends.
 #[derive(Args)]
 struct PaceArguments {
-    /// Where the run keeps what it goes on from.
+    /// File from which the run resumes.
     #[arg(long)]
     checkpoint: PathBuf,
-    /// Steps between checkpoints.
+    /// Number of steps between checkpoints.
     #[arg(long, default_value_t = 200)]
     every: usize,
-    /// Ends after so many minutes; the next call goes on.
+    /// Stops after this many minutes; the next call resumes the run.
     #[arg(long)]
     minutes: Option<f64>,
-    /// flex, or a device that this build has.
+    /// Device: flex, or another one that this build has.
     #[arg(long, default_value = "flex")]
     device: String,
 }
 
-/// Steps between lines about the losses.
+/// Number of steps between printed losses.
 const REPORT_EVERY: usize = 50;
 
 fn main() -> Result<()> {
@@ -149,7 +149,9 @@ fn main() -> Result<()> {
                 }
                 Pretrained::Comparison => {
                     let settings = Settings { batch_size: ComparisonTask::BATCH_SIZE, ..settings };
-                    let path = trunk.context("--trunk says whose first stages the comparison network starts from")?;
+                    let path = trunk.context(
+                        "expected --trunk: the base weights whose first stages the comparison network starts from",
+                    )?;
                     let orientation = BaseWeightsFile::from_bytes(&std::fs::read(&path)?)?.parameters;
                     let orientation = orientation
                         .into_iter()
@@ -164,7 +166,7 @@ fn main() -> Result<()> {
             let read = |path: Option<PathBuf>| path.map(|path| Checkpoint::read(&path)).transpose();
             let mut file = match (read(detector)?, base) {
                 (Some(detector), _) => export(&detector, read(orientation)?.as_ref(), &commit)?,
-                (None, base) => read_file(&base.context("--detector or --base")?)?,
+                (None, base) => read_file(&base.context("expected --detector or --base")?)?,
             };
             if let Some(comparison) = read(comparison)? {
                 file = with_comparison(file, &comparison, &commit)?;
@@ -220,7 +222,7 @@ fn pretrain<T: Task>(task: T, settings: Settings, pace: &PaceArguments) -> Resul
     Ok(())
 }
 
-/// A fine-tuning with some values changed, those of its training too; `None` for null.
+/// Changes some values of a fine-tuning, including its training; `None` for null.
 fn changed(fine_tuning: FineTuning, changes: &str) -> Result<Option<FineTuning>> {
     let changes: Value = serde_json::from_str(changes)?;
     if changes.is_null() {
@@ -231,7 +233,7 @@ fn changed(fine_tuning: FineTuning, changes: &str) -> Result<Option<FineTuning>>
     Ok(Some(serde_json::from_value(all)?))
 }
 
-/// Objects entry by entry, anything else as a whole.
+/// Merges objects entry by entry; replaces any other value as a whole.
 fn merge(value: &mut Value, changes: Value) {
     match (value, changes) {
         (Value::Object(all), Value::Object(changes)) => {

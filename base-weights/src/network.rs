@@ -1,18 +1,18 @@
-//! The network while it is pretrained: preset `edge` with every head, which tells parts apart by other views of them.
+//! The network during pretraining: preset `edge` with every head, identifying parts by other views of them.
 //!
 //! ```text
 //! images [N, 3, H, W] ─ backbone, FPN ─ RPN: is there any part ─ ROIs ─┬─ box head ─ hidden ─ one box for all parts
-//!                                                                      │     └ of each part, but of the other images: mean
+//!                                                                      │     └ mean per part over the other images
 //!                                                                      │        ─ imprint ─ which of the step's parts is it
 //!                                                                      ├─ keypoint head ─ map
-//!                                                                      │     └ read at the keypoints in the other images
-//!                                                                      │        ─ imprint ─ where are they here
-//!                                                                      └─ mask head: what the part covers
+//!                                                                      │     └ sampled at the keypoints in the other images
+//!                                                                      │        ─ imprint ─ where the keypoints are in this image
+//!                                                                      └─ mask head: pixels of the part
 //! ```
 //!
 //! Shapes: N images, R ROIs, P parts of a step, F hidden width, C channels, S side of a map, K keypoints. No parameter
-//! belongs to one part: what teaching needs, features by which views of a part it has never seen can be told from other
-//! parts, is what is learnt. See [`sdg_detection::imprint`].
+//! belongs to one part: the network learns features by which views of an unseen part can be told from other parts, as
+//! teaching needs. See [`sdg_detection::imprint`].
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor, TensorData};
@@ -33,16 +33,16 @@ use sdg_detection::{DetectionError, GeneralizedRcnn, Losses, TransformedImage, l
 use sdg_layers::initialization::Initializer;
 use sdg_layers::upsample_bilinear_2x;
 
-/// ROIs of an image that go through the keypoint head, and as many through the mask head.
+/// Maximum number of ROIs of an image that go through the keypoint head, and through the mask head.
 const MAX_ROIS_PER_IMAGE: usize = 6;
 
-/// The network that is pretrained, and that teaching has, with every head.
+/// The network that is pretrained, with every head that teaching uses.
 pub fn pretrain_config() -> RcnnConfig {
     let mut config = edge_of(RcnnKind::Keypoint { num_keypoints: NUM_KEYPOINTS });
     config.roi_heads.mask_head = edge_of(RcnnKind::Mask { num_classes: 1 }).roi_heads.mask_head;
-    // One box for all parts has the shape of the box of one part, which teaching goes on with.
+    // One box for all parts has the shape of the box of one part, with which teaching continues.
     config.roi_heads.box_head.box_deltas = BoxDeltas::ClassAgnostic;
-    // Pictures show several parts: half of the ROIs may lie on one.
+    // Pictures show several parts: up to half of the ROIs may be on parts.
     config.roi_heads.sampler.positive_fraction = 0.5;
     config
 }
@@ -52,12 +52,12 @@ pub fn pretrain_config() -> RcnnConfig {
 pub struct PretrainNetwork {
     /// Trunk and heads. The class scores are not used.
     pub detector: GeneralizedRcnn,
-    /// What makes the last layers of other views' features.
+    /// Computes the last layers from features of other views.
     pub imprint: Imprint,
 }
 
 impl PretrainNetwork {
-    /// Draws the parameters.
+    /// Initialises the parameters at random.
     ///
     /// # Errors
     /// A configuration that contradicts itself.
@@ -69,8 +69,8 @@ impl PretrainNetwork {
         Ok(Self { detector, imprint })
     }
 
-    /// Gives the losses of a batch whose targets are in pixels of the images; labels tell one part from another. `seed`
-    /// draws what takes part in them.
+    /// Computes the losses of a batch. Targets are in pixels of the images; their labels identify the parts. `seed`
+    /// determines the sampled ROIs.
     pub fn losses(&self, images: &[TransformedImage], targets: &[ResizedTarget], seed: u64) -> Losses {
         let stream = |purpose: u128| -> Vec<Pcg64Mcg> {
             let state = |idx: usize| purpose << 64 | u128::from(seed.wrapping_add((idx as u64) << 40));
@@ -108,8 +108,9 @@ impl PretrainNetwork {
         Losses { rpn_cls, rpn_loc, cls, box_reg, keypoint: Some(keypoint), mask: Some(mask) }
     }
 
-    /// Which part an ROI shows, by the mean of each part's ROIs in the other images: cross-entropy over the parts and
-    /// background, and, since teaching has one part and all else, whether it is that part for every part on its own.
+    /// Loss of the classification of ROIs by the mean of each part's ROIs in the other images: the cross-entropy over
+    /// the parts and the background, plus a binary cross-entropy for every part on its own, because teaching knows one
+    /// part only.
     ///
     /// # Shapes
     /// - `hidden`: `[R, F]`
@@ -176,8 +177,8 @@ impl PretrainNetwork {
         sum * (2.0 / (num_rows as f64 + num_pairs).max(1.0))
     }
 
-    /// Where the keypoints are, by what their part's ROIs in the other images show there: the cross-entropy over the cells,
-    /// divided by the keypoints that have a cell.
+    /// Loss of the keypoint positions, which are predicted from their part's ROIs in the other images: the sum of
+    /// cross-entropies over the cells, divided by the number of keypoints that have a cell.
     fn keypoint_loss(&self, features: &[Tensor<4>; 5], chosen: &[Chosen], targets: &[ResizedTarget]) -> Tensor<1> {
         let zero = || Tensor::zeros([1], &features[0].device());
         let (Some(head), Some(config)) =
@@ -198,7 +199,7 @@ impl PretrainNetwork {
         let [_, channels, _, _] = hidden.dims();
         let flat: Tensor<3> = hidden.clone().reshape([count, channels, side * side]);
 
-        // [R, K, S·S] reads each ROI at its keypoints, [K, R, R] takes the mean over the other images' ROIs of the part.
+        // [R, K, S·S] samples each ROI at its keypoints; [K, R, R] averages over the other images' ROIs of the part.
         let mut readings = vec![0f32; count * NUM_KEYPOINTS * side * side];
         let mut is_read = vec![[false; NUM_KEYPOINTS]; count];
         for (row, of_roi) in readings.chunks_exact_mut(NUM_KEYPOINTS * side * side).enumerate() {
@@ -246,7 +247,7 @@ impl PretrainNetwork {
     }
 }
 
-/// The ROI on whatever part, as the first class.
+/// The same ROI with every part as the first class.
 fn any_part(sampled: &SampledRoi) -> SampledRoi {
     let class = match sampled.class {
         RoiClass::Object { gt_idx, .. } => RoiClass::Object { class_idx: 0, gt_idx },
@@ -255,7 +256,7 @@ fn any_part(sampled: &SampledRoi) -> SampledRoi {
     SampledRoi { roi: sampled.roi, class }
 }
 
-/// An ROI on a part.
+/// A sampled ROI on a part.
 #[derive(Debug, Clone, Copy)]
 struct Chosen {
     roi: Roi,
@@ -269,7 +270,7 @@ impl Chosen {
     }
 }
 
-/// ROIs on parts, at most [`MAX_ROIS_PER_IMAGE`] an image.
+/// Samples ROIs on parts, at most [`MAX_ROIS_PER_IMAGE`] per image.
 fn choose(rois: &[SampledRoi], num_images: usize, rngs: &mut [Pcg64Mcg]) -> Vec<Chosen> {
     let on_part = |sampled: &SampledRoi| match sampled.class {
         RoiClass::Object { class_idx, gt_idx } => Some(Chosen { roi: sampled.roi, part_idx: class_idx, gt_idx }),

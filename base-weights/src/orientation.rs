@@ -1,8 +1,8 @@
-//! The orientation CNN's task: the turn of a part against another view of it that is turned in steps.
+//! The orientation CNN's task: the angle of a part relative to another view of it, which is rotated in steps.
 //!
 //! ```text
-//! a view of a part ─ crops turned by 15° each ─ features: one prototype a turn ─ imprint ─┐
-//! other views of it ─ crops at any turn ─ features ───────────────────── scores of the 24 turns ─ cross-entropy
+//! a view of a part ─ crops in steps of 15° ─ features: one prototype per angle ─ imprint ─┐
+//! other views of it ─ crops at any angle ─ features ───────────────── scores of the 24 angles ─ cross-entropy
 //! ```
 
 use std::f64::consts::TAU;
@@ -28,20 +28,20 @@ use sdg_training::step_seed;
 use crate::pictures::{MIN_VISIBLE_SHARE, Pictures};
 use crate::run::{Settings, Task};
 
-/// Crops of the one view, and parts and other views of each that a step compares with it.
+/// Number of rotated crops of the one view, and maximum numbers of parts and of other views per part in a step.
 const NUM_TURNS: usize = 24;
 const MAX_PARTS: usize = 4;
 const MAX_VIEWS: usize = 4;
 
-/// Standard deviation of the bell that stands for the true turn among the [`NUM_TURNS`].
+/// Standard deviation of the target distribution over the [`NUM_TURNS`] angles, around the true angle.
 const SIGMA_DEGREES: f64 = 8.0;
 
-/// Network and imprint.
+/// The orientation CNN and its imprint network.
 #[derive(Module, Debug)]
 pub struct OrientationNetwork {
-    /// Its classes are not used.
+    /// The network, whose classes are not used.
     pub network: OrientationCnn,
-    /// What makes classes of features.
+    /// Computes classes from features.
     pub imprint: ClassImprint,
 }
 
@@ -52,7 +52,8 @@ pub struct OrientationTask {
     jitter: BoxJitter,
 }
 
-/// The crops of a part in a step: those of one view by their turns, and those of others.
+/// The crops of a part in a step: one view at all angles (`turned`), and other views at one angle each
+/// (`asked`).
 struct Compared {
     turned: Vec<LabelledCrop>,
     asked: Vec<LabelledCrop>,
@@ -62,7 +63,7 @@ impl OrientationTask {
     /// Prepares the pictures of a run.
     ///
     /// # Errors
-    /// Settings that the generator refuses.
+    /// Settings that the generator rejects.
     pub fn new(settings: &Settings, config: OrientationConfig) -> Result<Self> {
         let detector = crate::network::pretrain_config();
         let pictures = Pictures::new(settings.num_parts, &detector, settings.seed)?;
@@ -104,7 +105,8 @@ impl OrientationTask {
                 .iter()
                 .take(MAX_VIEWS)
                 .enumerate()
-                // Turned by the golden angle after each other: at any turn, without a generator of their own.
+                // Each view is rotated by the golden angle further than the one before: the angles are spread
+                // evenly without random numbers.
                 .filter_map(|(k, (image, object))| crop(image, object, start + 137.5 * (k + 1) as f64, &self.jitter))
                 .collect();
             (turned.len() == NUM_TURNS && !asked.is_empty()).then_some(Compared { turned, asked })
@@ -153,7 +155,7 @@ impl Task for OrientationTask {
     }
 }
 
-/// A distribution over turned crops around an angle; sums to one.
+/// The target distribution over rotated crops, around an angle; its sum is one.
 fn bell(angle: Angle, turned: &[LabelledCrop]) -> Vec<f32> {
     let concentration = (360.0 / (TAU * SIGMA_DEGREES)).powi(2);
     let weights: Vec<f64> =
@@ -162,7 +164,8 @@ fn bell(angle: Angle, turned: &[LabelledCrop]) -> Vec<f32> {
     weights.into_iter().map(|weight| (weight / sum) as f32).collect()
 }
 
-/// The truth about an instance as crops are made of it; none for what is hardly visible or has no outline.
+/// The ground truth of an instance in the form that crops are made from; `None` if the instance is hardly
+/// visible or has no outline.
 fn object(instance: &Instance, image: &RgbImage) -> Option<SampleObject> {
     let bbox = instance.bbox.clip(f64::from(image.width()), f64::from(image.height()));
     if instance.visible_share < MIN_VISIBLE_SHARE || bbox.width() < 4.0 || bbox.height() < 4.0 {

@@ -2,49 +2,50 @@
 
 use serde::{Deserialize, Serialize};
 
-/// What becomes of one teaching.
+/// The outcome of one teaching.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
     /// The name of the weights.
     pub weights: String,
     /// Seed of the part.
     pub part: u64,
-    /// Steps of teaching.
+    /// Number of teaching steps.
     pub steps: usize,
     /// Seed of teaching.
     pub seed: u64,
-    /// Pictures with the part, and those in which the surest accepted detection is right, and in which it is wrong.
+    /// Number of pictures with the part.
     pub with: usize,
-    /// Right.
+    /// Pictures with the part in which the accepted detection with the highest score is correct.
     pub found: usize,
-    /// Accepted at a wrong place.
+    /// Pictures with the part in which the accepted detection with the highest score is wrong.
     pub wrong: usize,
-    /// Pictures with other parts alone, and those with an accepted detection.
+    /// Number of pictures with other parts only.
     pub without: usize,
-    /// False alarms.
+    /// False alarms: pictures with other parts only that have an accepted detection.
     pub alarms: usize,
-    /// Pictures with look-alikes alone, and those with an accepted detection.
+    /// Number of pictures with look-alikes only.
     pub look_alikes: usize,
-    /// Look-alikes taken for the part.
+    /// Pictures with look-alikes only that have an accepted detection.
     pub look_alike_alarms: usize,
-    /// Pictures with the part in which the surest detection, accepted or not, is right.
+    /// Pictures with the part in which the detection with the highest score, accepted or not, is correct.
     pub placed: usize,
-    /// Of those placed, the ones whose score is above that of all but one of the pictures with other parts alone: what the
-    /// best threshold would accept at one false alarm.
+    /// The `placed` pictures whose score is above the second-highest score of the pictures with other parts only: the
+    /// best threshold would accept them at one false alarm.
     #[serde(default)]
     pub separated: usize,
-    /// Median error of what is right, in pixels of the photo.
+    /// Median error of the correct accepted detections, in pixels of the photo.
     pub error_px: Option<f64>,
-    /// Processor time of teaching, seconds.
+    /// Processor time of teaching, in seconds.
     pub cpu_secs: f64,
-    /// Steps done: an early stop makes them fewer.
+    /// Number of steps done, fewer than `steps` after an early stop.
     pub steps_done: usize,
-    /// Why there is no model; pictures then count as neither found nor alarms.
+    /// The reason if there is no model; `found` and all alarms are then zero.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub failed: Option<String>,
 }
 
-/// The outcomes in JSON lines. A line that was cut off when the program was stopped is none: it is measured again.
+/// The outcomes in JSON lines. An incomplete line, cut off when the program was stopped, is skipped, so its trial is
+/// measured again.
 pub fn outcomes(text: &str) -> Vec<Outcome> {
     text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect()
 }

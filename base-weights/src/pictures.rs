@@ -1,4 +1,4 @@
-//! What is learnt from: pictures of several generated parts each, with the truth, by random access.
+//! The training pictures: each shows several generated parts, with ground truth and random access by index.
 
 use anyhow::Result;
 use rand::seq::SliceRandom;
@@ -12,27 +12,27 @@ use sdg_part_generator::{
     DemonstrationPhoto, LookAlike, MixedInstance, MixedSample, Part, PhotoConfig, SceneConfig, Scenes,
 };
 
-/// Every so many parts, one is a look-alike of the part before it: what tells the two apart must be learnt.
+/// Every second part is a look-alike of the part before it, so the network must learn to tell them apart.
 const LOOK_ALIKE_EVERY: usize = 2;
 
-/// Parts that a step tells apart, and the parts next to each other by size that they are drawn from: the size alone, which
-/// a photo gives away only roughly, shall not tell which it is.
+/// Number of parts that a step tells apart, and number of parts adjacent in size from which they are chosen: the size,
+/// which a photo gives only roughly, must not be enough to identify a part.
 const GROUP: usize = 8;
 const GROUP_FROM: usize = 20;
 
-/// Parts of which less is visible are not asked for.
+/// Minimum visible fraction of a part that is a training target.
 pub(crate) const MIN_VISIBLE_SHARE: f64 = 0.35;
 
-/// Seeds of the parts that are learnt from. Parts to measure on have seeds below [`FIRST_PART_SEED`].
+/// First seed of the training parts. Parts to measure on have smaller seeds.
 pub const FIRST_PART_SEED: u64 = 1 << 32;
 
-/// Scenes of 320×240 px in which parts have 22 to 140 px of diagonal.
+/// Scenes of 320×240 px in which the diagonal of parts is 22 to 140 px.
 pub fn scene_config() -> SceneConfig {
     SceneConfig {
         photo: PhotoConfig { fill: [0.12, 0.45], ..PhotoConfig::default() },
         absent_share: 0.0,
         instances: [4, 9],
-        // Every part in the picture is labelled; nothing but tables and covers is background.
+        // Every part in the picture is labelled; only tables and covers are background.
         others: [0, 0],
         look_alike_share: 0.0,
         num_other_parts: 0,
@@ -46,18 +46,18 @@ pub fn scene_config() -> SceneConfig {
 pub struct Pictures {
     scenes: Scenes,
     transform: ImageTransform,
-    /// Parts whose turn cannot be told: their keypoints are not asked for.
+    /// Parts whose angle is ambiguous: their keypoints are no targets.
     is_symmetric: Vec<bool>,
-    /// All parts, the smallest first; look-alikes stand beside each other.
+    /// All parts, the smallest first; look-alikes are adjacent.
     by_size: Vec<usize>,
     seed: u64,
 }
 
 impl Pictures {
-    /// Prepares so many parts.
+    /// Generates `num_parts` parts.
     ///
     /// # Errors
-    /// A scene configuration that the generator refuses.
+    /// A scene configuration that the generator rejects.
     pub fn new(num_parts: usize, network: &RcnnConfig, seed: u64) -> Result<Self> {
         let parts = draw_parts(num_parts, seed);
         let is_symmetric = parts.iter().map(|part| part.symmetry() != RotationalSymmetry::None).collect();
@@ -78,31 +78,31 @@ impl Pictures {
         group
     }
 
-    /// How many parts there are.
+    /// Number of parts.
     pub fn num_parts(&self) -> usize {
         self.is_symmetric.len()
     }
 
-    /// The photo that a part is demonstrated by.
+    /// The photo of a part's demonstration.
     pub fn photo(&self, part_idx: usize) -> &DemonstrationPhoto {
         self.scenes.photo(part_idx)
     }
 
-    /// Picture `index` of a group of parts, with the truth.
+    /// Picture `index` of a group of parts, with ground truth.
     pub fn mixed_sample(&self, group: &[usize], index: u64) -> MixedSample {
         self.scenes.mixed_sample_of(group, index)
     }
 
-    /// Whether a part's turn can be told.
+    /// Whether a part's angle is unambiguous.
     pub fn has_turn(&self, part_idx: usize) -> bool {
         !self.is_symmetric[part_idx]
     }
 
-    /// Picture `index` of a group of parts as the network gets it, and what is in it, in pixels of the network's input. A
-    /// part's label is its place in the group.
+    /// Picture `index` of a group of parts as the network's input, and its targets in pixels of that input. A part's
+    /// label is its position in the group.
     ///
     /// # Errors
-    /// A picture that the network refuses.
+    /// A picture that the network rejects.
     pub fn picture(&self, group: &[usize], index: u64) -> Result<(TransformedImage, ResizedTarget)> {
         let MixedSample { image, instances } = self.mixed_sample(group, index);
         let transformed = self.transform.apply(&image)?;
@@ -124,7 +124,7 @@ impl Pictures {
     }
 }
 
-/// The parts of a seed, each as often as any other.
+/// Generates the parts of a seed: pairs of a part and its look-alike.
 pub fn draw_parts(num_parts: usize, seed: u64) -> Vec<Part> {
     let first = FIRST_PART_SEED.wrapping_add(seed.wrapping_mul(1_000_000));
     let mut parts: Vec<Part> = Vec::with_capacity(num_parts);
@@ -139,13 +139,13 @@ pub fn draw_parts(num_parts: usize, seed: u64) -> Vec<Part> {
     parts
 }
 
-/// The part that one of [`draw_parts`] was made to look like, or that was made to look like it; another part where none
-/// could be made.
+/// The other part of a pair of [`draw_parts`]: the look-alike, or an unrelated part where no look-alike could be made.
 pub fn look_alike_of(part_idx: usize) -> usize {
     part_idx ^ 1
 }
 
-/// The keypoints on the grasp line, start to end, in pixels of the network's input; unlabelled outside the box.
+/// The keypoints on the grasp line, start to end, in pixels of the network's input; keypoints outside the box are
+/// unlabelled.
 fn keypoints(grasp: &GraspLine, is_symmetric: bool, bbox: &BoundingBox, [sx, sy]: [f64; 2]) -> Vec<Keypoint> {
     let labelled = |keypoint: Keypoint| {
         let visibility = match !is_symmetric && bbox.contains(&keypoint.point()) {

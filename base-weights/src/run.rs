@@ -1,4 +1,5 @@
-//! A pretraining run: pictures, losses, gradients, steps, checkpoints. What differs between networks is a [`Task`].
+//! A pretraining run: pictures, losses, gradients, steps, checkpoints. A [`Task`] provides the parts that depend on
+//! the network.
 
 use std::path::Path;
 
@@ -12,47 +13,47 @@ use serde::{Deserialize, Serialize};
 
 use crate::checkpoint::Checkpoint;
 
-/// Decoupled weight decay and the norm that each parameter's gradient is cut to, as teaching has them.
+/// Decoupled weight decay, and the norm to which each parameter's gradient is clipped; both as in teaching.
 const WEIGHT_DECAY: f64 = 1e-4;
 const MAX_GRADIENT_NORM: f64 = 10.0;
 
-/// What decides a run.
+/// The settings that determine a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
-    /// Decides parts, pictures and every random choice.
+    /// Determines parts, pictures and every random choice.
     pub seed: u64,
-    /// Parts that are drawn from.
+    /// Number of generated parts.
     pub num_parts: usize,
-    /// Pictures a step.
+    /// Pictures per step.
     pub batch_size: usize,
-    /// Steps of the whole run.
+    /// Number of steps of the whole run.
     pub steps: usize,
     /// Learning rate over the run.
     pub schedule: OneCycle,
 }
 
 impl Settings {
-    /// The run of `make base-weights` with so many parts and steps.
+    /// The settings of `make base-weights`, with these numbers of parts and steps.
     pub fn new(seed: u64, num_parts: usize, steps: usize) -> Self {
         Self { seed, num_parts, batch_size: 5, steps, schedule: OneCycle { peak: 1e-3, warm_up: 0.1 } }
     }
 }
 
-/// What a network learns.
+/// The network and losses of a pretraining run.
 pub trait Task: Sized {
     /// The module that is pretrained, all of whose parameters the optimiser updates.
     type Network: Module + Clone;
 
-    /// Draws the network, on a device that carries autodiff.
+    /// Initialises the network at random, on a device with autodiff.
     ///
     /// # Errors
     /// A configuration that contradicts itself.
     fn network(&self, settings: &Settings, device: &Device) -> Result<Self::Network>;
 
-    /// The losses of a step by their names; their sum is descended.
+    /// The losses of a step, by name; the run minimises their sum.
     ///
     /// # Errors
-    /// A picture that the network refuses.
+    /// A picture that the network rejects.
     fn losses(
         &self,
         network: &Self::Network,
@@ -61,7 +62,7 @@ pub trait Task: Sized {
     ) -> Result<Vec<(&'static str, Tensor<1>)>>;
 }
 
-/// A run and where it is.
+/// A run and its current state.
 pub struct Run<T: Task> {
     task: T,
     settings: Settings,
@@ -71,16 +72,16 @@ pub struct Run<T: Task> {
 }
 
 impl<T: Task> Run<T> {
-    /// Starts a run; `device` is without gradients.
+    /// Starts a run; `device` is without autodiff.
     ///
     /// # Errors
-    /// As [`Task::network`].
+    /// The errors of [`Task::network`].
     pub fn start(task: T, settings: Settings, device: &Device) -> Result<Self> {
         let network = task.network(&settings, &device.clone().autodiff())?;
         Ok(Self { task, settings, network, optimizer: AdamW::new(WEIGHT_DECAY, MAX_GRADIENT_NORM), step: 0 })
     }
 
-    /// Goes on from a checkpoint.
+    /// Resumes a run from a checkpoint.
     ///
     /// # Errors
     /// A checkpoint of another network.
@@ -89,7 +90,7 @@ impl<T: Task> Run<T> {
         let (network, report) = state_dict::import(fresh.network, &checkpoint.parameters);
         if !report.is_complete() {
             bail!(
-                "expected a checkpoint of this network, found {} parameters missing, {} of another shape and {} of none",
+                "expected a checkpoint of this network, found {} parameters missing, {} of a different shape and {} unexpected",
                 report.missing.len(),
                 report.mismatched.len(),
                 report.unused.len()
@@ -99,10 +100,10 @@ impl<T: Task> Run<T> {
         Ok(Self { network, optimizer, step: checkpoint.step, ..fresh })
     }
 
-    /// Reads the checkpoint at a path and goes on, or starts a run where there is none.
+    /// Resumes from the checkpoint at a path, or starts a run if the file does not exist.
     ///
     /// # Errors
-    /// A checkpoint of other settings.
+    /// A checkpoint of a run with other settings.
     pub fn start_or_resume(task: T, path: &Path, settings: Settings, device: &Device) -> Result<Self> {
         if !path.exists() {
             return Self::start(task, settings, device);
@@ -114,7 +115,7 @@ impl<T: Task> Run<T> {
         Self::resume(task, &checkpoint, device)
     }
 
-    /// Steps done.
+    /// Number of steps done.
     pub fn step(&self) -> usize {
         self.step
     }
@@ -124,7 +125,7 @@ impl<T: Task> Run<T> {
         self.step >= self.settings.steps
     }
 
-    /// What a later run goes on from.
+    /// The state from which a later run resumes.
     pub fn checkpoint(&self) -> Checkpoint<Settings> {
         Checkpoint {
             settings: self.settings.clone(),
@@ -134,7 +135,7 @@ impl<T: Task> Run<T> {
         }
     }
 
-    /// Does one step; gives its losses.
+    /// Does one step and returns its losses.
     ///
     /// # Errors
     /// A loss that is not finite.

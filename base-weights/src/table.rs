@@ -1,11 +1,12 @@
-//! Outcomes as a table: a row for weights and steps, summed over the parts that all rows have.
+//! Outcomes as a table: one row per weights and number of steps, summed over the parts that all rows have.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
 use crate::outcome::Outcome;
 
-/// Markdown of the outcomes, over the parts that were measured in every row; `only` names the rows, all where it is empty.
+/// Formats the outcomes as Markdown, over the parts that were measured in every row; `only` selects the weights by
+/// name, all if it is empty.
 pub fn table(outcomes: &[Outcome], only: &[String]) -> String {
     let mut rows: BTreeMap<(&str, usize), Vec<&Outcome>> = BTreeMap::new();
     for outcome in outcomes.iter().filter(|outcome| only.is_empty() || only.contains(&outcome.weights)) {

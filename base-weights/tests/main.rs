@@ -1,4 +1,5 @@
-//! One program for all tests of this folder: each links the whole crate.
+//! One test binary for all files of this folder, because each binary links the whole
+//! crate.
 #![allow(clippy::unwrap_used)]
 
 mod resume;

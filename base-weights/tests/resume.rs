@@ -13,7 +13,8 @@ use sdg_orientation::OrientationConfig;
 
 const STEPS: usize = 50;
 
-/// The pretraining's network, narrow and for small pictures, so that fifty steps take seconds.
+/// The network of the pretraining, narrow and for small pictures, so that fifty steps take
+/// seconds.
 fn narrow() -> RcnnConfig {
     let mut config = pretrain_config();
     config.input.resize = ResizeRule::FitWithin { width_px: 96, height_px: 72 };
@@ -39,7 +40,7 @@ fn advance<T: Task>(run: &mut Run<T>, steps: usize) -> Vec<f64> {
     (0..steps).map(|_| run.advance().unwrap().iter().map(|(_, loss)| loss).sum()).collect()
 }
 
-/// Fifty steps at once, and in two runs with a checkpoint between; gives the losses.
+/// Does fifty steps at once, and in two runs with a checkpoint between; returns the losses.
 fn stopped_and_not<T: Task>(task: impl Fn() -> T, settings: &Settings) -> Vec<f64> {
     let device = Device::flex();
     let mut whole = Run::start(task(), settings.clone(), &device).unwrap();
@@ -68,7 +69,7 @@ fn mean(losses: &[f64]) -> f64 {
 #[test]
 fn fifty_steps_of_the_detector_are_the_same_bits_whether_stopped_or_not() {
     let losses = stopped_and_not(|| task(narrow()), &settings());
-    // Something was learnt meanwhile.
+    // The losses must have fallen.
     assert!(mean(&losses[STEPS - 10..]) < mean(&losses[..10]), "{losses:?}");
 }
 
@@ -104,7 +105,7 @@ fn fifty_steps_of_the_comparison_network_are_the_same_bits_whether_stopped_or_no
     let losses = stopped_and_not(task, &settings);
     assert!(mean(&losses[STEPS - 10..]) < mean(&losses[..10]), "{losses:?}");
 
-    // The trunk starts as the orientation CNN's first stages, and is learnt.
+    // The trunk starts as the orientation CNN's first stages and is trained.
     let mut run = Run::start(task(), settings.clone(), &Device::flex()).unwrap();
     let is_first = |run: &Run<ComparisonTask>| {
         run.checkpoint().parameters["trunk.1.convs.0.weight"] == orientation["stages.1.convs.0.weight"]

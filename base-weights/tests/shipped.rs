@@ -1,11 +1,12 @@
-//! The shipped weights against their hash, their metadata and the figures in the documents.
+//! Tests the shipped weights against their hash, their metadata and the figures in the
+//! documents.
 
 use std::path::Path;
 
 use sdg_grasp::{BaseWeightsFile, ModelKind, Preset, TeachOptions};
 use sha2::{Digest, Sha256};
 
-/// More may not be in the repository.
+/// Maximum size of the file in the repository.
 const MAX_BYTES: usize = 12_000_000;
 
 #[test]
@@ -28,7 +29,8 @@ fn the_file_is_whole_small_and_says_how_it_was_made() {
         let weights = file.for_network(Preset::Edge.name(), &network, sha256.clone()).unwrap();
         let is_whole = !weights.imprint.is_empty() && weights.orientation.is_some() && !weights.comparison.is_empty();
         assert!(is_whole, "{kind}");
-        // Teaching draws nothing anew but the class scores, which it makes of the part's views.
+        // Teaching initialises no parameters but the class scores, and computes those from the
+        // part's views.
         assert!(weights.reinitialized.iter().all(|name| name.contains("cls_score")), "{:?}", weights.reinitialized);
     }
 }

@@ -1,5 +1,5 @@
-// The same network on the same picture in one page: ours, and onnxruntime-web on its export from PyTorch. Turn by turn,
-// one thread each, no WebGPU.
+// Runs the same network on the same picture in one page: our module, and onnxruntime-web with the network's export from
+// PyTorch. They run alternately, with one thread each and without WebGPU.
 
 import { Detector } from "./detector.js";
 import * as ort from "./ort.wasm.min.mjs";
@@ -29,7 +29,7 @@ async function theirs() {
     executionProviders: ["wasm"],
     graphOptimizationLevel: "all",
   });
-  // What our own transform makes of the picture: resized, normalised, padded.
+  // The picture after our own transform: resized, normalised, padded.
   const pixels = new Float32Array(await (await bytesOf("input.f32")).arrayBuffer());
   const images = new ort.Tensor("float32", pixels, [1, 3, HEIGHT, WIDTH]);
   return async () => {

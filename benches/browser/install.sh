@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Installs onnxruntime-web and Chromium, with which our page is compared: install.sh FOLDER. Does nothing when all is there.
+# Installs onnxruntime-web and Chromium, with which our page is compared: install.sh FOLDER. Does nothing if both are installed.
 set -euo pipefail
 
 version=1.30.0

@@ -1,4 +1,4 @@
-"""The paper's augmentation with albumentations: turn, tint, shift, scale; box and keypoints go along."""
+"""The paper's augmentation with albumentations: rotation, tint, shift, scale; box and keypoints are transformed too."""
 
 from concurrent.futures import ThreadPoolExecutor
 
@@ -40,7 +40,7 @@ def work(fused, demonstration, threads):
         "labels": [0],
         "keypoints": along * np.array([[width, height]]),
     }
-    # Two ways to use the threads; whichever is faster here stands for albumentations.
+    # Two ways to use the threads; the faster one on this machine represents albumentations.
     pool = ThreadPoolExecutor(threads)
     augmenters = [augmenter(fused, seed) for seed in range(threads)]
 
@@ -60,7 +60,7 @@ def work(fused, demonstration, threads):
 
 
 def faster(ways):
-    """Times each way after a warm-up, sets OpenCV's threads for the faster one and gives it."""
+    """Times each way after a warm-up, sets OpenCV's threads for the faster one and returns it."""
     import time
 
     seconds = []
@@ -76,10 +76,10 @@ def faster(ways):
 
 
 def four_operations(demonstration, threads):
-    """As the paper's program does it, one after the other: the same operations as ours."""
+    """The operations of the paper's program in sequence, the same as ours."""
     return work(False, demonstration, threads)
 
 
 def one_affine(demonstration, threads):
-    """Turn, shift and scale in one warp; the picture is not cut off between them."""
+    """Rotation, shift and scale in one warp, without clipping the picture between them."""
     return work(True, demonstration, threads)

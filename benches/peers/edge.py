@@ -1,7 +1,7 @@
 """The `edge` detector in PyTorch: the network of crates/detection's preset, layer by layer, on torch's operations.
 
-Shapes: N images, C channels, L anchors of an image, R ROIs, K keypoints, S side of a heatmap. Modules are named as the
-parameters in our weights.
+Shapes: N images, C channels, L anchors of an image, R ROIs, K keypoints, S side of a heatmap. Modules have the names of
+the parameters in our weights.
 """
 
 import math
@@ -22,14 +22,14 @@ from r50 import gflop_of
 WIDTH, HEIGHT, DIVISIBILITY = 320, 240, 32
 BATCH = 4
 NUM_KEYPOINTS = 12
-# Six parts a picture, as many as go through the keypoint head, so that it has the same to do on both sides.
+# Six parts per picture, as many as go through the keypoint head, so that its work is the same on both sides.
 GRID = (3, 2)
 SIZES, RATIOS, STRIDES = (24, 40, 70, 120, 200), (0.5, 1.0, 2.0), (4, 8, 16, 32, 64)
 BETA = 1 / 9
 
 
 class Conv(nn.Conv2d):
-    """A convolution that keeps the size (at stride 1), with group norm instead of a bias where `norm` says so."""
+    """A convolution that keeps the size (at stride 1), with group norm instead of a bias if `norm` is true."""
 
     def __init__(self, c_in, c_out, kernel, stride=1, norm=False):
         super().__init__(c_in, c_out, kernel, stride, kernel // 2, bias=not norm)
@@ -108,7 +108,7 @@ class Detector(nn.Module):
         self.anchors_of = {}
 
     def anchors(self, features):
-        """Anchors of each level; kept, since every picture has the same size."""
+        """Anchors of each level; cached, because every picture has the same size."""
         key = tuple(feature.shape[-2:] for feature in features)
         if key not in self.anchors_of:
             levels = []
@@ -257,7 +257,7 @@ def heatmap_cells(keypoints, boxes, size=56):
 
 
 def local_means(logits, boxes, radius=3):
-    """Keypoints `[R, K, 3]`, x y score: the softmax's mean place around each map's peak."""
+    """Keypoints `[R, K, 3]`, x y score: the mean position around each map's peak, weighted by the softmax."""
     size = logits.shape[-1]
     flat = logits.flatten(2)
     peak, best = flat.max(2, keepdim=True)
@@ -286,7 +286,7 @@ def grasp(keypoints):
 
 
 def network_input(picture):
-    """Bytes `[480, 640, 3]` to the normalised, padded `[1, 3, 256, 320]`."""
+    """Converts bytes `[480, 640, 3]` to the normalised, padded `[1, 3, 256, 320]`."""
     resized = T.resize(torch.from_numpy(picture).permute(2, 0, 1), [HEIGHT, WIDTH], antialias=True)
     normalised = T.normalize(resized.float().div_(255), (0.485, 0.456, 0.406), (0.229, 0.224, 0.225))
     return F.pad(normalised, (0, -WIDTH % DIVISIBILITY, 0, -HEIGHT % DIVISIBILITY))[None]
@@ -330,7 +330,7 @@ def training_step(path, layout):
     boxes = scene.boxes(*GRID)
     marks = scene.keypoints(boxes, NUM_KEYPOINTS)
     target = {"boxes": torch.from_numpy(boxes * scale), "keypoints": torch.from_numpy(marks * scale)}
-    # As our trainer has them from another thread: ready made.
+    # Prepared beforehand, because our trainer gets them from another thread.
     images = torch.cat([network_input(scene.picture(number)) for number in range(BATCH)])
     images = images.to(memory_format=layout)
 

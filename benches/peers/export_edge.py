@@ -1,7 +1,7 @@
 """Writes the `edge` detector of a grasp model as ONNX: `export_edge.py MODEL.sdg OUT`.
 
-From the network's input `[1, 3, 256, 320]` to boxes `[R, 4]`, scores `[R]` and keypoints `[R, K, 3]`, best first: all
-that our own detector does between resizing and reading off the grasp.
+The export computes boxes `[R, 4]`, scores `[R]` and keypoints `[R, K, 3]`, best first, from the network's input
+`[1, 3, 256, 320]`: all steps of our own detector between resizing and the computation of the grasp.
 """
 
 import sys
@@ -19,7 +19,7 @@ class Detection(edge.Detector):
         return self.detect(images)
 
     def pool(self, features, boxes, size):
-        """As the detector's own, without its question whether a level has any box: a trace keeps one answer for ever."""
+        """Like the detector's own, but without the test whether a level has any box, because a trace keeps only one result."""
         rois = F.pad(boxes[0], (1, 0))
         areas = (rois[:, 3] - rois[:, 1]) * (rois[:, 4] - rois[:, 2])
         levels = torch.floor(4 + torch.log2(areas.sqrt() / 112 + 1e-8)).clamp(2, 5).long() - 2
@@ -36,10 +36,10 @@ def main():
         sys.exit("usage: export_edge.py MODEL.sdg OUT")
     detector = weights.load(Detection(), weights.read(sys.argv[1], "network."))
     example = torch.zeros(1, 3, edge.HEIGHT + -edge.HEIGHT % edge.DIVISIBILITY, edge.WIDTH)
-    # Traced on noise: on an empty picture nothing is found, and what follows would not be seen.
+    # Traced on noise, because on an empty picture nothing is found and the following steps would not be traced.
     example.normal_(generator=torch.Generator().manual_seed(1))
     with torch.no_grad():
-        # The exporter by tracing: how many boxes are kept is known only when it runs, which the newer one refuses.
+        # The exporter that traces; the newer one rejects a number of boxes that is known only at run time.
         torch.onnx.export(
             detector.eval(),
             (example,),

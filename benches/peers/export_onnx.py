@@ -9,7 +9,7 @@ import r50
 
 
 def with_plain_norms(module):
-    """Batch norms that exporters know, in place of torchvision's frozen ones, so that the runtimes can fold them."""
+    """Replaces torchvision's frozen batch norms by batch norms that exporters know, so that the runtimes can fold them."""
     for name, child in module.named_children():
         if isinstance(child, FrozenBatchNorm2d):
             norm = torch.nn.BatchNorm2d(len(child.weight), eps=child.eps)

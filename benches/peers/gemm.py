@@ -1,4 +1,4 @@
-"""A square product, to measure the machine by."""
+"""A product of square matrices, which measures the machine."""
 
 import torch
 

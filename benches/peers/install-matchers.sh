@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Installs the template matchers that model S is compared with into a folder of its own: install-matchers.sh FOLDER. Does nothing
-# when they are there. Apart from the networks' peers: OpenCV with and without contrib cannot stand in one environment.
+# Installs the template matchers that model S is compared with into a folder: install-matchers.sh FOLDER. Does nothing if they are
+# installed. Separate from the networks' peers, because one environment cannot have OpenCV both with and without contrib.
 set -euo pipefail
 
 folder=$1

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Installs what we are compared with into a folder of its own: install.sh FOLDER. Does nothing when it is all there.
-# torch comes without the CUDA packages that it names as its own: see without_cuda.py.
+# Installs the peers that we are compared with into a folder: install.sh FOLDER. Does nothing if they are installed.
+# torch is installed without its CUDA packages: see without_cuda.py.
 set -euo pipefail
 
 folder=$1
@@ -24,7 +24,7 @@ fi
 echo "bench: installing the peers into $folder (once; about 0.9 GB to fetch, 2 GB on disk)" >&2
 rm -rf "$folder"
 python3 -m venv "$folder"
-# Every package that is really needed is listed with its version; --no-deps leaves out what torch would add for CUDA.
+# Every needed package is listed with its version; --no-deps leaves out the packages that torch would add for CUDA.
 "$folder/bin/pip" install --quiet --disable-pip-version-check --no-deps --requirement "$peers/requirements.txt"
 site_packages=$("$folder/bin/python" -c 'import sysconfig; print(sysconfig.get_path("purelib"))')
 "$folder/bin/python" "$peers/without_cuda.py" "$site_packages"

@@ -1,10 +1,10 @@
-"""Template matchers beside model S, one a process: matchers.py NAME --photo FILE --outline JSON --threads N.
+"""Template matchers to compare with model S, one per process: matchers.py NAME --photo FILE --outline JSON --threads N.
 
 in:   {"image": PATH}                                          a picture
-out:  {"seconds": s, "found": [[x, y, angle, score], ...]}     where the middle of the outline's box lies, pixels; degrees, clockwise
+out:  {"seconds": s, "found": [[x, y, angle, score], ...]}     centre of the outline's box, pixels; degrees, clockwise
                                                                as seen, from the photo; best first
-First comes {"ready": {"version": ..., "seconds": s}}, with the seconds that it took to learn the photo. All look for the part in every
-turn, at the photo's size: none of them has another.
+The first message is {"ready": {"version": ..., "seconds": s}}, with the seconds for learning the photo. All matchers search the part at
+all angles and at the photo's size, because none of them supports other sizes.
 """
 
 import argparse
@@ -22,7 +22,7 @@ MOST_FOUND = 40
 
 
 class Part:
-    """The photo, turned about the middle of the outline's box."""
+    """The photo, rotated about the centre of the outline's box."""
 
     def __init__(self, photo, outline):
         self.photo, self.outline = photo, np.array(outline, np.float64)
@@ -30,8 +30,8 @@ class Part:
         self.middle, self.extent = (low + high) / 2, float((high - low).max())
 
     def turned(self, degrees):
-        """Picture and mask of the part, cut to it, and where the middle is in them."""
-        # OpenCV's positive turn is counter-clockwise as seen.
+        """Picture and mask of the part, cropped to it, and the position of the centre in them."""
+        # OpenCV's positive angles are counter-clockwise as seen.
         turn = cv2.getRotationMatrix2D(tuple(self.middle), -degrees, 1.0)
         outline = self.outline @ turn[:, :2].T + turn[:, 2]
         low = np.floor(outline.min(0)) - 1
@@ -49,7 +49,7 @@ class Part:
 
 
 def apart(found, distance):
-    """The best first; none nearer to a better one than that."""
+    """The results, best first, without those nearer than `distance` to a better one."""
     kept = []
     for one in sorted(found, key=lambda one: -one[3]):
         if all(math.hypot(one[0] - other[0], one[1] - other[1]) >= distance for other in kept):
@@ -60,7 +60,7 @@ def apart(found, distance):
 
 
 class MatchTemplate:
-    """Normalised correlation under the mask, first where the part has some 50 pixels, then about the best places in full."""
+    """Normalised correlation under the mask, first at a size of about 50 pixels, then at full size around the best positions."""
 
     STEP, COARSE_PX, REFINED = 5, 50, 12
 
@@ -75,7 +75,7 @@ class MatchTemplate:
         if picture.shape[0] < template.shape[0] or picture.shape[1] < template.shape[1]:
             return None
         scores = cv2.matchTemplate(picture, template, cv2.TM_CCOEFF_NORMED, mask=mask)
-        # A patch of one grey has no correlation.
+        # A patch of uniform grey has no correlation.
         return np.where(np.isfinite(scores) & (scores <= 1.01), scores, -1)
 
     def find(self, picture):
@@ -111,7 +111,7 @@ class MatchTemplate:
 
 
 class Linemod:
-    """LINE-2D of opencv-contrib: quantised gradient directions, a template for every turn."""
+    """LINE-2D of opencv-contrib: quantised gradient directions, one template per angle."""
 
     STEP, LEAST_SIMILARITY = 5, 60
 
@@ -121,7 +121,7 @@ class Linemod:
         self.templates = []
         for degrees in range(0, 360, self.STEP):
             picture, mask, middle = self.part.turned(degrees)
-            # Gradients at the mask's edge need what lies about it.
+            # Gradients at the mask's edge need the pixels around it.
             border = 16
             picture = cv2.copyMakeBorder(picture, *[border] * 4, cv2.BORDER_REPLICATE)
             mask = cv2.copyMakeBorder(mask, *[border] * 4, cv2.BORDER_CONSTANT, value=0)
@@ -130,8 +130,8 @@ class Linemod:
                 self.templates.append((degrees, middle + border - (left, top)))
 
     def find(self, picture):
-        # The response maps need sides that the strides of both levels divide, and where a template reaches out of the picture,
-        # its search reads beyond its memory: a part's length of border keeps it within.
+        # The strides of both levels must divide the sides of the response maps. If a template extends beyond the picture, the
+        # search reads beyond its memory; a border of the part's length prevents this.
         border = math.ceil(self.part.extent)
         height, width = (side + 2 * border for side in picture.shape[:2])
         padded = cv2.copyMakeBorder(
@@ -148,7 +148,7 @@ class Linemod:
 
 
 class Corrmatch:
-    """corrmatch, its rectangle the outline's box; as many levels as leave the template 12 pixels."""
+    """corrmatch with the outline's box as rectangle, and as many levels as leave the template 12 pixels."""
 
     LEAST_PX = 12
 
@@ -163,7 +163,7 @@ class Corrmatch:
         compiled = corrmatch.Template(template).compile(CompileConfig(max_levels=levels))
         config = MatchConfig(rotation="enabled", parallel=True, max_image_levels=levels, beam_width=20)
         self.matcher = compiled.matcher(config)
-        # The match is the upper left corner of the rectangle as it was before it was turned about its middle.
+        # The match is the upper left corner of the rectangle before its rotation about its centre.
         self.middle = np.array(template.shape[::-1]) / 2
 
     def find(self, picture):
@@ -171,7 +171,7 @@ class Corrmatch:
         try:
             matches = self.matcher.match_topk(gray, MOST_FOUND)
         except RuntimeError as error:
-            # So it says that nothing was found.
+            # The error means that nothing was found.
             print(error, file=sys.stderr)
             return []
         found = [(one.x + self.middle[0], one.y + self.middle[1], one.angle_deg, one.score) for one in matches]
@@ -195,7 +195,7 @@ def main():
     os.environ["RAYON_NUM_THREADS"] = str(args.threads)
     cv2.setNumThreads(args.threads)
     kind, name, number = KINDS[args.kind]
-    # What libraries print must not get into the conversation.
+    # Output of libraries must not get into the protocol.
     answers = os.fdopen(os.dup(1), "w", buffering=1)
     os.dup2(2, 1)
     start = time.perf_counter()

@@ -1,10 +1,10 @@
 """OMPL's RRT-Connect on the problems of `planning proof`, with our collision model: success, number of collision checks, and whether its paths
-are free between the configurations that it looked at.
+are free between the checked configurations.
 
     python ompl_planning.py PLANNING_PROGRAM [COUNT] [FIRST_SEED] [SEGMENT_FRACTION]
 
-PLANNING_PROGRAM is target/release/examples/planning; its `serve` answers each check. SEGMENT_FRACTION is OMPL's longest valid segment as a share of the
-space's extent: 0.005 is what MoveIt's configuration of the Panda has, 0.01 is OMPL's own default.
+PLANNING_PROGRAM is target/release/examples/planning; its `serve` answers each check. SEGMENT_FRACTION is OMPL's longest valid segment as a fraction of
+the space's extent: 0.005 in MoveIt's configuration of the Panda, 0.01 as OMPL's default.
 """
 
 import math
@@ -14,16 +14,16 @@ import sys
 
 from ompl import base, geometric, util
 
-# As crates/kinematics/src/limits.rs has them.
+# As in crates/kinematics/src/limits.rs.
 LOW = [-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8973]
 HIGH = [2.8973, 1.7628, 2.8973, -0.0698, 2.8973, 3.7525, 2.8973]
 SOLVE_SECS = 10.0
-# Steps at which a path is looked at afterwards, rad.
+# Step in rad at which a path is checked afterwards.
 FINE_RAD = 0.003
 
 
 class Model:
-    """The collision model, which runs in our program."""
+    """The collision model, which our program runs."""
 
     def __init__(self, program):
         self.process = subprocess.Popen([program, "serve"], stdin=subprocess.PIPE, stdout=subprocess.PIPE)

@@ -1,4 +1,4 @@
-"""The conversation with `sdg-bench compare`, a JSON object a line.
+"""The protocol with `sdg-bench compare`: one JSON object per line.
 
 worker: {"ready": {"seconds": s, "facts": {...}, "gflop": g, "version": "..."}}    after one run that does not count
 driver: {"repeat": n}
@@ -16,21 +16,21 @@ from typing import Callable
 
 @dataclass
 class Work:
-    """Something to be timed."""
+    """A computation to be timed."""
 
     run: Callable[[], None]
-    # Whoever does the same work has the same numbers, to one part in a hundred.
+    # The same work gives the same numbers, within 1 %.
     facts: dict = field(default_factory=dict)
-    # Multiplications and additions of the network's products, 1e9 of them; None where nobody counted.
+    # Multiplications and additions in the network's products, in units of 1e9; None if they were not counted.
     gflop: float | None = None
     version: str = ""
-    # How many pieces one run makes; times are told for one piece.
+    # Number of pieces that one run makes; times are reported per piece.
     pieces: int = 1
 
 
 def serve(build):
     """Builds the work, warms up and serves runs until standard input ends."""
-    # What libraries print must not get into the conversation.
+    # Output of libraries must not get into the protocol.
     answers = os.fdopen(os.dup(1), "w", buffering=1)
     os.dup2(2, 1)
 

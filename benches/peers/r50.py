@@ -12,8 +12,8 @@ import weights
 from protocol import Work
 
 NUM_KEYPOINTS = 17
-# 32 parts a picture, and 32 of the 512 sampled proposals positive: the parts' own boxes are among the candidates, so
-# that the number is reached whatever the weights, and the second heads have the same to do on both sides.
+# 32 parts per picture, and 32 of the 512 sampled proposals positive. The parts' own boxes are among the candidates, so
+# this number is reached with any weights, and the keypoint or mask heads do the same work on both sides.
 GRID = (8, 4)
 POSITIVE_FRACTION = 32 / 512
 

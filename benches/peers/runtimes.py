@@ -34,7 +34,7 @@ def onnxruntime_backbone(onnx, threads):
 def openvino_backbone(onnx, threads):
     import openvino
 
-    # Single precision, as everybody else here: OpenVINO would take bfloat16 where the processor has it.
+    # Single precision, like the other runtimes: OpenVINO would use bfloat16 if the processor has it.
     config = {
         "INFERENCE_NUM_THREADS": threads,
         "PERFORMANCE_HINT": "LATENCY",
@@ -45,5 +45,5 @@ def openvino_backbone(onnx, threads):
     x = backbone_input()
     levels = [tensor.copy() for tensor in request.infer([x]).values()]
     version = f"openvino {openvino.__version__.split('-')[0]}"
-    # The outputs are shared, not copied: the cheapest way to ask.
+    # The outputs are shared, not copied, which takes the least time.
     return Work(lambda: request.infer([x], share_inputs=True, share_outputs=True), level_facts(levels), None, version)

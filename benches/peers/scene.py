@@ -1,4 +1,4 @@
-"""The pictures and their truth, as `benches/src/scene.rs` makes them."""
+"""The pictures and their ground truth, by the same formulas as `benches/src/scene.rs`."""
 
 import numpy as np
 

@@ -5,7 +5,7 @@ import re
 
 import numpy as np
 
-# From our names, which are Detectron2's but for two, to torchvision's.
+# Converts our names, which are Detectron2's with two exceptions, to torchvision's.
 TORCHVISION = [
     (r"^backbone\.bottom_up\.stem\.conv1\.norm\.", "backbone.body.bn1."),
     (r"^backbone\.bottom_up\.stem\.conv1\.", "backbone.body.conv1."),
@@ -29,7 +29,7 @@ TORCHVISION = [
 
 
 def read(path, module=""):
-    """Arrays by our names, from a safetensors file of floats; of a grasp model, those of one module."""
+    """Reads the arrays of a safetensors file of floats by our names; of a grasp model, only those of one module."""
     with open(path, "rb") as file:
         header = json.loads(file.read(int.from_bytes(file.read(8), "little")))
         data = file.read()
@@ -49,7 +49,7 @@ def torchvision_name(name):
         found, count = re.subn(pattern, replacement, name)
         if count == 0:
             continue
-        # Stages and levels are counted from 2 here; torchvision's layers from 1, its pyramid and heads from 0.
+        # Our stages and levels count from 2, torchvision's layers from 1, its pyramid and heads from 0.
         found = re.sub(r"(?<=body\.layer)\d", lambda m: str(int(m[0]) - 1), found)
         found = re.sub(r"(?<=_blocks\.)\d", lambda m: str(int(m[0]) - 2), found)
         return re.sub(r"(?<=roi_heads\.keypoint_head\.)\d+", lambda m: str(2 * int(m[0])), found)
@@ -61,7 +61,7 @@ def load(module, arrays, rename=lambda name: name):
     import torch
 
     state = {rename(name): torch.from_numpy(array.copy()) for name, array in arrays.items()}
-    # torchvision counts batches in norms that are never trained, where a version has them.
+    # Some versions of torchvision count batches in norms that are never trained.
     wanted = {name for name in module.state_dict() if not name.endswith("num_batches_tracked")}
     if wanted != set(state):
         missing, unused = sorted(wanted - set(state)), sorted(set(state) - wanted)

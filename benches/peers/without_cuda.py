@@ -1,9 +1,9 @@
-"""Lets PyPI's torch for Linux start without the CUDA packages, two and a half gigabytes that a CPU never runs.
+"""Lets PyPI's torch for Linux start without the CUDA packages, 2.5 GB that a CPU never runs.
 
-That torch is linked against CUDA's libraries, so it does not load where they are missing, though it computes on the CPU
-with the same code (oneDNN and MKL, both inside libtorch_cpu.so) as any other build. This script writes a library of
-that name for each that is missing, in which every function says "no device" (CUDA's error 100), as the real ones do on
-a machine without one. What runs on the CPU is torch's own, untouched.
+That torch is linked against CUDA's libraries, so it does not load without them, although it computes on the CPU with
+the same code (oneDNN and MKL, both inside libtorch_cpu.so) as any other build. This script writes a replacement for
+each missing library, in which every function returns "no device" (CUDA's error 100), as the real ones do on a machine
+without a device. The code that runs on the CPU is torch's own, unchanged.
 
 usage: without_cuda.py SITE_PACKAGES
 """
@@ -14,7 +14,7 @@ import subprocess
 import sys
 import tempfile
 
-# CUDA's own libraries; the others that torch needs are on every Linux.
+# CUDA's own libraries; every Linux has the other libraries that torch needs.
 CUDA_LIBRARY = re.compile(r"^lib(cu|nv|nccl)")
 CUDA_FUNCTION = re.compile(r"^_*(cu|nv|nccl)[A-Za-z]")
 
@@ -59,7 +59,7 @@ def main():
         else f"long {name}(void) {{ return 100; }}"
         for name in functions
     )
-    # The functions stand in a library of their own: the loader trusts CUDA's names only with their versions.
+    # The functions are in a separate library, because the loader accepts CUDA's names only with their versions.
     build(folder / "libno_device.so", source)
     for name in missing:
         build(folder / name, "", "-Wl,--no-as-needed", f"-L{folder}", "-l:libno_device.so", "-Wl,-rpath,$ORIGIN")

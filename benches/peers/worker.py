@@ -1,6 +1,6 @@
 """Runs one work with one of the peers: `worker.py PEER WORK --weights FILE --threads N`.
 
-What it can run is in `WORKS`; how it is asked to is in protocol.py.
+`WORKS` lists the works; protocol.py has the protocol.
 """
 
 import argparse
@@ -56,7 +56,7 @@ def gemm(_, args):
 
 
 TORCH = ("pytorch", "pytorch-channels_last")
-# (peer, work): what builds it.
+# (peer, work): the function that builds it.
 WORKS = {
     ("onnxruntime", "backbone"): runtime("onnxruntime_backbone"),
     ("openvino", "backbone"): runtime("openvino_backbone"),
@@ -88,7 +88,7 @@ def main():
         parser.error(f"expected one of {known}; found {args.peer} {args.work}")
     os.environ["OMP_NUM_THREADS"] = str(args.threads)
     os.environ["MKL_NUM_THREADS"] = str(args.threads)
-    # No look for a newer release over the network.
+    # No search for a newer release over the network.
     os.environ["NO_ALBUMENTATIONS_UPDATE"] = "1"
 
     def prepared():

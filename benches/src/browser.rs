@@ -1,8 +1,8 @@
-//! `sdg-bench browser`: the page's detection against onnxruntime-web's, in one page of a headless Chromium.
+//! `sdg-bench browser`: the page's detection compared with onnxruntime-web, in one page of a headless Chromium.
 //!
-//! Both run the network of one taught model on one picture: ours as the page does, from the picture's file to grasps;
-//! onnxruntime-web the export from PyTorch (`peers/export_edge.py`), from the normalised input to keypoints. One thread
-//! each, turn by turn. What both found must agree before times count.
+//! Both run the network of one taught model on one picture: ours as the page does, from the picture file to grasps;
+//! onnxruntime-web runs the export from PyTorch (`peers/export_edge.py`), from the normalised input to keypoints. Each
+//! uses one thread, and they run alternately. Times are reported only if both find the same.
 
 use std::fmt::Write as _;
 use std::io::Write as _;
@@ -21,25 +21,25 @@ use crate::network::Network;
 use crate::results::{duration, rewrite};
 
 const PICTURE: &str = "datasets/demonstrations/pendulum/image.png";
-/// What is ours and what is theirs of a download, without weights.
+/// Files of the download on each side, without weights.
 const OUR_MODULE: [&str; 2] = ["sdg_web_bg.wasm", "sdg_web.js"];
 const THEIR_MODULE: [&str; 3] = ["ort-wasm-simd-threaded.wasm", "ort-wasm-simd-threaded.mjs", "ort.wasm.min.mjs"];
-/// Between the same network's answers here and there: sums in another order.
+/// Maximum differences between the two sides' results, which add in different orders.
 const MAX_SCORE: f64 = 0.01;
 const MAX_PX: f64 = 0.5;
-/// Frames a second that we promise, without WebGPU.
+/// Minimum number of frames per second without WebGPU, which we promise.
 const MIN_FRAMES: f64 = 5.0;
 
 /// `sdg-bench browser`
 #[derive(Debug, ClapArgs)]
 pub struct BrowserArgs {
-    /// A grasp model C of the preset `edge`; `make bench` leaves one in target/bench/pendulum.sdg
+    /// Grasp model C of the preset `edge`; `make bench` writes one to target/bench/pendulum.sdg
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
     /// Timed runs of each side
     #[arg(long, default_value_t = 30, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
     rounds: u32,
-    /// The repository
+    /// Root of the repository
     #[arg(long, default_value = ".", value_name = "DIR")]
     root: PathBuf,
     /// Rewrite the table in this file
@@ -47,7 +47,7 @@ pub struct BrowserArgs {
     results: Option<PathBuf>,
 }
 
-/// Lays out the folder, runs the page, prints the table; fails where a promise is broken.
+/// Copies the files, runs the page and prints the table; fails if a promise is broken.
 pub fn run(args: &BrowserArgs) -> Result<()> {
     let folder = args.root.join("target/bench/browser");
     let model = args.model.clone().unwrap_or_else(|| args.root.join("target/bench/pendulum.sdg"));
@@ -65,7 +65,7 @@ pub fn run(args: &BrowserArgs) -> Result<()> {
     let script = "return window.compare(...arguments)";
     let measured = browser.run(script, &[json!(args.rounds), json!(3)])?;
     let errors = browser.console_errors()?;
-    ensure!(errors.is_empty(), "the page's console says {errors:?}");
+    ensure!(errors.is_empty(), "expected no errors in the page's console, found {errors:?}");
     check_same(&measured)?;
 
     let table = markdown(&measured, &folder)?;
@@ -78,7 +78,7 @@ pub fn run(args: &BrowserArgs) -> Result<()> {
     Ok(())
 }
 
-/// Puts everything that the page asks for into one folder.
+/// Copies all files of the page into one folder.
 fn lay_out(root: &Path, folder: &Path, model: &Path) -> Result<()> {
     let peer = root.join("target/bench/onnxruntime-web/node_modules/onnxruntime-web/dist");
     std::fs::create_dir_all(folder)?;
@@ -110,7 +110,7 @@ fn lay_out(root: &Path, folder: &Path, model: &Path) -> Result<()> {
     Ok(())
 }
 
-/// The picture as the network takes it, `[3, H, W]` padded with zeros, as bytes.
+/// The network's input for the picture, `[3, H, W]` padded with zeros, as bytes.
 fn network_input(picture: &Path) -> Result<Vec<u8>> {
     let config = Network::Edge.config().input;
     let image = image::open(picture).with_context(|| picture.display().to_string())?.to_rgb8();
@@ -125,31 +125,34 @@ fn network_input(picture: &Path) -> Result<Vec<u8>> {
     Ok(padded.iter().flat_map(|value| value.to_le_bytes()).collect())
 }
 
-/// The best detection's score and keypoints, here and there.
+/// Checks that both sides found the same score and keypoints.
 fn check_same(measured: &Value) -> Result<()> {
     let ours = &measured["network"]["detections"][0];
-    let number = |value: &Value| value.as_f64().context("a number is missing in what the page measured");
+    let number = |value: &Value| value.as_f64().context("expected a number in the page's measurements, found none");
     let (our_score, their_score) = (number(&ours["network_score"])?, number(&measured["theirs"]["scores"][0])?);
     if (our_score - their_score).abs() > MAX_SCORE {
-        bail!("not the same network: our best score is {our_score}, onnxruntime-web's {their_score}");
+        bail!("not the same network: our best score is {our_score}, onnxruntime-web's is {their_score}");
     }
-    // Theirs are in pixels of the network's input, half as large as the picture.
+    // onnxruntime-web's keypoints are in pixels of the network's input, half as large as the picture.
     let image_over_input = number(&measured["network"]["width"])? / 320.0;
     for (idx, keypoint) in ours["keypoints"].as_array().context("no keypoints")?.iter().enumerate() {
         for axis in 0..2 {
             let theirs = number(&measured["theirs"]["keypoints"][3 * idx + axis])? * image_over_input;
             let distance = (number(&keypoint[axis])? - theirs).abs();
-            ensure!(distance <= MAX_PX, "not the same network: keypoint {idx} lies {distance:.2} px apart");
+            ensure!(
+                distance <= MAX_PX,
+                "not the same network: the two positions of keypoint {idx} differ by {distance:.2} px"
+            );
         }
     }
     Ok(())
 }
 
-/// The median of one side, milliseconds.
+/// The median time of one side, in milliseconds.
 fn times(measured: &Value, side: &str) -> Result<f64> {
     let times = measured["times"][side].as_array().context("no times")?;
     let times: Vec<f64> = times.iter().filter_map(Value::as_f64).collect();
-    ensure!(!times.is_empty(), "{side} was never timed");
+    ensure!(!times.is_empty(), "expected times of {side}, found none");
     median(times).context("expected timed frames, found none")
 }
 
@@ -190,7 +193,7 @@ fn chromium() -> String {
     text.split_whitespace().take(2).collect::<Vec<_>>().join(" ")
 }
 
-/// Bytes of files as a host sends them.
+/// Size of files, compressed as a web server sends them.
 fn compressed(folder: &Path, names: &[&str]) -> Result<usize> {
     names
         .iter()
@@ -198,7 +201,7 @@ fn compressed(folder: &Path, names: &[&str]) -> Result<usize> {
             let bytes = std::fs::read(folder.join(name)).with_context(|| (*name).to_owned())?;
             let mut gzip =
                 Command::new("gzip").args(["-9", "-c"]).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn()?;
-            let mut input = gzip.stdin.take().context("gzip's input was asked for")?;
+            let mut input = gzip.stdin.take().context("expected a pipe to gzip")?;
             let writer = std::thread::spawn(move || input.write_all(&bytes));
             let output = gzip.wait_with_output()?;
             ensure!(matches!(writer.join(), Ok(Ok(()))) && output.status.success(), "gzip failed on {name}");
@@ -224,7 +227,7 @@ mod tests {
     fn another_network_is_seen() {
         assert!(check_same(&measured(10.2)).is_ok());
         let error = check_same(&measured(11.0)).unwrap_err().to_string();
-        assert!(error.contains("keypoint 0 lies 1.00 px apart"), "{error}");
+        assert!(error.contains("the two positions of keypoint 0 differ by 1.00 px"), "{error}");
     }
 
     #[test]

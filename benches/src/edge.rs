@@ -1,7 +1,7 @@
-//! `sdg-bench edge`: the program for small machines, measured as such a machine would run it.
+//! `sdg-bench edge`: measures the program for small machines under the conditions of such a machine.
 //!
-//! One core, a memory limit, one image from the start of the process to its end; then a row of images for frames a
-//! second. Each figure has the bound that we promise, and a run that breaks one fails.
+//! One core, a memory limit, one image from the start of the process to its end; then a sequence of images for the
+//! frames per second. Each figure has a bound that we promise, and the run fails if a bound is broken.
 
 use std::fmt::Write as _;
 use std::io::{Read, Seek};
@@ -19,24 +19,24 @@ use crate::results::{duration, rewrite};
 const MAX_BYTES: u64 = 25_000_000;
 const MAX_START_SECS: f64 = 0.3;
 const MAX_MEMORY_BYTES: u64 = 150_000_000;
-/// The memory limit under which it has to work, KiB of address space.
+/// Memory limit of the run, in KiB of address space.
 const LIMIT_KIB: u32 = 256 * 1024;
-/// Starts that are timed, and images in a row.
+/// Number of timed starts, and number of images in the sequence.
 const STARTS: usize = 9;
 const FRAMES: usize = 30;
-/// Steps of a model that is taught here: figures depend on the network's shape alone.
+/// Number of teaching steps; the figures depend only on the network's shape.
 const STEPS: &str = "60";
 const DEMONSTRATION: &str = "datasets/demonstrations/pendulum";
 
 /// `sdg-bench edge`
 #[derive(Debug, ClapArgs)]
 pub struct EdgeArgs {
-    /// The program, built without default features
+    /// The program under test, built without default features
     binary: PathBuf,
     /// A grasp model of the preset `edge`; without it, the program teaches one
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
-    /// The repository
+    /// Root of the repository
     #[arg(long, default_value = ".", value_name = "DIR")]
     root: PathBuf,
     /// Rewrite the table in this file
@@ -44,7 +44,7 @@ pub struct EdgeArgs {
     results: Option<PathBuf>,
 }
 
-/// A figure and the bound that it must keep.
+/// A figure and its bound.
 struct Figure {
     what: &'static str,
     found: String,
@@ -52,7 +52,7 @@ struct Figure {
     kept: bool,
 }
 
-/// Measures, prints the table, and fails where a bound is broken.
+/// Measures, prints the table, and fails if a bound is broken.
 pub fn run(args: &EdgeArgs) -> Result<()> {
     let folder = tempfile::tempdir()?;
     let photo = args.root.join(DEMONSTRATION).join("image.png");
@@ -79,7 +79,7 @@ fn teach(binary: &Path, photo: &Path, out: &Path) -> Result<f64> {
     let demo = format!("{}:{}", photo.display(), photo.with_file_name("annotation.json").display());
     let begun = Instant::now();
     let output = Command::new(binary)
-        // This build carries none.
+        // This build contains no base weights.
         .args(["teach", "--base-weights", "crates/grasp/weights/edge.safetensors"])
         .args(["--seed", "1", "--steps", STEPS, "--demo", &demo, "--out"])
         .arg(out)
@@ -100,7 +100,7 @@ fn measure(binary: &Path, model: &Path, photo: &Path) -> Result<Vec<Figure>> {
         starts.push(look.seconds);
         peak = peak.max(look.peak_bytes);
     }
-    // The shell sets the limit and becomes the program.
+    // The shell sets the limit and replaces itself with the program.
     let limited = pinned(&core, binary, model, &one);
     let mut shell = Command::new("sh");
     shell.args(["-c", &format!("ulimit -v {LIMIT_KIB} && exec \"$@\""), "sh"]);
@@ -147,7 +147,7 @@ fn measure(binary: &Path, model: &Path, photo: &Path) -> Result<Vec<Figure>> {
     ])
 }
 
-/// The program on one core, with a model and images to look at.
+/// The program on one core, with a model and input images.
 fn pinned(core: &str, binary: &Path, model: &Path, images: &[&Path]) -> Command {
     let mut command = Command::new("taskset");
     command.args(["-c", core]).arg(binary).args(["detect", "--json", "--grasp-model"]).arg(model).args(images);
@@ -162,7 +162,7 @@ struct Look {
 }
 
 impl Look {
-    /// Runs it to its end; the part must be found in every image.
+    /// Runs the program to its end; the part must be found in every image.
     fn run(mut command: Command) -> Result<Self> {
         let begun = Instant::now();
         let mut printed = tempfile::tempfile()?;
@@ -190,7 +190,7 @@ impl Look {
             .lines()
             .map(|line| {
                 let line: serde_json::Value = serde_json::from_str(line)?;
-                line["seconds"].as_f64().context("a line without seconds")
+                line["seconds"].as_f64().context("expected the seconds of a line, found none")
             })
             .collect::<Result<_>>()?;
         Ok(Self { seconds, peak_bytes, frame_seconds })
@@ -201,7 +201,9 @@ impl Look {
 fn first_core() -> Result<String> {
     let status = std::fs::read_to_string("/proc/self/status")?;
     let cores = status.lines().find_map(|line| line.strip_prefix("Cpus_allowed_list:"));
-    let first = cores.and_then(|list| list.trim().split([',', '-']).next()).context("no list of cores")?;
+    let first = cores
+        .and_then(|list| list.trim().split([',', '-']).next())
+        .context("expected a list of cores in /proc/self/status, found none")?;
     Ok(first.to_owned())
 }
 

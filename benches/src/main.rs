@@ -1,16 +1,16 @@
-//! `sdg-bench`: our speed against that of others, on the same work in one run.
+//! `sdg-bench`: compares our speed with that of other software, on the same work in one run.
 //!
 //! ```text
-//! sdg-bench compare ─┬─ sdg-bench work NAME ─────── ours          one computes at a time, turn by turn;
-//!                    ├─ python peers/worker.py ──── a peer        each is a process of its own, so that
-//!                    └─ …                                         its peak memory is its own too
+//! sdg-bench compare ─┬─ sdg-bench work NAME ─────── our side      they compute alternately; each is a
+//!                    ├─ python peers/worker.py ──── a peer        process of its own, so that its peak
+//!                    └─ …                                         memory is measured separately
 //!         │
 //!         └─ medians ─ target/bench/peers.json, a table, benches/RESULTS.md
 //! ```
 //!
-//! What is compared stands in [`registry`]; both sides load the same weights, see the same pictures and tell facts of
-//! what they computed (how many boxes, which scores), which must agree before anything is timed. Left out: installing
-//! the peers (`make bench`) and checking our kernels (their own tests).
+//! [`registry`] lists the compared works. Both sides load the same weights, process the same pictures and report
+//! facts about their results (number of boxes, scores), which must agree before anything is timed. Left out:
+//! installing the peers (`make bench`) and testing our kernels (their own tests).
 #![forbid(unsafe_code)]
 #![allow(missing_docs, reason = "a program that measures")]
 #![cfg_attr(test, allow(clippy::unwrap_used))]
@@ -36,7 +36,7 @@ use clap::{Parser, Subcommand};
 use crate::network::Network;
 use crate::works::WorkArgs;
 
-/// Our speed against PyTorch, ONNX Runtime, OpenVINO and albumentations, on the same work in one run.
+/// Compares our speed with PyTorch, ONNX Runtime, OpenVINO and albumentations, on the same work in one run.
 #[derive(Debug, Parser)]
 #[command(name = "sdg-bench", version, arg_required_else_help = true)]
 struct Args {
@@ -46,23 +46,23 @@ struct Args {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Runs ours and theirs turn by turn and writes medians
+    /// Runs our side and the peers alternately and writes medians
     Compare(compare::CompareArgs),
-    /// The page's detection against onnxruntime-web's in the same page of a headless Chromium
+    /// Compares the page's detection with onnxruntime-web in the same page of a headless Chromium
     Browser(browser::BrowserArgs),
-    /// The time of model S against pixels, parts in the picture and edge points
+    /// Measures the time of model S as a function of pixels, parts in the picture and edge points
     Curves(curves::CurvesArgs),
-    /// Model S beside corrmatch and OpenCV's matchers: times, found and wrong ones
+    /// Compares model S with corrmatch and OpenCV's matchers: times, found parts and wrong detections
     Matchers(matchers::MatchersArgs),
-    /// Size, start, memory and frames a second of the program for small machines, on one core
+    /// Measures size, start, memory and frames per second of the program for small machines, on one core
     Edge(edge::EdgeArgs),
-    /// Runs one of our works when asked on standard input; `compare` starts it
+    /// Runs one of our works on requests from standard input; `compare` starts it
     Work(WorkArgs),
     /// Writes a network's weights for both sides to load
     Weights {
-        /// Which network
+        /// Name of the network
         network: Network,
-        /// A safetensors file
+        /// Output file, safetensors
         out: PathBuf,
     },
 }

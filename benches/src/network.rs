@@ -11,10 +11,10 @@ use sdg_detection::presets::{self, RcnnKind};
 use sdg_detection::{GeneralizedRcnn, RcnnConfig};
 use sdg_layers::state_dict::{self, StateDict, WeightTensor};
 
-/// Keypoints of a part for R50: COCO's number.
+/// Number of keypoints of a part for R50: COCO's number.
 pub const NUM_KEYPOINTS: usize = 17;
-/// Positive ROIs an image while training, of 512: as many as the pictures have parts, whose own boxes are among the
-/// candidates, so that the number is reached whatever the weights.
+/// Number of positive ROIs per image in training, of 512. It equals the number of parts in the picture. Their
+/// ground-truth boxes are among the candidates, so the number is reached with any weights.
 pub const POSITIVE_ROIS: usize = 32;
 
 /// The networks that both sides build.
@@ -31,7 +31,7 @@ pub enum Network {
 }
 
 impl Network {
-    /// The name on the command line and of the weights' file.
+    /// Name on the command line and of the weights file.
     pub fn name(self) -> &'static str {
         match self {
             Self::Faster => "faster",
@@ -41,7 +41,7 @@ impl Network {
         }
     }
 
-    /// The configuration: torchvision's numerics for R50, since it is torchvision that it is compared with.
+    /// The configuration. R50 has torchvision's numerics, because it is compared with torchvision.
     pub fn config(self) -> RcnnConfig {
         match self {
             Self::Faster => with_torchvision_numerics(RcnnKind::Faster { num_classes: 1 }),
@@ -51,8 +51,8 @@ impl Network {
         }
     }
 
-    /// Writes weights drawn from a fixed seed, tamed so that values stay of order one through R50's sixteen blocks,
-    /// which have no trained norms to do that here.
+    /// Writes weights from a fixed seed, scaled so that values stay of order one through R50's sixteen blocks,
+    /// because there are no trained norms to keep them so.
     pub fn write_weights(self, out: &Path) -> Result<()> {
         let mut weights = state_dict::export(&self.config().init(&Device::flex(), SEED)?);
         for (name, weight) in &mut weights {
@@ -87,18 +87,23 @@ impl Network {
         drop(bytes);
         let (network, report) = state_dict::import(self.config().init(device, SEED)?, &dict);
         if !report.is_complete() {
-            bail!("{}: expected the weights of {}, found others: {report:?}", weights.display(), self.name());
+            bail!(
+                "{}: expected the weights of {}, found those of another network: {report:?}",
+                weights.display(),
+                self.name()
+            );
         }
         Ok(network)
     }
 }
 
-/// Draws the weights.
+/// Seed of the weights.
 const SEED: u64 = 11;
 /// Factor on the last convolution of every bottleneck.
 const RESIDUAL_GAIN: f32 = 0.2;
 
-/// torchvision's detector as the peers build it: at short side 480, norms with an epsilon, enough ROIs for the heads.
+/// torchvision's detector as the peers build it: short side 480, norms with an epsilon, and enough ROIs for the
+/// heads.
 fn with_torchvision_numerics(kind: RcnnKind) -> RcnnConfig {
     let mut config = presets::r50_torchvision(kind);
     config.input.resize = ResizeRule::ShortSide { short_px: 480, max_long_px: 1333, rounding: SizeRounding::Floor };

@@ -1,4 +1,4 @@
-//! The protocol between `compare` and its workers, a JSON object a line.
+//! The protocol between `compare` and its workers: one JSON object per line.
 //!
 //! ```text
 //! worker: {"ready": {"seconds": s, "facts": {…}, "gflop": g, "version": "…"}}   after one run that does not count
@@ -6,7 +6,7 @@
 //! worker: {"seconds": s}                                                        n times
 //! ```
 //!
-//! The end of standard input ends a worker. `peers/protocol.py` is the same for Python.
+//! A worker ends at the end of its standard input. `peers/protocol.py` implements the same in Python.
 
 use std::collections::BTreeMap;
 use std::io::{BufRead, Write};
@@ -15,44 +15,44 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use serde::{Deserialize, Serialize};
 
-/// Numbers that identify what was computed: equal where the same work was done.
+/// Numbers that identify the result: equal if the same work was done.
 pub type Facts = BTreeMap<String, f64>;
 
 /// The first line of a worker.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Ready {
-    /// Seconds of the run that does not count, all its pieces; `None` where there was none.
+    /// Seconds per piece of the untimed run; `None` without such a run.
     pub seconds: Option<f64>,
     pub facts: Facts,
-    /// Multiplications and additions of the network's products, 1e9 of them, where the worker counts.
+    /// Multiplications and additions in the network's products, in units of 1e9, if the worker counts them.
     pub gflop: Option<f64>,
-    /// What it runs on.
+    /// Name and version of the software.
     pub version: String,
 }
 
-/// From worker to driver.
+/// A message from worker to driver.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Answer {
-    /// Ready to be timed.
+    /// The worker is ready to be timed.
     Ready(Ready),
-    /// Seconds of one run, divided by its pieces.
+    /// Seconds of one run, divided by its number of pieces.
     Seconds(f64),
 }
 
-/// From driver to worker.
+/// A message from driver to worker.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Request {
     pub repeat: usize,
 }
 
-/// Something to be timed.
+/// A computation to be timed.
 pub struct Work {
     pub run: Box<dyn FnMut() -> Result<()>>,
     pub facts: Facts,
-    /// How many pieces one run makes; times are reported for one.
+    /// Number of pieces that one run makes; times are reported per piece.
     pub pieces: usize,
-    /// Whether one run goes before that does not count.
+    /// Whether an untimed run goes first.
     pub warm_up: bool,
 }
 

@@ -1,30 +1,30 @@
-//! Every work that is compared, its peers, and the ratio aimed at.
+//! All compared works, their peers, and the desired ratios.
 
 use crate::network::Network;
 
-/// Somebody to be compared with.
+/// Software to compare with.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Peer {
     pub id: &'static str,
     pub title: &'static str,
-    /// The ratio that we mean to reach, peer's seconds over ours.
+    /// The desired ratio of the peer's seconds to ours.
     pub wanted: Option<f64>,
 }
 
-/// Something that both sides do.
+/// A computation that both sides do.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WorkSpec {
     /// Name for the workers.
     pub name: &'static str,
-    /// Name in tables, with what is done and in which size.
+    /// Name in tables, with the computation and its size.
     pub title: &'static str,
     /// The network whose weights both sides load.
     pub network: Option<Network>,
-    /// The peer; none where only our own time is measured.
+    /// The peers; empty if only our own time is measured.
     pub peers: &'static [Peer],
-    /// Whether it takes minutes: run once, and not by `--quick`.
+    /// Whether the work takes minutes: it runs once, and not with `--quick`.
     pub long: bool,
-    /// Whether it reads the grasp model that `teaching` writes.
+    /// Whether the work reads the grasp model that `teaching` writes.
     pub needs_model: bool,
 }
 
@@ -32,7 +32,7 @@ const fn peer(id: &'static str, title: &'static str, wanted: f64) -> Peer {
     Peer { id, title, wanted: Some(wanted) }
 }
 
-/// A peer that no target names.
+/// A peer without a desired ratio.
 const fn also(id: &'static str, title: &'static str) -> Peer {
     Peer { id, title, wanted: None }
 }
@@ -46,13 +46,13 @@ const fn compared(
     WorkSpec { name, title, network, peers, long: false, needs_model: false }
 }
 
-/// Our own product of matrices, and the largest of what both reach is the machine's peak.
+/// Our own matrix product; the highest speed of all sides is the machine's peak.
 pub const GEMM: WorkSpec = compared("gemm", "product of two 2048×2048 matrices", None, &[also("pytorch", "PyTorch")]);
 
 const TORCHVISION: &[Peer] = &[peer("pytorch", "torchvision", 2.0)];
 const TRAINING: &[Peer] = &[peer("pytorch", "PyTorch", 1.5)];
 
-/// Every work, in the order in which they run.
+/// All works, in the order in which they run.
 pub const WORKS: &[WorkSpec] = &[
     compared(
         "backbone",
@@ -101,7 +101,7 @@ pub const WORKS: &[WorkSpec] = &[
     },
 ];
 
-/// Whose program does a work.
+/// The software that does a work.
 #[derive(Debug, Clone, Copy)]
 pub enum Side {
     Ours,

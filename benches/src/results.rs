@@ -1,11 +1,12 @@
-//! Figures as text, and the file that keeps them.
+//! Formats figures and updates the file that keeps them.
 
 use std::path::Path;
 
 use anyhow::{Context, Result};
 use sdg_files::write_atomically;
 
-/// Puts `new` between the marks `<!-- NAME: begin -->` and `<!-- NAME: end -->` of a file.
+/// Replaces the text between the marks `<!-- NAME: begin -->` and `<!-- NAME: end -->` of
+/// a file by `new`.
 pub fn rewrite(results: &Path, name: &str, new: &str) -> Result<()> {
     let text = std::fs::read_to_string(results).with_context(|| results.display().to_string())?;
     let text = between_marks(&text, name, new)
@@ -13,7 +14,7 @@ pub fn rewrite(results: &Path, name: &str, new: &str) -> Result<()> {
     Ok(write_atomically(results, text.as_bytes())?)
 }
 
-/// `text` with what stands between the marks replaced.
+/// `text` with the text between the marks replaced.
 fn between_marks(text: &str, name: &str, new: &str) -> Option<String> {
     let [begin, end] = ["begin", "end"].map(|which| format!("<!-- {name}: {which} -->"));
     let (before, rest) = text.split_once(&begin)?;
@@ -21,7 +22,7 @@ fn between_marks(text: &str, name: &str, new: &str) -> Option<String> {
     Some(format!("{before}{begin}\n{}\n{end}{after}", new.trim_end()))
 }
 
-/// Three significant digits, in milliseconds below a second.
+/// Formats a duration with three significant digits, in milliseconds below one second.
 pub fn duration(secs: f64) -> String {
     match secs {
         s if s >= 100.0 => format!("{s:.0} s"),

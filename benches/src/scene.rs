@@ -1,16 +1,16 @@
-//! The pictures and their truth: the same formulas as in `peers/scene.py`, so that both sides see the same.
+//! The pictures and their ground truth, by the same formulas as `peers/scene.py`, so that both sides get the same.
 
 use image::{Rgb, RgbImage};
 use nalgebra::Point2;
 use sdg_detection::{ObjectMask, Target};
 use sdg_geometry::{BoundingBox, GraspLine, Mask};
 
-/// Width of every picture, pixels.
+/// Width of every picture, in pixels.
 pub const WIDTH: u32 = 640;
-/// Height of every picture, pixels.
+/// Height of every picture, in pixels.
 pub const HEIGHT: u32 = 480;
 
-/// Picture of that number: a texture in which every place differs.
+/// Picture number `number`: a texture that is different at every place.
 pub fn picture(number: u32) -> RgbImage {
     RgbImage::from_fn(WIDTH, HEIGHT, |x, y| Rgb([x ^ y, x * y / 64 + 40 * number, x + 2 * y].map(|v| v as u8)))
 }
@@ -45,7 +45,7 @@ fn mask(of_part: &BoundingBox) -> ObjectMask {
     Mask::from_fn(WIDTH, HEIGHT, inside).into()
 }
 
-/// `count` points in the middles of as many equal parts of a box's diagonal.
+/// The centres of `count` equal sections of a box's diagonal.
 fn diagonal(of_part: &BoundingBox, count: usize) -> Vec<sdg_geometry::Keypoint> {
     let half = 0.5 / count as f64;
     let at = |along: f64| Point2::new(of_part.x1 + along * of_part.width(), of_part.y1 + along * of_part.height());

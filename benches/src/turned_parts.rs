@@ -1,4 +1,5 @@
-//! Pictures of any size with a demonstration's part laid on its table, turned: drawn from the photo itself, so that the truth is known.
+//! Draws pictures of any size with a demonstration's part on its table, rotated. The part is taken from the photo
+//! itself, so the ground truth is known.
 
 use image::imageops::interpolate_bilinear;
 use image::{Rgb, RgbImage};
@@ -6,12 +7,12 @@ use nalgebra::Point2;
 use sdg_demonstration::{Annotation, Demonstration};
 use sdg_geometry::{Angle, BoundingBox, GraspLine, PlanarSimilarity, Polygon};
 
-/// Side of the square of bare table, in the photo's upper left corner, that the table is made of.
+/// Side of the square of bare table in the photo's upper left corner, which is repeated as the table of the pictures.
 const TABLE_PX: u32 = 64;
-/// Samples a side for a pixel at the part's outline.
+/// Samples per side of a pixel at the part's outline.
 const SAMPLES: u32 = 3;
 
-/// The parts on the table, each where its pose takes it from the photo.
+/// Draws the parts on the table, each at its pose.
 pub fn picture(photo: &Demonstration, [width, height]: [u32; 2], picture_from_photo: &[PlanarSimilarity]) -> RgbImage {
     let mirrored = |at: u32| {
         let phase = at % (2 * TABLE_PX);
@@ -32,7 +33,7 @@ pub fn picture(photo: &Demonstration, [width, height]: [u32; 2], picture_from_ph
     picture
 }
 
-/// Mixes a pixel of the part into the picture, by the share of it that the part covers.
+/// Blends a pixel of the part into the picture, by the fraction of the pixel that the part covers.
 fn lay(
     picture: &mut RgbImage,
     [x, y]: [u32; 2],
@@ -64,15 +65,15 @@ fn outline(photo: &Demonstration) -> Polygon {
     photo.annotation.outline.clone().unwrap_or_else(|| Polygon::from_box(&photo.annotation.bbox))
 }
 
-/// `count` poses on a grid over a picture of this size, each in another turn, none nearer to the border than the part is long; of
-/// the same size as in the photo.
+/// `count` poses on a grid over a picture of this size, with the size of the photo. Each has a different angle and is
+/// at least the part's length away from the border.
 pub fn poses(
     photo: &Demonstration,
     [width, height]: [u32; 2],
     count: u32,
     first_turn_deg: f64,
 ) -> Vec<PlanarSimilarity> {
-    /// No two of many turns are near each other.
+    /// Multiples of the golden angle are far from each other.
     const GOLDEN_ANGLE_DEG: f64 = 137.507_764;
     let middle = outline(photo).bounds().center();
     let columns = (f64::from(count) * f64::from(width) / f64::from(height)).sqrt().round().max(1.0) as u32;
@@ -90,7 +91,7 @@ pub fn poses(
         .collect()
 }
 
-/// The same part alone on a photo of another size, and its marks there.
+/// Draws the photo's part alone, in the middle of a photo of another size, with its marks.
 pub fn photo_of_size(photo: &Demonstration, size: [u32; 2]) -> Demonstration {
     let outline_there = outline(photo);
     let middle = Point2::new(0.5 * f64::from(size[0]), 0.5 * f64::from(size[1]));
@@ -107,12 +108,13 @@ pub fn photo_of_size(photo: &Demonstration, size: [u32; 2]) -> Demonstration {
     Demonstration { image: picture(photo, size, &[pose]), annotation }
 }
 
-/// Dark strokes beside each other all over the picture, the same for the same number: edges that are no part's.
+/// Draws dark strokes all over the picture: edges that belong to no part. The strokes depend only on `count` and the
+/// picture's size.
 pub fn add_strokes(picture: &mut RgbImage, count: u32) {
     const LENGTH_PX: u32 = 40;
     let (width, height) = picture.dimensions();
     for k in 0..count {
-        // Multiples of irrational numbers are spread evenly.
+        // The fractions of an irrational number's multiples are distributed evenly over 0 to 1.
         let share = |factor: f64| (f64::from(k + 1) * factor).fract();
         let from = [share(0.754_877_67) * f64::from(width), share(0.569_840_29) * f64::from(height)];
         let (sin, cos) = (std::f64::consts::TAU * share(0.618_033_99)).sin_cos();
@@ -140,7 +142,7 @@ mod tests {
         read_demonstration(&root).unwrap()
     }
 
-    /// In grey values: what sampling between pixels makes of the photo's noise and print.
+    /// In grey values: the effect of interpolation on the photo's noise and print.
     const MAX_DIFFERENCE: f64 = 3.0;
 
     #[test]

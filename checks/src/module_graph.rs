@@ -41,7 +41,7 @@ impl ModuleGraph {
         Ok(Self::new(sources.iter().map(|(name, source)| (name.as_str(), source.as_str()))))
     }
 
-    /// The graph of an example: its file, the files in the folder of its name, and those of folders that are modules.
+    /// The graph of an example: its own file, the files in the folder with the same name, and modules shared by examples.
     ///
     /// # Errors
     /// A folder or file cannot be read.

@@ -3,7 +3,7 @@
 /// A path in a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NamedPath {
-    /// Its segments as written: the first may be `crate`, `super`, `self`, a module or a crate.
+    /// The segments as written: the first may be `crate`, `super`, `self`, a module or a crate.
     pub segments: Vec<String>,
     /// The name under which a `pub use` exports it; `None` for other uses.
     pub exported_as: Option<String>,

@@ -62,7 +62,7 @@ fn without_comments_and_strings(source: &str) -> String {
     code
 }
 
-/// Block comments nest.
+/// Position after the end of a block comment, which may contain others.
 fn end_of_block_comment(text: &[char], start: usize) -> usize {
     let (mut i, mut depth) = (start, 0_usize);
     while i < text.len() {

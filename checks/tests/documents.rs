@@ -43,7 +43,7 @@ pub fn tracked(pattern: &str) -> Vec<String> {
     files.into_iter().filter(|file| root().join(file).exists()).collect()
 }
 
-/// Conflict markers in documents and scripts are not found by compiling and running.
+/// Conflict markers in documents and scripts do not break any build or run.
 #[test]
 fn no_merge_has_left_its_marks() {
     let marks = ["<", ">"].map(|mark| format!("{} ", mark.repeat(7)));
@@ -51,7 +51,7 @@ fn no_merge_has_left_its_marks() {
     for file in
         ["*.md", "*.rs", "*.toml", "*.py", "*.sh", "*.html", "*.css", "*.js"].iter().flat_map(|kind| tracked(kind))
     {
-        // Files that are not UTF-8 are not merged by lines.
+        // Files that are not UTF-8 are not merged line by line.
         let Ok(text) = fs::read_to_string(root().join(&file)) else { continue };
         let lines =
             text.lines().enumerate().filter(|(_, line)| marks.iter().any(|mark| line.starts_with(mark.as_str())));
@@ -85,8 +85,8 @@ fn links_lead_to_files_and_headings() {
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
-/// The site has the pages that docs/SUMMARY.md lists: all of docs, and what those lead to, since a link to another document would lead
-/// nowhere there.
+/// The site has the pages that docs/SUMMARY.md lists. The list must have all of docs, and the documents to which they
+/// link, because the site would have no page for other links.
 #[test]
 fn the_site_s_summary_has_every_guide_and_what_guides_link_to() {
     let folder = root().join("docs");
@@ -161,7 +161,7 @@ fn the_crate_table_has_cargo_s_arrows_and_they_point_up_the_table() {
             dependencies[&row.name].iter().filter(|name| crates.contains(name)).cloned().collect();
         assert_eq!(told, seen, "{}: ARCHITECTURE.md's table (left), cargo metadata (right)", row.name);
         let below: Vec<_> = rows[place..].iter().map(|row| &row.name).filter(|name| seen.contains(*name)).collect();
-        assert!(below.is_empty(), "{} sees {below:?}, which stand below it in ARCHITECTURE.md's table", row.name);
+        assert!(below.is_empty(), "{} depends on {below:?}, which are below it in ARCHITECTURE.md's table", row.name);
     }
 }
 
@@ -176,7 +176,7 @@ fn crates_that_never_see_burn_do_not() {
         let mut open = vec![name.clone()];
         let mut reached = BTreeSet::new();
         while let Some(next) = open.pop() {
-            assert!(!next.starts_with("burn"), "{name} sees {next}");
+            assert!(!next.starts_with("burn"), "{name} depends on {next}");
             if reached.insert(next.clone()) {
                 open.extend(dependencies.get(&next).into_iter().flatten().cloned());
             }

@@ -1,8 +1,9 @@
-//! The site that `make site` built: every link and anchor of it leads somewhere, a page loads nothing from elsewhere and runs no script,
-//! no page is large, every picture is shown, and axe-core finds nothing at a phone's width and on a desk.
+//! Tests the site that `make site` built: every link and anchor has a target, a page loads nothing from other hosts and
+//! runs no script, no page is large, every picture is shown, and axe-core finds no fault at the widths of a phone and a
+//! desktop.
 //!
-//! Needs target/site, for the last test Chromium and axe-core: `make site` brings all of them and runs these tests. Screenshots are kept
-//! in target/site-test.
+//! Needs target/site, and for the last test Chromium and axe-core: `make site` provides all of them and runs these
+//! tests. Screenshots are kept in target/site-test.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -10,9 +11,9 @@ use std::path::{Path, PathBuf};
 
 use sdg_webdriver::{Browser, BrowserOptions, serve_folder};
 
-/// Most bytes of a page and its style, without its pictures.
+/// Maximum size of a page and its style sheet, in bytes, without its pictures.
 const MAX_PAGE_BYTES: usize = 300_000;
-/// Widths of the window, and whether the dark scheme is on: colours are the same at every width.
+/// Widths of the window in CSS pixels, and whether the dark scheme is on: colours are the same at every width.
 const LOOKS: [(u32, bool); 3] = [(390, false), (1280, false), (1280, true)];
 
 fn site() -> PathBuf {
@@ -41,7 +42,7 @@ fn pages() -> BTreeMap<String, String> {
     pages
 }
 
-/// The values of an attribute, with what stands in its element before it.
+/// The values of an attribute, each with the text of its element before it.
 fn attributes<'a>(page: &'a str, name: &str) -> Vec<(&'a str, &'a str)> {
     let start = format!(" {name}=\"");
     let mut found = Vec::new();

@@ -1,21 +1,22 @@
-//! Hostile input for every reader of strangers' files and messages.
+//! Hostile input for every reader of files and messages from outside.
 //!
 //! ```text
-//! corpus (targets: seeds) ─ mutator, by number ─ one target ─ read, or refused with an error
-//!                                                    └─ a panic, more time or more memory than promised: a failure, with its input
+//! corpus (targets: seeds) ─ mutator, by number ─ one target ─ accepted, or rejected with an error
+//!                                                    └─ a panic, or too much time or memory: a failure, kept with its input
 //! ```
 //!
-//! Each execution depends on the target's name and its number alone: a long run is resumed at any number, and a failure is made again
-//! by one. `make hardening` runs them; a short run is part of the tests.
+//! Each execution depends only on the target's name and its own number, so a long run is resumed at any number, and a
+//! failure is reproduced by its number. `make hardening` runs the targets; a short run is part of the tests.
 //!
-//! Left out: guidance by coverage while it runs (`make hardening COVERAGE=1` counts which lines the executions reach).
+//! Left out: guidance by coverage during the run (`make hardening COVERAGE=1` reports the lines that the executions
+//! reach).
 //!
 //! ```
 //! let workcell = sdg_fuzz::TARGETS.iter().find(|target| target.name == "workcell").unwrap();
-//! // Whatever the bytes are, the target returns.
+//! The target returns for all bytes.
 //! assert!(!(workcell.run)(b"[table]\nheight_mm = \"high\""));
 //! ```
-// Forbidden but for targets/c_border.rs, which calls the C library.
+// Not `forbid`, because targets/c_border.rs calls the C library.
 #![deny(unsafe_code)]
 
 mod mutator;

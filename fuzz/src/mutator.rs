@@ -1,16 +1,16 @@
-//! Mistakes in bytes, by number.
+//! Makes random mistakes in bytes, determined by a number.
 
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
 use crate::target::Target;
 
-/// At most so many mistakes are made at once.
+/// Maximum number of mistakes in one input.
 const MAX_MISTAKES: u32 = 6;
-/// Integers at the ends of their ranges, cut to the size that is written.
+/// Integers at the limits of their ranges, truncated to the written size.
 const EXTREMES: [u64; 10] =
     [0, 1, 0x7f, 0xff, 0x7fff, 0xffff, 0x7fff_ffff, 0xffff_ffff, 0x7fff_ffff_ffff_ffff, 0xffff_ffff_ffff_ffff];
-/// What stands in a text in place of a number.
+/// Texts that replace a number.
 const NUMBERS: [&[u8]; 12] = [
     b"0",
     b"-1",
@@ -26,7 +26,7 @@ const NUMBERS: [&[u8]; 12] = [
     b"[[[]]]",
 ];
 
-/// The input of an execution: one of the seeds with mistakes, the same for the same number.
+/// The input of an execution: a seed with mistakes, always the same for the same number.
 pub fn mutated(target: &Target, seeds: &[Vec<u8>], number: u64) -> Vec<u8> {
     let name_hash = target
         .name
@@ -39,7 +39,8 @@ pub fn mutated(target: &Target, seeds: &[Vec<u8>], number: u64) -> Vec<u8> {
     bytes
 }
 
-/// Makes mistakes in bytes: mostly one, at most six. `other` is what pieces are taken from, `dictionary` words of the format.
+/// Makes one to six mistakes in bytes, mostly one. Inserted pieces come from `other` and from `dictionary`, words of
+/// the format.
 pub fn make_mistakes(bytes: &mut Vec<u8>, other: &[u8], dictionary: &[&[u8]], rng: &mut Pcg64Mcg) {
     // Half of all inputs have one mistake, a quarter two, and so on.
     let num_mistakes = (rng.random::<u32>().trailing_zeros() + 1).min(MAX_MISTAKES);
@@ -76,7 +77,7 @@ fn make_mistake(bytes: &mut Vec<u8>, other: &[u8], dictionary: &[&[u8]], rng: &m
             bytes[at..at + size].copy_from_slice(&whole[..size]);
         }
         7 => {
-            // A number of a text, from `at` on.
+            // Replaces the first number of a text after `at`.
             let is_digit = |byte: &u8| byte.is_ascii_digit() || *byte == b'.';
             if let Some(from) = bytes[at..].iter().position(is_digit).map(|offset| at + offset) {
                 let to = bytes[from..].iter().position(|byte| !is_digit(byte)).map_or(length, |offset| from + offset);
@@ -93,7 +94,7 @@ fn make_mistake(bytes: &mut Vec<u8>, other: &[u8], dictionary: &[&[u8]], rng: &m
             let to = (from + rng.random_range(1..=512_usize)).min(other.len());
             bytes.splice(at..end, other[from..to].iter().copied());
         }
-        // The order of two pieces.
+        // Exchanges two adjacent pieces.
         _ => bytes[at..].rotate_left((end - at).min(length - at - 1)),
     }
 }

@@ -1,4 +1,4 @@
-//! Many executions of one target.
+//! Runs many executions of one target.
 
 use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -10,53 +10,53 @@ use peak_alloc::PeakAlloc;
 use crate::mutator::mutated;
 use crate::target::{MAX_BYTES_PER_INPUT_BYTE, MAX_SECONDS, Target};
 
-/// What an execution broke.
+/// A broken promise of an execution.
 #[derive(Debug, Clone)]
 pub struct Failure {
-    /// Of the execution.
+    /// Number of the execution.
     pub number: u64,
-    /// What was promised and what was found, in words.
+    /// The promise and the observation, in words.
     pub reason: String,
     /// The input.
     pub input: Vec<u8>,
 }
 
-/// What came of many executions.
+/// The results of many executions.
 #[derive(Debug, Clone, Default)]
 pub struct Outcome {
-    /// Executions.
+    /// Number of executions.
     pub count: u64,
-    /// Of which the reader accepted the input.
+    /// Number of executions whose input the reader accepted.
     pub accepted: u64,
-    /// Seconds of the slowest.
+    /// Time of the slowest execution, in seconds.
     pub slowest_secs: f64,
-    /// Most bytes that one took.
+    /// Most memory that an execution took, in bytes.
     pub most_bytes: usize,
-    /// What broke a promise.
+    /// The executions that broke a promise.
     pub failures: Vec<Failure>,
 }
 
-/// What one execution came to.
+/// The result of one execution.
 #[derive(Debug, Clone)]
 pub struct Execution {
     /// Whether the reader accepted the input.
     pub accepted: bool,
-    /// Seconds that it took.
+    /// Time that it took, in seconds.
     pub seconds: f64,
-    /// Most bytes in use, beyond those before.
+    /// Most memory in use, beyond the memory in use before, in bytes.
     pub bytes: usize,
-    /// What was promised and what was found, where that differs.
+    /// The broken promise, if any: its limit and the observation.
     pub broken: Option<String>,
 }
 
-/// The first panic of any thread since the execution began; also one that is caught where it happened.
+/// The first panic of any thread since the execution began, including caught panics.
 static PANIC: Mutex<Option<String>> = Mutex::new(None);
 
 fn panic_text() -> MutexGuard<'static, Option<String>> {
     PANIC.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Notes panics instead of printing them.
+/// Records panics instead of printing them.
 fn note_panics() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
@@ -68,7 +68,7 @@ fn note_panics() {
 
 /// Runs a target on one input.
 ///
-/// `allocator` is the program's, which nothing else uses meanwhile: it counts what is taken.
+/// `allocator` counts the memory of the whole process, which must do nothing else at the same time.
 pub fn execute(target: &Target, input: &[u8], allocator: &PeakAlloc) -> Execution {
     note_panics();
     let before = allocator.current_usage();
@@ -81,14 +81,14 @@ pub fn execute(target: &Target, input: &[u8], allocator: &PeakAlloc) -> Executio
     let panic = panic_text().take();
     let broken = match panic {
         Some(panic) => Some(format!("a panic: {panic}")),
-        None if seconds > MAX_SECONDS => Some(format!("{seconds:.1} s, of at most {MAX_SECONDS}")),
-        None if bytes > bound => Some(format!("{bytes} bytes, of at most {bound}")),
+        None if seconds > MAX_SECONDS => Some(format!("expected at most {MAX_SECONDS} s, found {seconds:.1} s")),
+        None if bytes > bound => Some(format!("expected at most {bound} bytes, found {bytes}")),
         None => None,
     };
     Execution { accepted: broken.is_none() && accepted.unwrap_or_default(), seconds, bytes, broken }
 }
 
-/// Runs a target on the inputs of these numbers, made of its seeds; `allocator` as of [`execute`].
+/// Runs a target on the inputs of these numbers, made from its seeds; `allocator` as in [`execute`].
 pub fn run(target: &Target, seeds: &[Vec<u8>], numbers: Range<u64>, allocator: &PeakAlloc) -> Outcome {
     let mut outcome = Outcome::default();
     for number in numbers {

@@ -1,22 +1,24 @@
-//! One reader under attack.
+//! A reader under attack.
 
-/// Longer than this an execution may never take.
+/// Maximum time of an execution.
 pub const MAX_SECONDS: f64 = 10.0;
-/// JSON's values take more than their text.
+/// Maximum memory per byte of input; parsed JSON values take more than their text.
 pub const MAX_BYTES_PER_INPUT_BYTE: usize = 20;
 
-/// One reader under attack.
+/// A reader under attack.
 pub struct Target {
-    /// As the command line and files have it.
+    /// Name on the command line and in file names.
     pub name: &'static str,
-    /// Bytes that may be in use while it reads, beyond [`MAX_BYTES_PER_INPUT_BYTE`] times the input's.
+    /// Bytes that may be in use while it reads, beyond [`MAX_BYTES_PER_INPUT_BYTE`] times the size of
+    /// the input.
     pub max_extra_bytes: usize,
-    /// Executions of the short run that is part of the tests; about a second.
+    /// Number of executions in the short run that is part of the tests; they take about a second.
     pub quick_executions: u64,
-    /// Words and numbers of the format, which chance would hardly write.
+    /// Words and numbers of the format that random mistakes would hardly produce.
     pub dictionary: &'static [&'static [u8]],
-    /// Input that is read without an error, from which all other input is made.
+    /// Valid inputs, from which all other inputs are made.
     pub seeds: fn() -> Vec<Vec<u8>>,
-    /// Reads the bytes as the program does, and uses what comes out; whether they were accepted.
+    /// Reads the bytes as the program does and uses the result; returns whether the bytes were
+    /// accepted.
     pub run: fn(&[u8]) -> bool,
 }

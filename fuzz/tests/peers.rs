@@ -1,4 +1,5 @@
-//! A client of a robot that makes mistakes in everything it sends: errors, no panic, no wait beyond the client's own bounds.
+//! Tests the robot's client against peers that make mistakes in everything they send: the client returns errors, does
+//! not panic, and does not exceed its own timeouts.
 #![allow(clippy::unwrap_used)]
 
 use std::io::Write;
@@ -19,11 +20,11 @@ use sdg_fuzz::make_mistakes;
 
 const NUM_SESSIONS: usize = 150;
 const TIMEOUT: Duration = Duration::from_millis(50);
-/// Connecting twice (versions 5 and 10), the start of a motion, its end and its stop: each wait has its limit, recovery
-/// the longest one, which a closed connection shortens.
+/// Covers two connections (versions 5 and 10), and the start, end and stop of a motion. Each wait has a limit; recovery
+/// has the longest one, which a closed connection shortens.
 const MAX_SESSION: Duration = Duration::from_secs(25);
 
-/// With errors in half of the cases.
+/// Mutates half of the messages.
 fn maybe_mutated(mut bytes: Vec<u8>, rng: &mut Pcg64Mcg) -> Vec<u8> {
     if rng.random_bool(0.5) {
         let other = bytes.clone();
@@ -86,7 +87,7 @@ fn a_robot_that_makes_mistakes_is_an_error() {
     let address = listener.local_addr().unwrap().to_string();
     thread::spawn(move || {
         let rng = &mut Pcg64Mcg::seed_from_u64(1);
-        // Ends with the test's process; a client that disconnects first is an error of the stream.
+        // Runs until the test's process ends; a client that disconnects first is an error of the stream.
         loop {
             let _ = play_robot(&listener, rng);
         }

@@ -1,4 +1,5 @@
-//! Some thousand executions of every target. One test, because it counts the memory of the whole process.
+//! A few thousand executions of every target. They are one test, because it counts the memory of the
+//! whole process.
 #![allow(clippy::unwrap_used)]
 
 use peak_alloc::PeakAlloc;
@@ -11,12 +12,13 @@ static ALLOCATOR: PeakAlloc = PeakAlloc;
 fn every_reader_refuses_or_reads_and_takes_neither_long_nor_much() {
     let mut wrong = Vec::new();
     for target in TARGETS {
-        // Unchanged, each is read: else nothing of the format would be tried.
+        // Every seed must be accepted unchanged; otherwise the mistakes would never get past the first
+        // check.
         let seeds = (target.seeds)();
         for (k, seed) in seeds.iter().enumerate() {
             let execution = execute(target, seed, &ALLOCATOR);
             if !execution.accepted {
-                wrong.push(format!("{}: seed {k} is refused: {:?}", target.name, execution.broken));
+                wrong.push(format!("{}: expected seed {k} to be accepted, found {:?}", target.name, execution.broken));
             }
         }
         let outcome = run(target, &seeds, 0..target.quick_executions, &ALLOCATOR);
@@ -35,15 +37,16 @@ fn every_reader_refuses_or_reads_and_takes_neither_long_nor_much() {
                 target.name, first.number, first.reason
             ));
         }
-        // Of what is made, some is still of the format, and some is not.
+        // Some of the mutated inputs are still valid, and some are not.
         if !(1..outcome.count).contains(&outcome.accepted) {
             wrong.push(format!("{}: {} of {} accepted", target.name, outcome.accepted, outcome.count));
         }
     }
-    // No mistake makes these: an operation of a pickle, a million times.
+    // No mistake produces these pickles, which repeat an operation a million times.
     let checkpoint = TARGETS.iter().find(|target| target.name == "checkpoint").unwrap();
     for (k, pickle) in costliest_pickles().iter().enumerate() {
-        // The program reads a file from the disk: of the input's twenty bytes a byte this leaves three.
+        // The program reads the file from the disk, so the limit is 3 instead of
+        // [`sdg_fuzz::MAX_BYTES_PER_INPUT_BYTE`] bytes per byte of the file.
         let execution = execute(checkpoint, pickle, &ALLOCATOR);
         let most = checkpoint.max_extra_bytes + 3 * pickle.len();
         if execution.broken.is_some() || execution.bytes > most {
@@ -53,7 +56,8 @@ fn every_reader_refuses_or_reads_and_takes_neither_long_nor_much() {
             ));
         }
     }
-    // The targets' own hook notes panics and prints none.
+    // The targets' hook records panics without printing them; restore the default hook for the assertion
+    // below.
     let _ = std::panic::take_hook();
     assert!(wrong.is_empty(), "{wrong:#?}");
 }

@@ -80,7 +80,7 @@ _MAX_SEARCH_FRAMES = 10_000
 
 
 class Camera:
-    """A calibrated camera with its pose over the table."""
+    """A calibrated camera with its pose relative to the table."""
 
     def __init__(self, native: _native.Camera) -> None:
         self._native = native
@@ -95,12 +95,12 @@ class Camera:
 
     @classmethod
     def from_yaml(cls, text: str) -> "Camera":
-        """The same from the text of a file. Raises CameraError."""
+        """Reads a camera from the text of a file. Raises CameraError."""
         return cls(_native.Camera.from_yaml(text))
 
     @property
     def size_px(self) -> tuple[int, int]:
-        """Width and height of its pictures, in pixels."""
+        """Width and height of the camera's pictures, in pixels."""
         return self._native.size_px
 
     @property
@@ -117,16 +117,16 @@ class GraspModel:
 
     @classmethod
     def load(cls, path: _Path) -> "GraspModel":
-        """Reads a model's file. Raises FileError and ModelFileError."""
+        """Reads a model file. Raises FileError and ModelFileError."""
         return cls(_native.Model.load(path))
 
     def save(self, path: _Path) -> None:
-        """Writes the model's file atomically; it replaces only an existing grasp model. Raises FileError."""
+        """Writes the model file atomically; it replaces only an existing grasp model. Raises FileError."""
         self._native.save(path)
 
     @property
     def model(self) -> str:
-        """Its letter: S, A, B, C or D."""
+        """The model's letter: S, A, B, C or D."""
         return self._native.kind
 
     @property
@@ -243,11 +243,11 @@ def teach(
     marks: a file of marks (COCO, LabelMe, YOLO-pose), or the contents of such a JSON file as a dictionary.
     model: S, which takes seconds, or A, B, C or D, which have a network and take minutes.
     steps, time_budget_s: maximum steps and seconds of the network's training.
-    symmetry: number of turns, within a full rotation, in which the part looks the same, or "full".
-    size_tolerance: smallest and largest size of the part in a picture, relative to its size in the photo.
+    symmetry: number of angles at which the part looks the same, or "full".
+    size_tolerance: minimum and maximum size of the part in a picture, relative to its size in the photo.
     region: (left, upper, width, height) in pixels of the photo.
     camera: the file of the calibrated camera that took the photo, for grasps in metres.
-    mark_height_mm, grasp_height_mm: heights over the table of the marks and of the grasp, with a camera; grasp_height_mm defaults
+    mark_height_mm, grasp_height_mm: heights of the marks and of the grasp above the table, with a camera; grasp_height_mm defaults
     to half of mark_height_mm.
     negatives: files of pictures without the part.
 
@@ -264,7 +264,7 @@ def teach(
             if not (value == 0 or 0.1 <= value <= 500):
                 raise ArgumentError(f"expected {name} of 0 to 500 millimetres, found {value}: metres given as millimetres?")
         of_camera = (camera, 1e-3 * mark_height_mm, 1e-3 * grasp_mm)
-    # 0 for all turns.
+    # 0 for full symmetry.
     turns = 0
     if symmetry != "full":
         if isinstance(symmetry, str):
@@ -341,7 +341,7 @@ def _native_of(camera: Optional[Camera]) -> Optional[_native.Camera]:
 
 
 def _checked(array: Any) -> _Array:
-    """The array as exactly numpy.ndarray, without a copy."""
+    """Checks an array and returns it as exactly numpy.ndarray, without a copy."""
     if not isinstance(array, np.ndarray):
         raise PictureError(f"expected a numpy.ndarray, found {type(array).__name__}")
     return np.asarray(array)

@@ -20,10 +20,10 @@ class Grasp:
 
 @dataclass(frozen=True)
 class Pose:
-    """Pose of the grasp in the frame of the camera's file, in metres and degrees."""
+    """Pose of the grasp in the frame of the camera file, in metres and degrees."""
 
     frame: str
-    """"table" or "base", as given in the camera's file."""
+    """"table" or "base", as given in the camera file."""
     p_m: tuple[float, float, float]
     yaw_deg: float
     """Rotation about the frame's z, right-handed."""

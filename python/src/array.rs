@@ -8,10 +8,10 @@ use sdg_bindings::{Fault, FaultKind, PixelOrder, PixelShape};
 
 use crate::errors::exception;
 
-/// Copies an array of bytes with any strides; the GIL is held.
+/// Copies an array of bytes with any strides; the GIL must be held.
 ///
 /// # Errors
-/// Not a `numpy.ndarray`, another element type, another shape, or unknown channels.
+/// An array that is not a `numpy.ndarray`, has another element type or shape, or unknown channels.
 pub fn picture(array: &Bound<'_, PyAny>, channels: &str) -> PyResult<RgbImage> {
     let py = array.py();
     let fault = |kind, text: String| exception(py, Fault::new(kind, text));
@@ -23,7 +23,7 @@ pub fn picture(array: &Bound<'_, PyAny>, channels: &str) -> PyResult<RgbImage> {
             return Err(fault(FaultKind::Argument, text));
         }
     };
-    // Exactly this class: a subclass could return another address.
+    // Only this class: a subclass could return another address.
     let class = array.get_type();
     if !class.is(&py.import("numpy")?.getattr("ndarray")?) {
         let text = format!("expected a numpy.ndarray, found {}", class.name()?);

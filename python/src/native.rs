@@ -33,7 +33,7 @@ fn detached<T: Send>(py: Python<'_>, work: impl FnOnce() -> sdg_bindings::Result
     py.detach(work).map_err(|fault| exception(py, fault))
 }
 
-/// A calibrated camera over its table.
+/// A calibrated camera and its pose.
 #[pyclass(frozen)]
 struct Camera(sdg_bindings::Camera);
 
@@ -194,7 +194,8 @@ fn teach(
     let mut signal = None;
     let taught = py.detach(|| {
         sdg_bindings::teach(&from, options, &mut |_| {
-            // Ctrl-C is a Python exception, which no other code checks for meanwhile.
+            // Ctrl-C is a Python exception, which no other code checks for during the
+            // teaching.
             match Python::attach(|py| py.check_signals()) {
                 Ok(()) => ControlFlow::Continue(()),
                 Err(raised) => {

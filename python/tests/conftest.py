@@ -1,4 +1,4 @@
-"""Shared fixtures: programs of `make test-python`, models that are taught once, pictures as files."""
+"""Common fixtures: programs of `make test-python`, models that are taught once, pictures as files."""
 
 import os
 from pathlib import Path
@@ -9,9 +9,9 @@ import made_pictures
 import sdg
 
 ROOT = Path(__file__).resolve().parents[2]
-# Heights over the table of the pendulum's marks and grasp: datasets/objects/pendulum.
+# Heights of the pendulum's marks and grasp above the table: datasets/objects/pendulum.
 MARK_HEIGHT_MM = 16.0
-# Enough steps to show that C's network is used; what it learns is tested in Rust.
+# Enough steps to show that C's network is used; the quality of its training is tested in Rust.
 STEPS = 10
 
 

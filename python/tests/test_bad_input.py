@@ -1,4 +1,4 @@
-"""Wrong input: an exception of a specific class, with the expected and the found value."""
+"""Tests that wrong input raises an exception of a specific class, with the expected and the found value."""
 
 import subprocess
 import sys
@@ -214,7 +214,7 @@ def test_a_forked_process_is_told_instead_of_waiting_for_ever(models: dict[str, 
     arguments = [sys.executable, "-c", FORKED, str(models["S"]), str(made_pictures.PHOTO)]
     done = subprocess.run(arguments, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
-    assert done.stdout.count("expected a process that was started anew (spawn)") == 2
+    assert done.stdout.count("expected a new process (spawn)") == 2
 
 
 def test_every_exception_is_of_this_package() -> None:

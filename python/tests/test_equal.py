@@ -1,4 +1,4 @@
-"""The same grasps as from Rust, to the bit, and as from `sdg detect --json --all`, to the last printed digit."""
+"""Compares grasps with those from Rust, to the bit, and with `sdg detect --json --all`, to the last printed digit."""
 
 import json
 import math
@@ -98,7 +98,7 @@ def test_teaching_writes_the_file_of_the_program(
 
 
 def without_seconds_of_teaching(file: Path) -> tuple[str, bytes]:
-    """The header and the tensors of a model's file, without the duration of its teaching, which always differs."""
+    """The header and the tensors of a model file, without the duration of its teaching, which always differs."""
     content = file.read_bytes()
     length = int.from_bytes(content[:8], "little")
     header, num_times = re.subn(r'\\"seconds\\":[0-9.e-]+', "", content[8 : 8 + length].decode())

@@ -1,4 +1,4 @@
-"""The notebook's cells run in order, without Jupyter; its picture has the grasp drawn at the part's new position."""
+"""Tests that the notebook's cells run in order, without Jupyter, and that its picture has the grasp at the part's new position."""
 
 import json
 import subprocess

@@ -1,4 +1,4 @@
-"""The guide's code runs; the package is typed, documented and within its size limit; it contains the command."""
+"""Tests that the guide's code runs, that the package is typed, documented and within its size limit, and that it has the command."""
 
 import inspect
 import os

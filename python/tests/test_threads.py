@@ -1,4 +1,4 @@
-"""Other Python threads run during a detection; prints the speed of two parallel detections, and the time to the first grasp."""
+"""Tests that other Python threads run during a detection; prints the speed of two parallel detections and the time to the first grasp."""
 
 import os
 import subprocess

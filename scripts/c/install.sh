@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Builds the C library and lays it out as it is installed: lib, include, pkg-config's and CMake's files, all of which find each other
-# from wherever the folder is moved to. `make capi`: target/capi. Usage: install.sh FOLDER
+# Builds the C library and installs it into a folder: lib, include, files of pkg-config and CMake. The folder can be moved.
+# `make capi`: target/capi. Usage: install.sh FOLDER
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 

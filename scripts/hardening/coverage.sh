@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Which share of the readers' lines hostile input reaches: `make hardening COVERAGE=1`. At most EXECUTIONS of each target (20000), in COVERAGE_SECONDS
-# for all of them (400).
+# Measures the fraction of the readers' lines that hostile input reaches: `make hardening COVERAGE=1`. At most EXECUTIONS of each target (20000), in
+# COVERAGE_SECONDS for all targets together (400).
 # The first table is per reader, the second per file; `SHOW=FILE` prints a file's lines with their counts.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
@@ -14,19 +14,19 @@ tools=$(rustc --print sysroot)/lib/rustlib/$host/bin
 
 out=target/hardening/coverage
 mkdir -p "$out/figures"
-# Programs of the build itself write counts, too.
+# Programs of the build also write counts.
 LLVM_PROFILE_FILE="$PWD/$out/build-%p.profraw" RUSTC_WORKSPACE_WRAPPER="$PWD/scripts/hardening/instrumented_rustc.sh" \
     scripts/build.sh --bin hardening
 cp target/release/hardening "$out/hardening"
-# The program without counters takes its place again.
+# Restores the program without counters.
 scripts/build.sh --bin hardening
 
 if [ -z "${SHOW:-}" ]; then
     rm -f "$out"/*.profraw "$out"/figures/*
-    # Counters make it many times slower: an execution that takes too long for that is none of the failures that count.
+    # Counters make the program many times slower, so executions that take too long are not counted as failures.
     # shellcheck disable=SC2086 # names of targets
     LLVM_PROFILE_FILE="$PWD/$out/%p.profraw" "$out/hardening" --executions "${EXECUTIONS:-20000}" --seconds "${COVERAGE_SECONDS:-400}" \
-        --out "$out/figures" ${TARGETS:-} || echo "coverage: with failures, above"
+        --out "$out/figures" ${TARGETS:-} || echo "coverage: there are failures, listed above"
     "$tools/llvm-profdata" merge --sparse "$out"/*.profraw --output "$out/all.profdata"
     "$tools/llvm-cov" export "$out/hardening" --instr-profile "$out/all.profdata" --summary-only >"$out/summary.json"
     python3 scripts/hardening/coverage_tables.py "$out/summary.json"

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Shares of lines from llvm-cov's summary: per reader, then per file. Called by coverage.sh."""
+"""Prints the percentage of reached lines from llvm-cov's summary, per reader and per file. Called by coverage.sh."""
 import json
 import os
 import sys
 
-# The files that read what strangers write, by the targets that attack them.
+# The files that read input from outside, by the targets that attack them.
 READERS = [
     ("checkpoint", ["weights-conversion/src/pickle/", "weights-conversion/src/checkpoint.rs", "weights-conversion/src/element.rs",
                     "weights-conversion/src/safetensors_file.rs", "weights-conversion/src/source.rs", "weights-conversion/src/tensor.rs",

@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# Endurance, section by section; each goes on where it ended or counts what fits in its time. docs/testing.md has the figures.
+# Endurance tests in sections; each resumes an earlier run or stops at its time limit. docs/testing.md has the figures.
 #
 #   endure.sh [SECTION…]   crash, refusals, soak, robot, limits, mutants; without a section, the first four
-#   QUICK=1                a few of each
-#   KILLS, FRAMES, SESSIONS, DISCONNECTIONS, ATTEMPTS   how many; SECS: the longest that a part of soak or robot takes
+#   QUICK=1                only a few repetitions of each
+#   KILLS, FRAMES, SESSIONS, DISCONNECTIONS, ATTEMPTS   numbers of repetitions; SECS: maximum time of a part of soak or robot
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Breaks each guard in a copy of the repository, and tells which tests notice: `scripts/hardening/guards.py [WORD…]` for those whose
-line contains a word. What was found stays in target/hardening/guards/found.json and is not tried again; delete it to begin anew."""
+"""Breaks each guard in a copy of the repository, and prints the tests that notice it: `scripts/hardening/guards.py [WORD…]` for guards
+whose line contains a word. Results stay in target/hardening/guards/found.json and are not repeated; delete it to start again."""
 import json
 import os
 import re
@@ -12,9 +12,9 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 WORK = ROOT / "target/hardening/guards"
 
-# Guard, file, what stands there, what breaks it, the package whose tests must notice.
+# Guard, file, its text, the replacement that breaks it, and the package whose tests must notice.
 GUARDS = [
-    # Sizes of what decoders read.
+    # Sizes of the input of decoders.
     ("file: length before it is read", "crates/files/src/bounded.rs", "if length > max_bytes {", "if length > u64::MAX - 1 {", "sdg-files"),
     ("file or pipe: length while it is read", "crates/files/src/bounded.rs", "if bytes.len() as u64 > max_bytes {", "if bytes.len() as u64 > u64::MAX - 1 {", "sdg-files"),
     ("picture: pixels by its header", "crates/picture/src/decode.rs", "if u64::from(width) * u64::from(height) > limits.max_pixels {", "if u64::from(width) * u64::from(height) > u64::MAX - 1 {", "sdg-picture"),
@@ -44,7 +44,7 @@ GUARDS = [
     ("safetensors: bytes of the header", "weights-conversion/src/safetensors_file.rs", "if header_len > MAX_HEADER_BYTES {", "if header_len > u64::MAX - 1 {", "sdg-weights-conversion"),
     ("safetensors: places of tensors", "weights-conversion/src/safetensors_file.rs", "if start != end || stop < start {", "if stop < start {", "sdg-weights-conversion"),
     ("workcell: cells of a tray", "crates/robot/src/workcell/place_sections.rs", "(1..=MAX_CELLS).contains(&i64::from(count))", "(1..).contains(&i64::from(count))", "sdg-robot"),
-    # What cameras and browsers send.
+    # Input from cameras and browsers.
     ("camera over HTTP: head", "crates/camera/src/http/exchange.rs", "if bytes.len() > MAX_HEAD_BYTES {", "if bytes.len() > usize::MAX - 1 {", "sdg-camera"),
     ("camera over HTTP: redirects", "crates/camera/src/http/exchange.rs", "for _ in 0..=MAX_REDIRECTS {", "for _ in 0..=1_000_000 {", "sdg-camera"),
     ("camera over HTTP: a chunk's line", "crates/camera/src/http/body.rs", "if line.len() > MAX_CHUNK_LINE_BYTES {", "if line.len() > usize::MAX - 1 {", "sdg-camera"),
@@ -120,12 +120,12 @@ def tests_of(package: str, tree: Path) -> subprocess.CompletedProcess:
     built = run([*command, "--no-run"], cwd=tree, env=environment)
     if built.returncode != 0:
         return built
-    # Endless where a guard against endlessness is broken.
+    # The tests may never end if a guard against endless loops is broken.
     return run(["timeout", "300", *command, "--no-fail-fast"], cwd=tree, env=environment)
 
 
 def main() -> None:
-    # The tree is mended when this is ended, too.
+    # The tree is also restored if this script is terminated.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit("ended"))
     words = sys.argv[1:]
     guards = [guard for word in words for guard in GUARDS if word in guard[0] or word in guard[4]] if words else GUARDS

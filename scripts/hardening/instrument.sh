@@ -1,4 +1,4 @@
 #!/usr/bin/env bash
-# As RUSTC_WORKSPACE_WRAPPER: counts in our own crates alone, since counters in every small function of nalgebra make tests twenty
-# times as slow.
+# The RUSTC_WORKSPACE_WRAPPER that adds counters only to our own crates, because counters in every small function of nalgebra make
+# tests twenty times slower.
 exec "$@" -C instrument-coverage

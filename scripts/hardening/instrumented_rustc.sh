@@ -1,3 +1,3 @@
 #!/usr/bin/env bash
-# The compiler for crates of this workspace, with counters of lines: what cargo calls as RUSTC_WORKSPACE_WRAPPER, so that burn is not compiled again.
+# The compiler with line counters for crates of this workspace, called by cargo as RUSTC_WORKSPACE_WRAPPER, so burn is not compiled again.
 exec "$@" -C instrument-coverage

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# Breaks the robot's limits by hand, one by one, in a copy of the last commit, and names the tests that fail for each. A limit that can be
-# broken without a failing test is an error. Everything lies in target/limits.
+# Breaks the robot's limits one by one in a copy of the last commit, and prints the tests that fail for each. A limit that can be broken
+# without a failing test is an error. All files are in target/limits.
 #
-#   ONLY=force   those with this word in their name
+#   ONLY=force   only limits with this word in their name
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
@@ -15,7 +15,7 @@ export CARGO_TARGET_DIR=$work/build
 
 limits=crates/robot/src/safety/limits.rs
 touch=crates/robot/src/touch.rs
-# What is broken | the file | how, by sed | which tests are run
+# Broken limit | file | sed command that breaks it | tests to run
 cases=(
     "none|$limits||test(safety::)"
     "position of joints|$limits|s/\"position\" { 1e-6 }/\"position\" { 1e6 }/|test(safety::)"
@@ -43,7 +43,7 @@ printf '| limit | tests that fail |\n|---|---|\n'
 for case in "${cases[@]}"; do
     IFS='|' read -r name file change tests <<<"$case"
     [[ "$name" == *"${ONLY:-}"* ]] || continue
-    # A filter may have bars itself.
+    # A filter may itself contain bars.
     tests=${case#*|*|*|}
     cp "$file" "$work/unbroken"
     if [ -n "$change" ]; then

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Mutants of crate robot's safety, crate kinematics' timing and crate fci, each tried on the tests beside it alone: those of other
-# crates would catch more and take hours. What was found is in target/mutants/NAME/mutants.out.
+# Mutants of crate robot's safety, crate kinematics' timing and crate fci, each with the tests of its own crate only: those of other
+# crates would catch more but take hours. The results are in target/mutants/NAME/mutants.out.
 #
 #   mutants.sh [NAME…]    safety, timing, fci; without a name, all
 #   SHARD=0/8             every eighth mutant
@@ -20,7 +20,7 @@ for name in "${names[@]}"; do
     esac
     out=$PWD/target/mutants/$name
     mkdir -p "$out"
-    # Exit code 2 says that there are survivors: they are counted below.
+    # Exit code 2 means that some mutants survived, which are counted below.
     cargo mutants -f "$files" ${SHARD:+--shard "$SHARD" --sharding round-robin} --profile release --timeout 60 --build-timeout 600 \
         --test-tool nextest --cargo-arg=--locked -o "$out" -- "${tests[@]}" || [ $? -le 3 ]
     count() { wc -l <"$out/mutants.out/$1.txt"; }

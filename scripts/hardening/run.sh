@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
-# The sections of `make hardening`: those that SECTIONS names, in order. What each found stays in target/hardening, where it goes on.
+# Runs the sections of `make hardening` in SECTIONS, in order. Their results stay in target/hardening, from which a later run resumes.
 #   input       hostile input for every reader: EXECUTIONS for each of TARGETS (100000, all); figures in TARGET.json, failures in TARGET-NUMBER.bin
-#   sync        files are flushed before they take their names, seen by strace
+#   sync        files are flushed before they get their names, checked by strace
 #   coverage    which lines of the readers the input reaches (coverage.sh)
-#   guards      each guard broken once, and the tests that notice (guards.py)
+#   guards      each guard is broken once, and the tests that notice it are printed (guards.py)
 #   address, thread   unit tests under AddressSanitizer and ThreadSanitizer (sanitizers.sh)
-# QUICK=1 is input for two minutes and sync.
+# QUICK=1 runs input for two minutes, and sync.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 

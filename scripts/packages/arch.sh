@@ -1,7 +1,7 @@
-# What packages are called for ARCH (amd64 without one, or arm64), and how a program for it runs here; to be sourced.
+# Names of packages for ARCH (amd64 by default, or arm64), and the command that runs its programs on this machine; to be sourced.
 #   arch      Debian's name          machine  the kernel's
 #   triple    Rust's                 program  the folder of the program that packages hold
-#   emulated  a command before the program: qemu's, where this machine is another
+#   emulated  a command before the program: qemu, if this machine is of another kind
 
 arch=${ARCH:-amd64}
 case $arch in
@@ -16,7 +16,7 @@ triple=$machine-unknown-linux-gnu
 program=target/packages/program/$arch
 emulated=()
 if [ "$(uname -m)" != "$machine" ]; then
-    # The C library of that machine, where nothing else is told (QEMU_LD_PREFIX).
+    # The C library of that machine, unless QEMU_LD_PREFIX gives another one.
     scripts/install.sh qemu-user-static "libc6-$arch-cross"
     emulated=(env "QEMU_LD_PREFIX=${QEMU_LD_PREFIX:-/usr/$machine-linux-gnu}" "qemu-$machine-static")
 fi

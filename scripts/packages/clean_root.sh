@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# A Debian system without anything of ours. Usage: clean_root.sh RELEASE FOLDER
+# Makes a Debian system without any file of this project. Usage: clean_root.sh RELEASE FOLDER
 set -euo pipefail
 
 "$(dirname "$0")/../install.sh" mmdebstrap

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Counts the instructions of a convolution on arm64 under qemu: with NEON's lanes, with the same kernel over arrays, and with plain loops.
-# Every instruction is a block of its own and qemu writes a line for each block; the count of one round is that of two less that of one.
+# Every instruction is a separate block, and qemu writes a line per block; the count of one round is the difference of the counts of two rounds and one.
 # Usage: count_arm64.sh TEST-PROGRAM of sdg-kernels (`make test-arm64` names it)
 set -euo pipefail
 

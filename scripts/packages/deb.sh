@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# A Debian package, target/packages/deb/single-demo-grasp_VERSION_ARCH.deb; `make deb`. With TRY=1 it is then installed, used and
-# removed in a clean Debian root without network (root, mmdebstrap).
+# Makes a Debian package, target/packages/deb/single-demo-grasp_VERSION_ARCH.deb; `make deb`. With TRY=1 the package is then installed,
+# used and removed in a clean Debian root without network (needs root and mmdebstrap).
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 source scripts/packages/arch.sh

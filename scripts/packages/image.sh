@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# An OCI image for users, target/packages/image/single-demo-grasp-VERSION-amd64.oci.tar: the system of the Slurm image, and in /usr what the
-# packages hold; the user is not root, the folder is /data. Then it is used as a user would, without network; where the machine allows no
-# namespaces, that is said and left out. `make image`.
+# Makes an OCI image for users, target/packages/image/single-demo-grasp-VERSION-amd64.oci.tar: the system of the Slurm image, and in /usr the
+# contents of the packages; the user is not root, the folder is /data. Then the image is used like a user would, without network; if the
+# machine allows no namespaces, this step is skipped with a message. `make image`.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 source scripts/packages/arch.sh
@@ -20,7 +20,7 @@ mkdir -p "$work/layer/data"
 
 scripts/oci_system.sh "$layout" "$version" "$work"
 scripts/packages/lay_out.sh "$work/layer/usr"
-# Numbers, not names: there is no account, and `--user` takes any other. The folder is everyone's.
+# Numbers, not names, because there is no account, and `--user` accepts any other number. Everyone can write to the folder.
 chmod 1777 "$work/layer/data"
 tar --create --owner=0 --group=0 --numeric-owner --sort=name --file "$work/sdg.tar" -C "$work/layer" usr data
 umoci raw add-layer --image "$layout:$version" "$work/sdg.tar"
@@ -36,7 +36,7 @@ if ! unshare --mount --net --pid --fork true 2>/dev/null; then
     exit 0
 fi
 umoci unpack --image "$layout:$version" "$work/bundle" >/dev/null
-# What the image says of itself is what a container is started with.
+# A container must be started with the image's own configuration.
 config=$work/bundle/config.json
 [ "$(python3 -c 'import json, sys; process = json.load(open(sys.argv[1]))["process"]; print(process["user"]["uid"], process["cwd"], process["args"][0])' "$config")" = \
     "1000 /data /usr/bin/sdg" ]
@@ -50,7 +50,7 @@ unshare --mount --net --pid --fork bash -euc '
     seconds() { echo "$(date +%s.%N) - $2" | bc | cut -c 1-5; }
     echo "image: from starting to the grasp drawn on a photo: $(seconds "$@") s"
     in_image "$1" /usr/bin/sdg rehearse --object pendulum --grasp-model pendulum.sdg --attempts 1 --out report | tail -1
-    # The page, with the network that a container shares with its host: the loopback alone.
+    # The page, with the only network that a container has in common with its host: the loopback interface.
     ip link set lo up
     in_image "$1" cp /usr/share/single-demo-grasp/pendulum/image.png photo.png
     in_image "$1" timeout 60 /usr/bin/sdg annotate --no-browser --json photo.png >"$1/data/address" &

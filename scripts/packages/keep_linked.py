@@ -1,6 +1,6 @@
-"""Keeps of a CycloneDX file those crates that are in the program: usage keep_linked.py FILE <names, a line `NAME vVERSION` each.
+"""Keeps only the crates of a CycloneDX file that are in the program. Usage: keep_linked.py FILE <names, one line `NAME vVERSION` each.
 
-cargo-cyclonedx lists what the whole workspace may depend on, with the features of all of its members.
+cargo-cyclonedx lists all possible dependencies of the whole workspace, with the features of all members.
 """
 
 import json

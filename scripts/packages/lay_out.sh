@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Lays the program and what belongs to it out under a folder: bin, manual pages, completions, the shipped photos with their marks,
-# licences. Usage: lay_out.sh PREFIX
+# Installs the program and its files under a folder: bin, manual pages, completions, the shipped photos with their marks, licences.
+# Usage: lay_out.sh PREFIX
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 source scripts/packages/arch.sh
@@ -26,5 +26,5 @@ done
 install -D -m 644 -t "$prefix/share/doc/single-demo-grasp" LICENSE-MIT LICENSE-APACHE
 gzip -9nc CHANGELOG.md >"$prefix/share/doc/single-demo-grasp/changelog.gz"
 chmod -R u=rwX,go=rX "$prefix"
-# The same bytes whenever they are laid out: as old as the commit.
+# With the commit's date, so the result always has the same bytes.
 find "$prefix" -exec touch --no-dereference --date "@$(git log -1 --format=%ct)" {} +

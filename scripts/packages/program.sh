@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Builds the `sdg` that packages hold, into target/packages/program/ARCH, for ARCH=amd64 or arm64 with glibc 2.31 or later. Nothing but
-# the C library is linked; MuJoCo and EGL are loaded by those verbs that simulate.
+# Builds the packages' program `sdg` into target/packages/program/ARCH, for ARCH=amd64 or arm64 with glibc 2.31 or later. Only the C
+# library is linked; the commands that simulate load MuJoCo and EGL.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 source scripts/packages/arch.sh
@@ -11,7 +11,7 @@ zig_cargo zigbuild --package sdg-cli --bin sdg
 
 mkdir -p "$program"
 cp "$built/sdg" "$program/sdg.new"
-# Of any machine's program, which objdump is not.
+# readelf reads programs of any machine, unlike objdump.
 newest=$(readelf --wide --version-info "$program/sdg.new" | grep -o 'GLIBC_[0-9.]*' | sort -Vu | tail -1)
 if [ "$(printf '%s\n' "$newest" "GLIBC_$GLIBC" | sort -V | tail -1)" != "GLIBC_$GLIBC" ]; then
     echo "packages: sdg needs $newest, and GLIBC_$GLIBC is promised" >&2

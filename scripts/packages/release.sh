@@ -1,16 +1,16 @@
 #!/usr/bin/env bash
-# Everything that a release consists of, in target/packages/release/VERSION: packages, wheel, image, zip, what is in the program
-# (CycloneDX), SHA256SUMS. Nothing is published: docs/releasing.md says what comes before and after. `make release`.
+# Makes all files of a release in target/packages/release/VERSION: packages, wheel, image, zip, the list of crates in the program
+# (CycloneDX), SHA256SUMS. Nothing is published: docs/releasing.md describes the steps before and after. `make release`.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
 version=$(sed -n '/^\[workspace.package\]/,/^version/s/^version = "\(.*\)"/\1/p' Cargo.toml)
 
 if [ -z "${DIRTY:-}" ] && [ -n "$(git status --porcelain)" ]; then
-    echo "release: expected a clean working tree, so that the commit says what was built; found changes (git status); DIRTY=1 tries it all the same" >&2
+    echo "release: expected a clean working tree, so that the commit identifies the sources; found changes (git status); DIRTY=1 builds anyway" >&2
     exit 1
 fi
-# At most twenty lines a version are read by anyone.
+# At most twenty lines per version, because nobody reads more.
 awk '/^## / { version = $0; lines = 0 } /^- / && ++lines > 20 { print "release: CHANGELOG.md: " version " has more than 20 lines"; exit 1 }' CHANGELOG.md >&2
 scripts/packages/semver.sh
 

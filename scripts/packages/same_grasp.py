@@ -1,6 +1,6 @@
-"""Compares two lines of `sdg detect --json` that two machines printed for one picture: usage same_grasp.py NAME <lines.
+"""Compares the lines of `sdg detect --json` from two machines for one picture. Usage: same_grasp.py NAME <lines.
 
-Says whether they are the same digits, and how far the best grasps are apart. Further than a hundredth of a pixel or of a degree is a failure.
+Prints whether all digits are the same, and the difference of the best grasps. A difference of more than a hundredth of a pixel or degree is a failure.
 """
 
 import json

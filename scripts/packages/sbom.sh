@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
-# What is in the program: every crate with version and licence, as CycloneDX JSON. Usage: sbom.sh FILE
+# Lists the contents of the program: every crate with version and licence, as CycloneDX JSON. Usage: sbom.sh FILE
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
 tools=target/packages/tools
 [ -x "$tools/bin/cargo-cyclonedx" ] || cargo install --quiet --debug --locked --root "$tools" cargo-cyclonedx@0.5.9
-# It writes a file beside each member of the workspace.
+# cargo-cyclonedx writes a file into the folder of each member of the workspace.
 name=sdg-what-is-in-it
 trap 'find . -path ./target -prune -o -name "$name.json" -exec rm {} +' EXIT
 SOURCE_DATE_EPOCH=$(git log -1 --format=%ct) "$tools/bin/cargo-cyclonedx" cyclonedx --quiet --manifest-path crates/cli/Cargo.toml \

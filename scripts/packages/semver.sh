@@ -1,13 +1,13 @@
 #!/usr/bin/env bash
-# Whether the libraries that other programs use are still what a release promised, by cargo-semver-checks. BASELINE is that release as
-# git knows it: the newest tag v*, without one nothing is checked and that is said. Usage: semver.sh [CRATE…]
+# Checks with cargo-semver-checks that the interfaces of the libraries for other programs are compatible with a release. BASELINE is the
+# git revision of that release, by default the newest tag v*; without one nothing is checked, with a message. Usage: semver.sh [CRATE…]
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
 tools=target/packages/tools
 baseline=${BASELINE:-$(git tag --list 'v*' --sort=-version:refname | head -1)}
 if [ -z "$baseline" ]; then
-    echo "release: interfaces not compared: no tag v* is there to compare with (0.2.0 will be the first)"
+    echo "release: interfaces not compared: there is no tag v* to compare with (0.2.0 will be the first)"
     exit 0
 fi
 [ -x "$tools/bin/cargo-semver-checks" ] || cargo install --quiet --debug --locked --root "$tools" cargo-semver-checks@0.51.0

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# One directory that runs from glibc 2.31 on, target/packages/tarball/single-demo-grasp-VERSION-MACHINE-linux.tar.xz;
-# `make tarball`. With TRY=1 it is then used in Debian 11, the oldest root that has that library (root, mmdebstrap).
+# Makes a tarball of one folder that runs with glibc 2.31 or later, target/packages/tarball/single-demo-grasp-VERSION-MACHINE-linux.tar.xz;
+# `make tarball`. With TRY=1 it is then used in Debian 11, the oldest release with that library (needs root and mmdebstrap).
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 source scripts/packages/arch.sh

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Uses a tarball or package for arm64 under qemu with the C library of Debian 11's arm64 (glibc 2.31), without network and as another user
-# than root, and compares the grasps of PARTS (the pendulum) with those of this machine's program, where there is one.
+# Uses a tarball or package for arm64 under qemu with the C library of Debian 11's arm64 (glibc 2.31), without network and not as root,
+# and compares the grasps of PARTS (the pendulum) with those of this machine's program, if there is one.
 # Usage: try_arm64.sh TARBALL|PACKAGE
 set -euo pipefail
 cd "$(dirname "$0")/../.."
@@ -10,7 +10,7 @@ package=$(realpath "$1")
 root=$(realpath -m target/packages/arm64-root)
 scripts/install.sh mmdebstrap qemu-user-static
 rm -rf "$root"
-# Nothing is run in it, so that the kernel needs no knowledge of arm64. The release's own library, not a later one of its security updates.
+# No program runs in this root, so the kernel needs no support for arm64. It has the release's own library, not a later security update.
 mmdebstrap --quiet --variant=extract --skip=check/qemu --architectures=arm64 --include=libc6/bullseye,libgcc-s1 bullseye "$root" 2>/dev/null
 mkdir -p "$root/opt" "$root/tmp"
 start=$(date +%s.%N)
@@ -24,7 +24,7 @@ case $package in
         installed=$(echo "$root"/opt/*/)
         ;;
 esac
-# A home that cannot be written, and a folder with a space and an umlaut.
+# A home folder that cannot be written, and a folder with a space and an umlaut.
 folder="$root/tmp/erste Größe"
 mkdir -p "$folder"
 chmod 755 "$root"

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Unpacks a tarball in the oldest Debian root that it promises to run in, and uses it without network. Prints seconds.
+# Unpacks a tarball in a root of the oldest supported Debian release, and uses it without network. Prints seconds.
 # Usage: try_tarball.sh TARBALL
 set -euo pipefail
 cd "$(dirname "$0")/../.."

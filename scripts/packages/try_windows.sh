@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Uses the zip for Windows under Wine: teaches, detects and draws, opens the page, and asks for what it has not. Usage: try_windows.sh ZIP
+# Uses the zip for Windows under Wine: teaches, detects and draws, opens the page, and runs commands that it lacks. Usage: try_windows.sh ZIP
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
@@ -15,7 +15,7 @@ export WINEPREFIX=$work/prefix WINEDEBUG=-all LC_ALL=C.UTF-8
 start=$(date +%s.%N)
 unzip -q "$zip" -d "$work"
 folder=$work/$(basename "$zip" .zip)
-# Windows' source of random numbers, which Debian 12's Wine 8 lacks; Windows 10 has it.
+# Windows' source of random numbers: Windows 10 has it, but Debian 12's Wine 8 lacks it.
 echo '#include <windows.h>
 BOOLEAN NTAPI SystemFunction036(PVOID, ULONG);
 __declspec(dllexport) BOOL WINAPI ProcessPrng(PBYTE bytes, SIZE_T count) { return SystemFunction036(bytes, count); }' >"$work/random.c"
@@ -29,7 +29,7 @@ cd "$work/erste Größe"
 sh "$OLDPWD/scripts/packages/first_grasp.sh" "$work/sdg" "$folder/photos" . 2>&1 | tail -1
 echo "windows: from unpacking to the grasp drawn on a photo, under $("$wine" --version): $(echo "$(date +%s.%N) - $start" | bc | cut -c 1-5) s"
 
-# What is not in it says so in one line.
+# A missing command is reported in one line.
 for verb in "demo" "camera grab --from v4l:/dev/video0 --out picture.png"; do
     told=$("$work/sdg" $verb 2>&1) && { echo "windows: $verb did not fail" >&2; exit 1; }
     [ "$(wc -l <<<"$told")" = 1 ] || { echo "windows: $verb said: $told" >&2; exit 1; }

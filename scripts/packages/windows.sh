@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# sdg.exe for 64-bit Windows without simulator (teach, detect, annotate) by mingw-w64, and a zip of it with the shipped photos,
-# target/packages/windows/single-demo-grasp-VERSION-windows-x86_64.zip; `make windows`. With TRY=1 it is then used under Wine.
+# Builds sdg.exe for 64-bit Windows without simulator (teach, detect, annotate) by mingw-w64, and a zip of it with the shipped photos,
+# target/packages/windows/single-demo-grasp-VERSION-windows-x86_64.zip; `make windows`. With TRY=1 it is then tried under Wine.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 source scripts/other_target.sh
@@ -14,7 +14,7 @@ folder=target/packages/target-windows
 CARGO_TARGET_DIR=$folder "$cargo_for_target" build --locked --profile "$profile" --target "$triple" "${standard_library[@]}" \
     --package sdg-cli --bin sdg --no-default-features --features annotate,base-weights
 exe=$folder/$triple/$profile/sdg.exe
-# Nothing but what Windows brings: a library of mingw's would have to be beside it.
+# Only libraries of Windows may be linked: a library of mingw would have to be shipped.
 if linked=$(x86_64-w64-mingw32-objdump -p "$exe" | sed -n 's/.*DLL Name: //p' | grep -Evi '^(api-ms-win-.*|kernel32|ntdll|msvcrt|ws2_32|userenv|advapi32|bcrypt.*|user32|shell32|ole32|combase)\.dll$'); then
     echo "windows: sdg.exe needs" $linked >&2
     exit 1

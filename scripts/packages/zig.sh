@@ -1,9 +1,9 @@
-# Cargo with zig's linker for the machine that arch.sh has chosen, with glibc 2.31 or later (Debian 11, Ubuntu 20.04), whose symbols zig
-# has, and those of other machines; to be sourced after arch.sh.
-#   zig_cargo zigbuild|test ARGUMENTS    in the profile of what goes to other machines; PROFILE=release, which `make build` has, takes a
-#                                        quarter of the time, for trying
+# Cargo with zig's linker for the machine that arch.sh has chosen, with glibc 2.31 or later (Debian 11, Ubuntu 20.04). zig has the symbols
+# of glibc's versions and of other machines. To be sourced after arch.sh.
+#   zig_cargo zigbuild|test ARGUMENTS    in the profile for distribution; PROFILE=release, the profile of `make build`, takes a quarter of
+#                                        the time, for trials
 #                                        AUDITABLE=1 writes the list of its crates into the program (cargo auditable)
-#   built                                the folder of what it compiles
+#   built                                the folder of the compiled programs
 
 source scripts/other_target.sh
 
@@ -16,14 +16,14 @@ if [ ! -x "$tools/bin/cargo-zigbuild" ]; then
     "$tools/bin/pip" --quiet --disable-pip-version-check install 'cargo-zigbuild==0.24.1' 'ziglang==0.17.1'
 fi
 choose_compiler "$triple"
-# A target directory of its own: it is another linker's and another profile's.
+# A separate target folder, because linker and profile are different.
 zig_target=target/packages/target
 [ "$compiled_by" = rustup ] || zig_target=$zig_target-$compiled_by
 built=$zig_target/$triple/$profile
 
 if [ -n "${AUDITABLE:-}" ]; then
     [ -x "$tools/bin/cargo-auditable" ] || cargo install --quiet --debug --locked --root "$tools" cargo-auditable@0.7.7
-    # zigbuild calls one program as cargo.
+    # zigbuild calls a single program as cargo.
     printf '#!/bin/sh\nexec "%s" auditable "$@"\n' "$cargo_for_target" >"$tools/auditable-cargo"
     chmod +x "$tools/auditable-cargo"
     cargo_for_target=$PWD/$tools/auditable-cargo

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# A clean environment with the wheel, and what its tests use: target/python/test.
+# Makes a clean environment with the wheel and the packages of its tests: target/python/test.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 

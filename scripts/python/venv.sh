@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Makes a virtual environment with the named packages, or does nothing where it has them: venv.sh FOLDER PACKAGE==VERSION …
+# Makes a virtual environment with the given packages; does nothing if it has them: venv.sh FOLDER PACKAGE==VERSION …
 set -euo pipefail
 
 folder=$1

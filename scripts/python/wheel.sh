@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Builds the Python package's wheel into target/wheels. Called by `make wheel`.
 #
-# In the release profile and with the features that the workspace has, so that what `make build` compiled, burn above all, is not compiled
-# again: crates/bindings/Cargo.toml says how.
+# In the release profile and with the features of the workspace, so the libraries of `make build`, above all burn, are not compiled again:
+# crates/bindings/Cargo.toml explains this.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 

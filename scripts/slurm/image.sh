@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# An OCI image with sdg and the Debian packages that it runs on (scripts/oci_system.sh).
-# It lies in target/oci (a layout) and, for Apptainer and others, in target/oci.tar. Then the program is run from the unpacked
-# image in namespaces without network; where those are not allowed, that is said and left out.
+# Makes an OCI image with sdg and the Debian packages that it needs (scripts/oci_system.sh), in target/oci (a layout) and, for Apptainer
+# and others, in target/oci.tar. Then the program is run from the unpacked image in namespaces without network; if those are not
+# allowed, this step is skipped with a message.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
@@ -27,7 +27,7 @@ fi
 umoci unpack --image "$layout:sdg" "$work/bundle"
 root=$work/bundle/rootfs
 mkdir -p "$root/run-test"
-# The part that needs MuJoCo and EGL, too: a unit of an evaluation, in a network of its own that has nothing.
+# Including the part that needs MuJoCo and EGL: a unit of an evaluation, in a network namespace without any network.
 unshare --mount --net --pid --fork bash -euc '
     mount --bind /dev "$1/dev"
     mount -t proc proc "$1/proc"
@@ -35,4 +35,4 @@ unshare --mount --net --pid --fork bash -euc '
     chroot "$1" /usr/local/bin/sdg evaluate --models S --objects rod_end --attempts 1 --views 1 --scenes 1 \
         --out /run-test --unit teach-S-rod_end grasp-S-rod_end --json
 ' unshare "$root"
-echo "the image does units without network"
+echo "the image runs units without network"

@@ -26,7 +26,7 @@ const NUM_ATTEMPTS: u32 = 1;
 const MIN_RIGHT_OF_PART: usize = 5;
 /// Minimum for all pictures of all parts: the evaluation's 98 %, minus two standard deviations for 72 pictures.
 const MIN_RIGHT_SHARE: f64 = 0.95;
-/// Maximum number of failed grasps, one of each part: in the evaluation 80 of 80 hold.
+/// Maximum number of failed grasps, one attempt per part: 80 of 80 hold in the evaluation.
 const MAX_DROPPED: usize = 1;
 
 fn model_without_network(object: &ObjectSpec) -> GraspModel {

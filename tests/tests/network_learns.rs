@@ -1,8 +1,8 @@
 //! Fails if a network learns badly: tests model C's network alone, taught from one photo of a generated part, on
 //! generated pictures with and without the part.
 //!
-//! The check against the demonstration would hide weaknesses of the network, so it is off here. The part is not a
-//! shipped one, and its pictures are rendered by another program than the network's training samples.
+//! The check against the demonstration would hide weaknesses of the network, so it is off. The part is not a shipped
+//! one, and its pictures are not rendered by the program that renders the network's training samples.
 
 use std::ops::ControlFlow;
 
@@ -10,15 +10,15 @@ use sdg_geometry::PlanarGrasp;
 use sdg_grasp::{GraspModel, TeachOptions, Verification, teach};
 use sdg_part_generator::{Condition, Part, Sample, SceneConfig, Scenes};
 
-/// Seed of the part, which has no symmetry, so that its turn counts.
+/// Seed of the part, which has no symmetry, so that the angle counts.
 const PART_SEED: u64 = 4;
 /// Seed of the pictures.
 const SCENES_SEED: u64 = 11;
 /// Number of pictures with the part, and of pictures without it.
 const NUM_PICTURES: u64 = 40;
-/// Maximum distance of a hit, as a share of the part's box diagonal: 10 mm for a part of 150 mm.
+/// Maximum distance of a hit, as a fraction of the diagonal of the part's box: 10 mm for a part of 150 mm.
 const MAX_DISTANCE: f64 = 1.0 / 15.0;
-/// Maximum turn of a hit.
+/// Maximum angle error of a hit.
 const MAX_TURN_DEG: f64 = 10.0;
 
 /// Bounds for the network alone. Measured with seed 1, edge preset from the shipped weights, at most 120 steps: 31 hits

@@ -24,7 +24,7 @@ const MAX_ERROR_DEG: f64 = 2.0;
 const MIN_SHARE: f64 = 0.95;
 /// Maximum number of frames until a reappearing part is found again.
 const MAX_FIND_FRAMES: usize = 100;
-/// Distance from every instance at which a tracked object counts as another one.
+/// Minimum distance from every instance at which a tracked object counts as a different object.
 const ELSEWHERE_PX: f64 = 25.0;
 /// Maximum number of frames until a removed part is lost.
 const MAX_LOSE_FRAMES: usize = 3;

@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use crate::error::{Result, WeightsError};
 
-/// Norm after a convolution, as far as it has parameters.
+/// Norm after a convolution, with the parameters that it has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum Norm {
     /// None: the convolution has a bias.
@@ -20,19 +20,19 @@ pub enum Norm {
     Stored,
 }
 
-/// Residual block.
+/// Kind of residual block.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum Block {
     /// Two 3×3 convolutions.
     Basic,
-    /// 1×1, 3×3, 1×1.
+    /// 1×1, 3×3 and 1×1 convolution.
     Bottleneck {
         /// Channels of the inner convolutions in res2; doubled in each later stage.
         inner_channels: usize,
     },
 }
 
-/// Position of the background among the classes, and the classes with box deltas.
+/// Position of the background among the classes, and the classes that have box deltas.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum Background {
     /// Class 0, with its own unused box deltas and mask: torchvision.
@@ -101,7 +101,7 @@ pub struct Heads {
     pub mask: Option<MaskHead>,
 }
 
-/// A detector, or a backbone alone.
+/// A detector, or only a backbone.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Architecture {
     /// The residual network.

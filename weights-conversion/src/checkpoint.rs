@@ -11,8 +11,8 @@ use crate::source::{Source, Span};
 use crate::tensor::StoredTensor;
 use crate::torch::{self, Storages};
 
-/// Keys of the state dict in checkpoints that also contain optimiser and counters: Detectron2 and torchvision; others;
-/// Caffe2.
+/// Keys of the state dict in checkpoints that also contain the optimiser's state and counters: Detectron2 and
+/// torchvision, others, Caffe2.
 const STATE_DICT_KEYS: [&str; 3] = ["model", "state_dict", "blobs"];
 
 /// A file's format, recognised by its content.
@@ -88,7 +88,7 @@ fn describe(start: &[u8]) -> String {
 pub struct Checkpoint {
     /// The file's format.
     pub format: FileFormat,
-    /// Its author, if the file gives one (`__author__`).
+    /// The author, if the file gives one (`__author__`).
     pub author: Option<String>,
     /// Metadata of a safetensors file.
     pub metadata: BTreeMap<String, String>,
@@ -145,9 +145,9 @@ impl Checkpoint {
             self.not_tensors.iter().take(SHOWN).map(|name| format!("`{}`", printable(name))).collect();
         let more = if self.not_tensors.len() > SHOWN { ", …" } else { "" };
         let what = format!("none, but {}{more}", named.join(", "));
-        // Parameters have a point in their names; their numbers are in torch's zip beside this pickle or, if written by
-        // Python's own pickle, nowhere. Otherwise a training checkpoint contains the weights, or their mean over its
-        // last steps (`model_ema`), together with other data.
+        // Names with a point are parameters. Their values are in torch's zip beside this pickle; Python's own pickle
+        // does not write them. Names without a point are the parts of a training checkpoint, one of which contains the
+        // weights, or their mean over the last steps (`model_ema`).
         match self.not_tensors.iter().find(|name| name.contains("ema")).or(self.not_tensors.first()) {
             Some(name) if !name.contains('.') => format!(
                 "{what}: write the weights alone, in Python: torch.save(torch.load(\"FILE\", weights_only=False)[\"{}\"], \"NEW.pth\")",
@@ -197,7 +197,7 @@ impl Checkpoint {
         Ok(checkpoint)
     }
 
-    /// Many names for the same bytes would make a large result from a small file; a few layers may share.
+    /// A small file must not give a large result by many names for the same bytes; a few layers may use the same bytes.
     fn check_total(&self, file_len: u64) -> Result<()> {
         let bytes = |tensor: &StoredTensor| (tensor.len() as u64).saturating_mul(tensor.element().size() as u64);
         let total = self.tensors.values().map(bytes).fold(0, u64::saturating_add);

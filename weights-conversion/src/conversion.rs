@@ -1,4 +1,4 @@
-//! From a checkpoint's tensors to the network's parameters: the assignment, and a report of every name.
+//! Assigns a checkpoint's tensors to the network's parameters, and reports the outcome for every name.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -15,7 +15,7 @@ pub type ParameterValues = BTreeMap<String, (Vec<usize>, Vec<f32>)>;
 
 /// Prefix of the names of a backbone's parameters.
 const BACKBONE: &str = "backbone.bottom_up.";
-/// Box deltas of a class.
+/// Number of box deltas per class.
 const DELTAS: usize = 4;
 
 /// The source of a parameter's values.
@@ -210,7 +210,8 @@ fn stands_for_missing(naming: Naming, name: &str) -> Option<f32> {
     }
 }
 
-/// Class rows are moved to the target's position of the class; everything else must have the right shape.
+/// The values of a parameter from a tensor: class rows are moved to the target's position of the class; all other
+/// shapes must be equal. `None` if the tensor does not fit.
 fn arrange(
     name: &str,
     tensor: &StoredTensor,
@@ -240,7 +241,7 @@ fn arrange(
     Some(Origin::Rows(tensor.clone(), moved))
 }
 
-/// All classes, the background moved from one end to the other.
+/// The rows of all classes, with the background moved from one end to the other.
 fn move_background(rows: usize, to: Background) -> Vec<Option<usize>> {
     match to {
         Background::Last => (1..rows).chain([0]).map(Some).collect(),
@@ -248,7 +249,8 @@ fn move_background(rows: usize, to: Background) -> Vec<Option<usize>> {
     }
 }
 
-/// The background's own rows come first; they are unused, so that zeros suffice.
+/// The rows of all classes without the background's own rows, or with rows of zeros in their place, which come first
+/// and are unused.
 fn drop_or_add_background(
     rows: usize,
     num_rows: usize,

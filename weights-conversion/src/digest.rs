@@ -1,4 +1,4 @@
-//! The checkpoint's fingerprint.
+//! The SHA-256 digest of a checkpoint.
 
 use std::fs::File;
 use std::io::Read;

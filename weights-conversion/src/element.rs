@@ -35,7 +35,7 @@ impl ElementType {
         matches!(self, Self::F64 | Self::F32 | Self::F16 | Self::Bf16)
     }
 
-    /// The printed name, as in safetensors.
+    /// The name in reports, as in safetensors.
     pub fn name(self) -> &'static str {
         match self {
             Self::F64 => "F64",
@@ -51,7 +51,7 @@ impl ElementType {
         }
     }
 
-    /// From the name in safetensors.
+    /// The type with a name in safetensors.
     pub(crate) fn from_name(name: &str) -> Option<Self> {
         let all = [
             Self::F64,
@@ -68,7 +68,7 @@ impl ElementType {
         all.into_iter().find(|element| element.name() == name)
     }
 
-    /// From numpy's letter and size, such as `f4`.
+    /// The type with numpy's letter and size, such as `f4`.
     pub(crate) fn from_numpy(code: &str) -> Option<Self> {
         Some(match code {
             "f8" => Self::F64,
@@ -84,7 +84,7 @@ impl ElementType {
         })
     }
 
-    /// From the name of torch's storage class, such as `FloatStorage`.
+    /// The type of a torch storage class, such as `FloatStorage`.
     pub(crate) fn from_torch_storage(class: &str) -> Option<Self> {
         Some(match class.strip_suffix("Storage")? {
             "Double" => Self::F64,
@@ -101,7 +101,7 @@ impl ElementType {
         })
     }
 
-    /// Appends whole elements as `f32`; integers beyond 2²⁴ are rounded.
+    /// Appends complete elements as `f32`; integers beyond 2²⁴ are rounded.
     pub(crate) fn decode(self, bytes: &[u8], values: &mut Vec<f32>) {
         debug_assert!(bytes.len().is_multiple_of(self.size()));
         match self {

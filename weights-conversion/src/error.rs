@@ -5,7 +5,7 @@ use std::io;
 /// The reason why a checkpoint could not be read or converted. Each message gives the expected and the found value.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "the messages say what the fields are")]
+#[allow(missing_docs, reason = "the messages explain the fields")]
 pub enum WeightsError {
     /// The file system refused an operation.
     #[error("cannot {action}: {source}")]
@@ -19,7 +19,7 @@ pub enum WeightsError {
         /// The kind of the bytes, as far as it can be determined.
         found: String,
     },
-    /// A pickle that asks for a function or class which weights do not need.
+    /// A pickle that requires a function or class which weights do not need.
     #[error(
         "refused: the pickle asks for {name} (byte {offset}); weights need only numpy arrays, torch tensors and dicts: \
          write them alone, in Python: torch.save(torch.load(\"FILE\", weights_only=False)[\"model\"], \"NEW.pth\")"

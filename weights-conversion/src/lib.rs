@@ -2,9 +2,9 @@
 //!
 //! ```text
 //! file ─ format by content ─┬─ pickle of numpy arrays ─┐
-//!                                ├─ torch zip, legacy ──────┼─ Checkpoint: name → shape, place in the file
-//!                                └─ safetensors ────────────┘
-//! Checkpoint + Architecture ─ naming scheme ─ Conversion: what goes where, and a Report ─ write ─ safetensors
+//!                           ├─ torch zip, legacy ──────┼─ Checkpoint: name → shape, position in the file
+//!                           └─ safetensors ────────────┘
+//! Checkpoint + Architecture ─ naming scheme ─ Conversion: a tensor for each parameter, and a Report ─ write ─ safetensors
 //! ```
 //!
 //! Values stay in the file until they are written, so that a conversion needs the memory of one layer.

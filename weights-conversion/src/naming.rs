@@ -19,7 +19,7 @@ pub enum Naming {
     Detectron2Backbone,
     /// A torchvision detector.
     Torchvision,
-    /// A torchvision classifier, of which the backbone is used.
+    /// A torchvision classifier; only its backbone is used.
     TorchvisionResnet,
     /// A Caffe2 classifier, such as the MSRA ResNet-50 that Detectron2 starts from.
     Caffe2Resnet,
@@ -36,7 +36,7 @@ pub(crate) fn strip_wrapper(name: &str) -> &str {
 pub(crate) enum Renamed {
     /// A parameter of this project's network.
     To(String),
-    /// Known, and not needed: it follows from the configuration.
+    /// Known but not needed: it follows from the configuration.
     NotNeeded,
     /// No parameter of this project's network corresponds to it.
     Unknown,
@@ -56,7 +56,7 @@ impl fmt::Display for Naming {
 }
 
 impl Naming {
-    /// Recognises the scheme by names that only it has.
+    /// Recognises the scheme by names that no other scheme has.
     pub fn detect<'a>(names: impl Iterator<Item = &'a str> + Clone) -> Option<Self> {
         let any = |test: &dyn Fn(&str) -> bool| names.clone().any(test);
         if any(&|n| n.starts_with("backbone.fpn.fpn_")) {
@@ -96,7 +96,7 @@ impl Naming {
         }
     }
 
-    /// From a name of this scheme to ours.
+    /// Converts a name of this scheme to ours.
     pub(crate) fn rename(self, name: &str) -> Renamed {
         if name.ends_with(".num_batches_tracked") {
             return Renamed::NotNeeded;

@@ -12,7 +12,7 @@ use crate::naming::Naming;
 pub struct Applied {
     /// Our name.
     pub name: String,
-    /// Sizes.
+    /// Sizes of its axes.
     pub shape: Vec<usize>,
     /// The checkpoint's name.
     pub from: String,
@@ -20,16 +20,16 @@ pub struct Applied {
     pub rows_moved: bool,
 }
 
-/// A parameter whose tensor does not fit.
+/// A parameter whose tensor has another shape or type.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Mismatch {
     /// Our name.
     pub name: String,
     /// The network's sizes.
     pub expected: Vec<usize>,
-    /// The tensor's.
+    /// The tensor's sizes.
     pub found: Vec<usize>,
-    /// The tensor's element type: integers do not fit either.
+    /// The tensor's element type, because integers do not fit either.
     pub element: &'static str,
 }
 
@@ -50,7 +50,7 @@ pub struct Report {
     pub missing: Vec<String>,
     /// Parameters whose tensor has another shape.
     pub mismatched: Vec<Mismatch>,
-    /// Tensors that no parameter took.
+    /// Tensors that no parameter uses.
     pub unused: Vec<String>,
     /// Entries that follow from the configuration, such as anchors.
     pub not_needed: Vec<String>,
@@ -105,7 +105,7 @@ impl fmt::Display for Report {
     }
 }
 
-/// The report without the names that simply fit.
+/// The report without the names that were applied unchanged.
 struct Exceptions<'a>(&'a Report);
 
 impl fmt::Display for Exceptions<'_> {

@@ -11,10 +11,11 @@ use crate::error::{Result, WeightsError, printable};
 use crate::source::{Source, Span};
 use crate::tensor::{Encoding, Payload, StoredTensor};
 
-/// Maximum size of a header; a detector's is about 50 kB. Parsed, `[0,0,…` takes about ten times its bytes in memory.
+/// Maximum size of a header; a detector's header has about 50 kB. Parsed, `[0,0,…` takes about ten times its bytes in
+/// memory.
 const MAX_HEADER_BYTES: u64 = 4 << 20;
 
-/// Tensors and metadata by name.
+/// Tensors by name, and metadata by name.
 pub(crate) type Content = (BTreeMap<String, StoredTensor>, BTreeMap<String, String>);
 
 #[derive(Default)]
@@ -36,7 +37,7 @@ impl<'de> Deserialize<'de> for Header {
     }
 }
 
-/// Reads entry by entry: serde's own mix of fixed and free keys would store the header a second time.
+/// Reads the entries one by one: serde's combination of fixed and free keys would store the header a second time.
 struct HeaderVisitor;
 
 impl<'de> Visitor<'de> for HeaderVisitor {
@@ -52,7 +53,7 @@ impl<'de> Visitor<'de> for HeaderVisitor {
             if name == "__metadata__" {
                 header.metadata = map.next_value()?;
             } else if header.tensors.insert(name, map.next_value()?).is_some() {
-                return Err(de::Error::custom("a name twice"));
+                return Err(de::Error::custom("expected each name once"));
             }
         }
         Ok(header)

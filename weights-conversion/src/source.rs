@@ -16,7 +16,7 @@ pub(crate) struct Span {
 }
 
 impl Span {
-    /// The byte after the last one; spans come from positions inside a file, so that this cannot overflow.
+    /// The byte after the last one. Spans lie inside a file, so the sum cannot overflow.
     pub fn end(self) -> u64 {
         self.offset.saturating_add(self.len)
     }

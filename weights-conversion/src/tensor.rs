@@ -4,7 +4,7 @@ use crate::element::ElementType;
 use crate::error::{Result, WeightsError};
 use crate::source::{Source, Span};
 
-/// More axes than any layer has.
+/// Maximum number of axes, more than any layer has.
 const MAX_AXES: usize = 8;
 /// Bytes decoded at once; a multiple of every element's size.
 const PIECE: usize = 1 << 20;
@@ -29,13 +29,13 @@ pub(crate) struct Payload {
 #[derive(Debug, Clone, PartialEq)]
 pub struct StoredTensor {
     shape: Vec<usize>,
-    /// Elements from one index to the next, along each axis.
+    /// Number of elements from one index to the next, along each axis.
     strides: Vec<usize>,
     element: ElementType,
     payload: Payload,
 }
 
-/// Sizes multiplied, unless that overflows.
+/// The product of sizes, unless it overflows.
 fn product(sizes: &[usize]) -> Option<usize> {
     sizes.iter().try_fold(1usize, |product, size| product.checked_mul(*size))
 }
@@ -94,7 +94,7 @@ impl StoredTensor {
         }
         let count = product(&shape).unwrap_or(0) as u64;
         let size = element.size() as u64;
-        // Elements from the first one of the view to after its last one.
+        // Number of elements from the first to the last one of the view, including both.
         let extent = if count == 0 {
             Some(0)
         } else {
@@ -154,7 +154,7 @@ impl StoredTensor {
         self.numbers(source)
     }
 
-    /// The same also for integers, such as the classes among a reference's outputs.
+    /// Like [`Self::values`], also for integers, such as the classes in a reference's outputs.
     ///
     /// # Errors
     /// Missing bytes.
@@ -273,7 +273,7 @@ fn checked_bytes(part: &str, shape: &[usize], element: ElementType) -> Result<u6
     Ok(bytes as u64)
 }
 
-/// From UTF-8 back to the encoded bytes, across pieces.
+/// Decodes UTF-8 back to the encoded bytes, across pieces.
 #[derive(Debug, Default)]
 struct Latin1Decoder {
     /// The first byte of a character of two bytes.

@@ -1,18 +1,18 @@
 //! The part of the zip format that torch uses: entries without compression, with checksums, including zip64.
 //!
-//! Entries are read in place and never unpacked to disk. A name that leads out of a folder is still refused: no
-//! regular writer makes one.
+//! Entries are read in place and never unpacked to disk. A name that leads out of a folder is still rejected,
+//! because no regular writer makes one.
 
 use std::collections::BTreeMap;
 
 use crate::error::{Result, WeightsError, printable};
 use crate::source::{Scanner, Source, Span};
 
-/// A state dict has an entry for each tensor.
+/// Maximum number of entries; a state dict has one for each tensor.
 const MAX_ENTRIES: u64 = 100_000;
-/// Bytes of the list of entries; some 100 bytes each.
+/// Maximum size of the list of entries, with about 100 bytes per entry.
 const MAX_DIRECTORY_BYTES: u64 = 16 << 20;
-/// The end record and the longest comment after it.
+/// Size of the end record with the longest comment.
 const MAX_END_BYTES: u64 = 22 + 0xffff;
 /// Bytes per step of a checksum.
 const PIECE: usize = 1 << 20;
@@ -40,7 +40,7 @@ fn damaged(expected: impl Into<String>, found: impl Into<String>) -> WeightsErro
     WeightsError::damaged("zip archive", expected, found)
 }
 
-/// Little-endian fields, front to back, of a record that is in memory.
+/// Reads the little-endian fields of a record in memory, front to back.
 struct Fields<'a>(&'a [u8]);
 
 impl Fields<'_> {
@@ -77,7 +77,7 @@ impl Fields<'_> {
     }
 }
 
-/// Number of entries and position of the directory.
+/// Reads the number of entries and the position of the directory.
 fn find_directory(source: &mut Source) -> Result<(u64, Span)> {
     let tail_len = source.len().min(MAX_END_BYTES);
     let tail_at = source.len() - tail_len;
@@ -216,7 +216,7 @@ fn read_entry(fields: &mut Fields) -> Result<(String, Entry)> {
         let (kind, len) = (extra.u16()?, extra.u16()?);
         let mut wide = Fields(extra.bytes(len.into())?);
         if kind == 1 {
-            // Wide fields exist only for narrow ones at their maximum, in this order.
+            // Wide fields exist only for narrow fields at their maximum, in this order.
             for field in [&mut unpacked, &mut packed, &mut header_offset] {
                 if *field == u64::from(u32::MAX) {
                     *field = wide.u64()?;

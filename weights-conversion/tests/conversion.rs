@@ -1,4 +1,5 @@
-//! Whole conversions: Detectron2's own pickles (reduced), torchvision's class order, files in and out.
+//! Complete conversions: Detectron2's own pickles (reduced), torchvision's class order, input and
+//! output files.
 
 use std::collections::BTreeMap;
 use std::fs;

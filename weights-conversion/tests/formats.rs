@@ -1,4 +1,5 @@
-//! The same arrays from every writer. The files come from `fixtures/make_fixtures.py`.
+//! Every writer's files of the same arrays are read alike. The files come from
+//! `fixtures/make_fixtures.py`.
 
 use std::path::{Path, PathBuf};
 

@@ -1,4 +1,4 @@
-//! The machine that a run was made on.
+//! Describes the machine of a run.
 
 use std::process::Command;
 
@@ -6,23 +6,23 @@ use std::process::Command;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Machine {
     pub processor: String,
-    /// Cores that this process may use.
+    /// Number of cores that this process may use.
     pub cores: usize,
-    /// The wide instructions that it has, of those that matter here.
+    /// The SIMD instruction sets that it has, of those that matter for the measurements.
     pub instructions: String,
     pub memory_gib: f64,
-    /// The commit that was measured, with a plus sign where files differ from it.
+    /// The measured commit, with a plus sign if files differ from it.
     pub commit: String,
 }
 
 impl Machine {
-    /// The machine and the commit in a line.
+    /// The machine and the commit in one line.
     pub fn in_words(&self) -> String {
         let Self { processor, cores, instructions, memory_gib, commit } = self;
         format!("{processor}, {cores} cores ({instructions}), {memory_gib:.0} GiB; commit {commit}")
     }
 
-    /// Asks the system; what it does not tell is "unknown".
+    /// Reads the facts from the system; facts that it does not report are "unknown".
     pub fn read() -> Self {
         let processor = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
         let memory = std::fs::read_to_string("/proc/meminfo").unwrap_or_default();
@@ -41,7 +41,7 @@ fn git(arguments: &[&str]) -> Option<String> {
     Some(String::from_utf8_lossy(&output.stdout).trim().to_owned())
 }
 
-/// Value of the first line with that key.
+/// Value of the first line with this key.
 fn value<'a>(text: &'a str, key: &str) -> Option<&'a str> {
     let mut lines = text.lines().filter_map(|line| line.split_once(':'));
     lines.find(|(found, _)| found.trim() == key).map(|(_, value)| value.trim())
@@ -51,13 +51,13 @@ fn kib(text: &str) -> Option<f64> {
     text.strip_suffix("kB")?.trim().parse().ok()
 }
 
-/// The model's name, and family and model number, since virtual machines call many processors the same.
+/// Name, family and model number: virtual machines give many processors the same name.
 fn processor_name(cpuinfo: &str) -> String {
     let of = |key| value(cpuinfo, key).unwrap_or("unknown");
     format!("{} (family {}, model {})", of("model name"), of("cpu family"), of("model"))
 }
 
-/// Features that programs choose their code by, as Linux names them on x86 and on Arm.
+/// CPU features by which programs select their code, as Linux names them on x86 and Arm.
 const FEATURES: [&str; 13] = [
     "sse4_1",
     "avx",

@@ -1,4 +1,4 @@
-//! The driver: starts both sides of every work, lets them run turn by turn, writes medians.
+//! Starts both sides of every work, runs them alternately, and writes medians.
 
 pub(crate) mod machine;
 mod pace;
@@ -24,22 +24,22 @@ pub(crate) use worker_process::peak_of_status;
 #[derive(Debug, ClapArgs)]
 #[command(after_help = known_works())]
 pub struct CompareArgs {
-    /// Only this work; repeat for several
+    /// Run only this work; repeat for several
     #[arg(long, value_name = "WORK")]
     only: Vec<String>,
-    /// Most rounds of a work; each side has one turn a round
+    /// Maximum number of rounds of a work; each side runs once per round
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
     rounds: Option<u32>,
-    /// Fewer rounds and no teaching: to see where we are, not to publish
+    /// Fewer rounds and no teaching: for a quick look, not for publication
     #[arg(long)]
     quick: bool,
-    /// Ours alone, without peers
+    /// Measure only our side, without peers
     #[arg(long)]
     alone: bool,
     /// Threads of each side
     #[arg(long, default_value_t = 2, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64))]
     threads: u32,
-    /// The repository
+    /// Root of the repository
     #[arg(long, default_value = ".", value_name = "DIR")]
     root: PathBuf,
     /// Rewrite the table in this file after a run of every work
@@ -52,7 +52,8 @@ fn known_works() -> String {
     format!("Works: {}", names.join(", "))
 }
 
-/// Facts of the same work may differ by this share: sums in another order, ties broken the other way.
+/// Maximum relative difference between the facts of the same work: sums are added in different orders, ties
+/// are broken differently.
 const SAME_WORK: f64 = 0.01;
 
 /// Runs the comparison.
@@ -73,14 +74,18 @@ pub fn run(args: &CompareArgs) -> Result<()> {
             continue;
         }
         if work.needs_model && !paths.model().exists() {
-            eprintln!("{}: left out, since no work `teaching` has written {} yet", work.name, paths.model().display());
+            eprintln!(
+                "{}: skipped, because {} does not exist; the work `teaching` writes it",
+                work.name,
+                paths.model().display()
+            );
             continue;
         }
         match measure(work, args, &paths, &pace) {
             Ok(measured) => {
                 report.add(work, measured);
                 eprint!("{}", report.last_lines());
-                // After each work, so that a run that is cut short has written something.
+                // After each work, so that an interrupted run has written its finished works.
                 report.write_json(&paths.out)?;
             }
             Err(error) => {
@@ -94,7 +99,7 @@ pub fn run(args: &CompareArgs) -> Result<()> {
         if args.only.is_empty() && !args.quick && !args.alone && failures.is_empty() {
             report.rewrite(results)?;
         } else {
-            eprintln!("{}: left as it is; only a full run without failures rewrites it", results.display());
+            eprintln!("{}: not rewritten, because this was not a full run without failures", results.display());
         }
     }
     if failures.is_empty() { Ok(()) } else { bail!("not measured: {}", failures.join(", ")) }
@@ -107,7 +112,7 @@ fn chosen(only: &[String]) -> Result<Vec<&'static WorkSpec>> {
     Ok(WORKS.iter().filter(|work| only.is_empty() || only.iter().any(|name| name == work.name)).collect())
 }
 
-/// Measures one work: ours first in the answer, then the peers in the registry's order.
+/// Measures one work: our side first in the result, then the peers in the registry's order.
 fn measure(work: &WorkSpec, args: &CompareArgs, paths: &Paths, pace: &Pace) -> Result<Vec<Measured>> {
     let sides = std::iter::once(Side::Ours).chain(work.peers.iter().map(Side::Peer));
     let mut workers = Vec::new();
@@ -123,7 +128,7 @@ fn measure(work: &WorkSpec, args: &CompareArgs, paths: &Paths, pace: &Pace) -> R
     let plan = if work.long { pace.once(&warm_ups) } else { pace.plan(&warm_ups) };
     let mut seconds = vec![Vec::new(); workers.len()];
     for round in 0..plan.rounds {
-        // Another one begins each time, so that whatever comes and goes on the machine meets everybody.
+        // Each round starts with the next side, so that changes of the machine affect all sides alike.
         for turn in 0..workers.len() {
             let idx = (round + turn) % workers.len();
             seconds[idx].extend(workers[idx].run(plan.repeats[idx])?);
@@ -136,12 +141,12 @@ fn check_facts(ours: &WorkerProcess, theirs: &WorkerProcess) -> Result<()> {
     match contradiction(&ours.ready.facts, &theirs.ready.facts) {
         None => Ok(()),
         Some((name, our, their)) => {
-            bail!("not the same work: {name} is {our} here and {their} with {}", theirs.side.title())
+            bail!("not the same work: {name} is {our} on our side and {their} with {}", theirs.side.title())
         }
     }
 }
 
-/// A fact that both tell and on which they disagree.
+/// A fact that both sides report with different values.
 fn contradiction<'a>(ours: &'a Facts, theirs: &Facts) -> Option<(&'a str, f64, f64)> {
     ours.iter()
         .filter_map(|(name, our)| Some((name.as_str(), *our, *theirs.get(name)?)))

@@ -1,33 +1,33 @@
-//! How many rounds, and how often each side runs in its turn.
+//! Number of rounds, and number of runs of each side per round.
 
-/// How long to measure.
+/// Limits for the time of a measurement.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pace {
-    /// Rounds, where they fit.
+    /// Number of rounds, if the time allows.
     pub rounds: usize,
-    /// Rounds, whether they fit or not.
+    /// Minimum number of rounds, even if the time does not allow them.
     pub min_rounds: usize,
-    /// A turn lasts at least this long: fast works run several times in it.
+    /// Minimum seconds of one side in a round: fast works run several times.
     pub turn_secs: f64,
-    /// Rounds beyond the least ones end here.
+    /// Time limit of all rounds, in seconds; the first `min_rounds` may exceed it.
     pub budget_secs: f64,
 }
 
-/// What a work's warm-ups say about how to measure it.
+/// The plan of a work, from the times of its warm-ups.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rounds {
     pub rounds: usize,
-    /// Runs of each side in its turn.
+    /// Number of runs of each side per round.
     pub repeats: Vec<usize>,
 }
 
 impl Pace {
-    /// For figures to be published: all works in twelve minutes.
+    /// For published figures: all works take twelve minutes.
     pub const FULL: Self = Self { rounds: 7, min_rounds: 3, turn_secs: 0.5, budget_secs: 30.0 };
-    /// To see where we are.
+    /// For a quick look.
     pub const QUICK: Self = Self { rounds: 3, min_rounds: 1, turn_secs: 0.3, budget_secs: 10.0 };
 
-    /// Plans from the seconds of one run of each side.
+    /// Makes a plan from the seconds of one run of each side.
     pub fn plan(&self, warm_ups: &[Option<f64>]) -> Rounds {
         let repeats: Vec<usize> = warm_ups
             .iter()
@@ -35,12 +35,12 @@ impl Pace {
             .collect();
         let round: f64 = warm_ups.iter().zip(&repeats).map(|(secs, &count)| secs.unwrap_or(0.0) * count as f64).sum();
         let fit = (self.budget_secs / round.max(1e-6)) as usize;
-        // An order from outside for fewer rounds counts.
+        // A smaller number of rounds that the user requests takes precedence.
         let least = self.min_rounds.min(self.rounds);
         Rounds { rounds: fit.clamp(least, self.rounds), repeats }
     }
 
-    /// One run of each.
+    /// A plan with one run of each side.
     pub fn once(&self, warm_ups: &[Option<f64>]) -> Rounds {
         Rounds { rounds: 1, repeats: vec![1; warm_ups.len()] }
     }

@@ -1,4 +1,4 @@
-//! Where everything lies, and the files that a work needs, made when they are missing.
+//! The folders of a comparison, and the files that a work needs; missing files are made.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -8,15 +8,15 @@ use anyhow::{Context, Result, ensure};
 use crate::network::Network;
 use crate::registry::{Side, WorkSpec};
 
-/// The shipped demonstration that augmentation and teaching work on.
+/// The shipped demonstration for augmentation and teaching.
 const DEMONSTRATION: &str = "datasets/demonstrations/pendulum";
 
 /// The folders of a comparison.
 #[derive(Debug, Clone)]
 pub struct Paths {
-    /// What is written: `target/bench`.
+    /// Output folder: `target/bench`.
     pub out: PathBuf,
-    /// The Python workers: `benches/peers`.
+    /// Folder of the Python workers: `benches/peers`.
     pub peers: PathBuf,
     demonstration: PathBuf,
 }
@@ -31,7 +31,7 @@ pub struct Files {
 }
 
 impl Files {
-    /// As arguments of a worker.
+    /// The files as arguments of a worker.
     pub fn arguments(&self) -> impl Iterator<Item = (&'static str, &Path)> {
         [
             ("--weights", &self.weights),
@@ -54,7 +54,7 @@ impl Paths {
         }
     }
 
-    /// Makes the folders to write to.
+    /// Creates the output folders.
     pub fn create(&self) -> Result<()> {
         ensure!(
             self.peers.join("worker.py").exists(),
@@ -67,10 +67,14 @@ impl Paths {
         })
     }
 
-    /// The peers' Python.
+    /// The Python interpreter of the peers.
     pub fn python(&self) -> Result<PathBuf> {
         let python = self.out.join("venv/bin/python");
-        ensure!(python.exists(), "{}: not there; `make bench` installs the peers", python.display());
+        ensure!(
+            python.exists(),
+            "{}: expected the peers' Python, found no file; `make bench` installs it",
+            python.display()
+        );
         Ok(python)
     }
 
@@ -79,7 +83,7 @@ impl Paths {
         self.out.join("pendulum.sdg")
     }
 
-    /// The files that a side needs.
+    /// The files that a side needs; missing files are made.
     pub fn files_for(&self, work: &WorkSpec, side: Side) -> Result<Files> {
         let mut files = Files::default();
         if let Some(network) = work.network {
@@ -104,7 +108,8 @@ impl Paths {
     fn weights(&self, network: Network) -> Result<PathBuf> {
         let path = self.out.join("weights").join(format!("{}.safetensors", network.name()));
         if !path.exists() {
-            // In a process of its own: what it holds on the way is nobody's peak memory.
+            // In a process of its own, so that its memory does not count for another
+            // process.
             let mut command = Command::new(std::env::current_exe()?);
             run(command.args(["weights", network.name()]).arg(&path))?;
         }

@@ -1,4 +1,4 @@
-//! Medians as JSON, as lines, as a Markdown table.
+//! Writes medians as JSON, as lines, and as a Markdown table.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -19,11 +19,11 @@ pub struct Measured {
     pub side: Side,
     /// Seconds of every run.
     pub seconds: Vec<f64>,
-    /// Peak memory while running, bytes.
+    /// Peak memory of the timed runs, in bytes.
     pub memory_bytes: Option<u64>,
-    /// Work in GFLOP, where it was counted.
+    /// Amount of work in GFLOP, if it was counted.
     pub gflop: Option<f64>,
-    /// What it ran on.
+    /// Versions of the software.
     pub version: String,
 }
 
@@ -31,7 +31,7 @@ impl Measured {
     /// Reads the peak memory and ends the worker.
     pub fn new(worker: WorkerProcess, seconds: Vec<f64>) -> Result<Self> {
         if seconds.is_empty() {
-            bail!("{} was never timed", worker.side.title());
+            bail!("expected times of {}, found none", worker.side.title());
         }
         let memory_bytes = worker.peak_memory_bytes();
         let ready = worker.ready.clone();
@@ -43,7 +43,7 @@ impl Measured {
     }
 }
 
-/// A row of `peers.json`. Where no peer does the same work, its columns are null.
+/// A row of `peers.json`. Its peer columns are null if no peer does the same work.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Row {
     work: &'static str,
@@ -53,7 +53,7 @@ pub struct Row {
     ratio: Option<f64>,
 }
 
-/// A row with all that was measured, for `details.json`.
+/// A row with all measurements, for `details.json`.
 #[derive(Debug, Clone, Serialize)]
 struct Details {
     work: &'static str,
@@ -65,12 +65,12 @@ struct Details {
     gflop: Option<f64>,
 }
 
-/// All that a run measured.
+/// All measurements of a run.
 #[derive(Debug)]
 pub struct Report {
     machine: Machine,
     threads: usize,
-    /// The most that anybody reached in a product of matrices, GFLOP/s.
+    /// The highest speed that a side reached in a matrix product, in GFLOP/s.
     peak_gflops: Option<f64>,
     works: Vec<(&'static WorkSpec, Vec<Measured>)>,
     versions: Vec<String>,
@@ -82,7 +82,7 @@ impl Report {
         Self { machine, threads, peak_gflops: None, works: Vec::new(), versions: Vec::new() }
     }
 
-    /// Takes the fastest of all runs of the product of matrices as the machine's peak.
+    /// Sets the machine's peak from the fastest run of the matrix product.
     pub fn set_peak(&mut self, gemm: &[Measured]) {
         const GFLOP: f64 = 2e-9 * 2048.0 * 2048.0 * 2048.0;
         let fastest = gemm.iter().flat_map(|side| &side.seconds).copied().min_by(f64::total_cmp);
@@ -90,7 +90,7 @@ impl Report {
         self.note_versions(gemm);
     }
 
-    /// Adds a work: ours first.
+    /// Adds a work; our side is the first.
     pub fn add(&mut self, work: &'static WorkSpec, measured: Vec<Measured>) {
         self.note_versions(&measured);
         self.works.push((work, measured));
@@ -104,7 +104,7 @@ impl Report {
         }
     }
 
-    /// One line on machine, versions and peak.
+    /// One line with machine, versions and peak.
     pub fn heading(&self) -> String {
         let peak = self.peak_gflops.map_or("unknown".to_owned(), |peak| format!("{peak:.0} GFLOP/s"));
         let versions = if self.versions.is_empty() { String::new() } else { format!(" {}.", self.versions.join(", ")) };
@@ -134,7 +134,7 @@ impl Report {
         self.works.iter().flat_map(rows_of).collect()
     }
 
-    /// Writes `peers.json` and `details.json`, each whole or not at all.
+    /// Writes `peers.json` and `details.json`, each atomically.
     pub fn write_json(&self, folder: &Path) -> Result<()> {
         let details: Vec<Details> = self
             .works
@@ -155,7 +155,7 @@ impl Report {
         Ok(write_atomically(&folder.join("details.json"), &serde_json::to_vec_pretty(&details)?)?)
     }
 
-    /// The last work as lines to read while a run goes on.
+    /// The rows of the last work, to print during the run.
     pub fn last_lines(&self) -> String {
         self.works.last().map(|(work, measured)| self.table_rows(work, measured)).unwrap_or_default()
     }
@@ -205,7 +205,7 @@ impl Report {
         text
     }
 
-    /// Puts heading and table between the marks of a file.
+    /// Replaces the text between the marks of a file by heading and table.
     pub fn rewrite(&self, results: &Path) -> Result<()> {
         rewrite(results, "measured", &self.markdown())
     }
@@ -261,7 +261,7 @@ mod tests {
         let text = std::fs::read_to_string(folder.path().join("peers.json")).unwrap();
         let rows: Value = serde_json::from_str(&text).unwrap();
         let expected = json!([
-            // Medians: 0.625 of ours, 2 of theirs.
+            // Medians: 0.625 s on our side, 2 s on the peer's.
             {"work": "backbone", "ours_seconds": 0.625, "peer": "PyTorch", "peer_seconds": 2.0, "ratio": 3.2},
             {"work": "teaching", "ours_seconds": 90.0, "peer": null, "peer_seconds": null, "ratio": null},
         ]);

@@ -13,14 +13,14 @@ use crate::compare::prepare::{Files, Paths};
 use crate::protocol::{Answer, Ready, Request};
 use crate::registry::{Side, WorkSpec};
 
-/// Between turns: time for the other side's threads to block, some of which spin for a while after their work.
+/// Pause between runs, in which the other side's threads block; some of them spin for a while after their work.
 const PAUSE: Duration = Duration::from_millis(100);
 
 /// One side of a work, ready to run.
 pub struct WorkerProcess {
-    /// Whose program it is.
+    /// The side that it runs.
     pub side: Side,
-    /// What it reported when it was ready.
+    /// The worker's first message, sent when it was ready.
     pub ready: Ready,
     child: Child,
     requests: Option<ChildStdin>,
@@ -56,7 +56,7 @@ impl WorkerProcess {
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(log_file);
         let mut child = command.spawn().with_context(|| format!("{:?}", command.get_program()))?;
         let requests = child.stdin.take();
-        let answers = BufReader::new(child.stdout.take().context("the worker's output was asked for")?);
+        let answers = BufReader::new(child.stdout.take().context("expected a pipe from the worker")?);
         let nothing = Ready { seconds: None, facts: Default::default(), gflop: None, version: String::new() };
         let mut worker = Self { side, ready: nothing, child, requests, answers, log };
         match worker.answer()? {
@@ -67,11 +67,11 @@ impl WorkerProcess {
         Ok(worker)
     }
 
-    /// Lets it run `repeat` times and gives the seconds of each.
+    /// Runs the work `repeat` times and returns the seconds of each run.
     pub fn run(&mut self, repeat: usize) -> Result<Vec<f64>> {
         sleep(PAUSE);
         let request = serde_json::to_string(&Request { repeat })?;
-        let requests = self.requests.as_mut().context("a worker that was ended does not run")?;
+        let requests = self.requests.as_mut().context("expected a running worker, found one that was stopped")?;
         if writeln!(requests, "{request}").and_then(|()| requests.flush()).is_err() {
             return Err(self.last_words());
         }
@@ -83,13 +83,14 @@ impl WorkerProcess {
             .collect()
     }
 
-    /// The most memory it held at once since it was ready, in bytes; `None` where the system does not tell.
+    /// Peak memory since the worker was ready, in bytes; `None` if the system does not report it.
     pub fn peak_memory_bytes(&self) -> Option<u64> {
         let status = std::fs::read_to_string(format!("/proc/{}/status", self.child.id())).ok()?;
         peak_of_status(&status)
     }
 
-    /// What it took to get ready, weights read and pictures made, does not count. Where the system refuses, it does.
+    /// Resets the peak memory, so that the preparation (reading weights, making pictures) does not count. If the
+    /// system does not allow this, it counts.
     fn forget_peak_memory(&self) {
         let _ = std::fs::write(format!("/proc/{}/clear_refs", self.child.id()), "5");
     }
@@ -102,7 +103,7 @@ impl WorkerProcess {
         serde_json::from_str(&line).with_context(|| format!("expected an answer, found {}", line.trim_end()))
     }
 
-    /// Why it ended: the last line of its log.
+    /// The reason why the worker ended: the last line of its log.
     fn last_words(&self) -> anyhow::Error {
         let log = std::fs::read_to_string(&self.log).unwrap_or_default();
         let last = log.lines().rev().find(|line| !line.trim().is_empty()).unwrap_or("it printed nothing");
@@ -112,7 +113,7 @@ impl WorkerProcess {
 
 impl Drop for WorkerProcess {
     fn drop(&mut self) {
-        // The end of its input ends a worker; one that is busy or hangs is killed.
+        // A worker ends at the end of its input; a worker that does not end in time is killed.
         self.requests = None;
         for _ in 0..20 {
             if matches!(self.child.try_wait(), Ok(Some(_))) {

@@ -1,9 +1,10 @@
-//! `sdg-bench curves`: the time of model S against pixels, parts in the picture and edge points.
+//! `sdg-bench curves`: the time of model S as a function of pixels, parts in the picture and edge points.
 //!
 //! ```text
-//! shipped photo ─ the part laid on its table, turned ─ pictures that differ in one number ─ median time ─ table, exponents
+//! shipped photo ─ the part drawn on its table, rotated ─ pictures that differ in one number ─ median time ─ table, exponents
 //! ```
-//! An exponent of 1 is a time that grows as the number does; the time from the first to the last row of a curve decides.
+//! With an exponent of 1, the time is proportional to the number. The exponent of a curve comes from its first and last
+//! row.
 
 mod table;
 
@@ -27,16 +28,16 @@ use crate::works::read_demonstration;
 /// `sdg-bench curves`
 #[derive(Debug, ClapArgs)]
 pub struct CurvesArgs {
-    /// The repository
+    /// Root of the repository
     #[arg(long, default_value = ".", value_name = "DIR")]
     root: PathBuf,
-    /// The shipped part
+    /// Name of the shipped part
     #[arg(long, default_value = "pendulum", value_name = "NAME")]
     part: String,
-    /// The region of 200×200 alone
+    /// Measure only the region of 200×200
     #[arg(long)]
     region_only: bool,
-    /// Seconds for each row at most; three runs are made in any case
+    /// Maximum seconds per row, but at least three runs
     #[arg(long, default_value_t = 3.0, value_name = "SECS")]
     secs: f64,
     /// Rewrite the table in this file
@@ -44,14 +45,14 @@ pub struct CurvesArgs {
     results: Option<PathBuf>,
 }
 
-/// Runs of a row, and least of them; one run before does not count.
+/// Minimum and maximum number of timed runs of a row, after one untimed run.
 const RUNS: RangeInclusive<usize> = 3..=25;
-/// Sizes of pictures: to 12 megapixels.
+/// Sizes of pictures, up to 12 megapixels.
 const SIZES: [[u32; 2]; 5] = [[320, 240], [640, 480], [1280, 960], [2560, 1920], [4000, 3000]];
 const PARTS: [u32; 6] = [1, 2, 4, 8, 16, 32];
 const SEARCH_POINTS: [usize; 6] = [16, 32, 64, 128, 256, 512];
 const STROKES: [u32; 5] = [0, 50, 100, 200, 400];
-/// The picture in which parts and strokes are counted.
+/// Size of the pictures of the curves over parts and strokes.
 const WIDE: [u32; 2] = [1280, 960];
 const REGION_PX: u32 = 200;
 
@@ -82,12 +83,12 @@ struct Bench {
     secs: f64,
 }
 
-/// The two tolerances of the part's size that are measured: free as by default, and fixed.
+/// The measured tolerances of the part's size: free, which is the default, and fixed.
 const TOLERANCES: [(&str, RangeInclusive<f64>); 2] =
     [("free", CheckConfig::DEFAULT_SIZE_TOLERANCE), ("fixed", CheckConfig::FIXED_HEIGHT_TOLERANCE)];
 
 impl Bench {
-    /// Model S of a photo as large as the pictures, once for each tolerance.
+    /// Model S from a photo of the size of the pictures, for each tolerance.
     fn models(&self, size: [u32; 2]) -> Result<[GraspModel; 2]> {
         let mut options = TeachOptions::new(1);
         options.kind = ModelKind::S;
@@ -96,7 +97,7 @@ impl Bench {
         Ok([free?, fixed?])
     }
 
-    /// Median seconds of a detection, and how many parts are found.
+    /// Median seconds of a detection, and number of parts found.
     fn time(&self, model: &GraspModel, picture: &RgbImage) -> Result<(f64, usize)> {
         let detect = || model.detect(picture, Verification::ByShape);
         let num_found = detect()?.iter().filter(|found| found.is_accepted()).count();
@@ -108,7 +109,7 @@ impl Bench {
             std::hint::black_box(detect()?);
             seconds.push(start.elapsed().as_secs_f64());
         }
-        Ok((median(seconds).context("a row was never timed")?, num_found))
+        Ok((median(seconds).context("expected times of a row, found none")?, num_found))
     }
 
     fn row(&self, number: f64, num_parts: u32, models: &[GraspModel; 2], picture: &RgbImage) -> Result<Row> {
@@ -156,7 +157,7 @@ impl Bench {
         Curve::new("edge pixels of a picture of 1280×960: 0 to 400 strokes beside one part", STROKES.iter().map(row))
     }
 
-    /// A region of [`REGION_PX`] a side about the part, against the whole picture.
+    /// Compares a region around the part, with sides of [`REGION_PX`], with the whole picture.
     fn region(&self) -> Result<String> {
         let mut text =
             String::from("| a region of 200×200 about the part | whole | region | ratio |\n|---|--:|--:|--:|\n");
@@ -181,7 +182,7 @@ impl Bench {
     }
 }
 
-/// Pixels that differ from a neighbour by more than noise does.
+/// Number of pixels that differ from a neighbour by more than noise.
 fn num_edge_pixels(picture: &RgbImage) -> usize {
     const EDGE: u8 = 24;
     let differ =

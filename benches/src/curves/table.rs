@@ -4,18 +4,18 @@ use std::fmt::Write as _;
 
 use anyhow::Result;
 
-/// Times at one number.
+/// Times at one value of the number.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
     pub number: f64,
-    /// Parts in the picture, and how many were found: with the size free, and fixed.
+    /// Parts in the picture, and parts found with the size free and with the size fixed.
     pub num_parts: u32,
     pub found: [usize; 2],
-    /// Median seconds, likewise.
+    /// Median seconds with the size free and with the size fixed.
     pub seconds: [f64; 2],
 }
 
-/// Times against a number.
+/// Times as a function of a number.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve {
     what: &'static str,
@@ -27,13 +27,14 @@ impl Curve {
         Ok(Self { what, rows: rows.collect::<Result<_>>()? })
     }
 
-    /// The exponent from the first row to the last: 1 where the time grows as the number does.
+    /// The exponent from the first row to the last: 1 if the time is proportional to the
+    /// number.
     fn exponent(&self, which: usize) -> Option<f64> {
         let (first, last) = (self.rows.first()?, self.rows.last()?);
         exponent(first, last, which)
     }
 
-    /// The largest from a row to the next.
+    /// The largest exponent from one row to the next.
     fn steepest(&self, which: usize) -> Option<f64> {
         let steps = self.rows.windows(2).filter_map(|pair| exponent(&pair[0], &pair[1], which));
         steps.max_by(f64::total_cmp)
@@ -69,7 +70,7 @@ mod tests {
     #[test]
     fn exponents_by_hand() {
         let row = |number: f64, free: f64| Ok(Row { number, num_parts: 1, found: [1, 1], seconds: [free, 0.01] });
-        // Four times the number: first the same time, then four times it.
+        // The number grows fourfold twice: the time stays the same, then also grows fourfold.
         let curve = Curve::new("pixels", [row(100.0, 0.1), row(400.0, 0.1), row(1600.0, 0.4)].into_iter()).unwrap();
         let (whole, steepest) = (curve.exponent(0).unwrap(), curve.steepest(0).unwrap());
         assert!((whole - 0.5).abs() < 1e-12 && (steepest - 1.0).abs() < 1e-12, "{whole} {steepest}");

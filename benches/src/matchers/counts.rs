@@ -1,9 +1,9 @@
-//! Found parts, wrong detections and false alarms, as `sdg evaluate --pictures` counts them.
+//! Counts found parts, wrong detections and false alarms in the way of `sdg evaluate --pictures`.
 
 use sdg_evaluation::Share;
 use sdg_evaluation::labelled_pictures::{Judged, Tested, Totals, judge};
 
-/// What came of some pictures.
+/// Counts over some pictures.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Counted {
     pub found: Share,
@@ -11,20 +11,21 @@ pub struct Counted {
     pub false_alarms: Share,
 }
 
-/// Those that score at least so much.
+/// Counts the detections with a score of at least `min_score`.
 pub fn counted(tested: &[Tested], min_score: f64) -> Counted {
     let judged: Vec<Judged> = tested.iter().map(|tested| judge(tested, min_score)).collect();
     let Totals { found, wrong, false_alarms, .. } = Totals::of(&judged);
     Counted { found, wrong, false_alarms }
 }
 
-/// The least score at which found less wrong ones and false alarms are most, and the counts there; of several the highest.
+/// The threshold at which the found parts minus wrong detections and false alarms are most, with its counts; the
+/// highest such threshold.
 pub fn best_for(tested: &[Tested]) -> (f64, Counted) {
     const STEPS: u32 = 100;
     let scores = tested.iter().flat_map(|tested| &tested.detections).map(|detection| detection.score);
     let (low, high) =
         scores.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), score| (low.min(score), high.max(score)));
-    // Above the highest nothing counts: better than wrong ones alone.
+    // Above the highest score nothing is accepted, which is better than wrong detections only.
     let mut best = (1.0f64.max(high) + 1e-6, counted(tested, f64::INFINITY));
     for step in (0..=STEPS).rev().filter(|_| low <= high) {
         let least = low + (high - low) * f64::from(step) / f64::from(STEPS);

@@ -1,13 +1,14 @@
-//! `sdg-bench matchers`: model S beside what a user would take instead, on the same pictures, found and wrong ones beside the times.
+//! `sdg-bench matchers`: compares model S with the alternatives that a user has, on the same pictures: times, found
+//! parts and wrong detections.
 //!
 //! ```text
-//! shipped photos, parts laid on their tables ─┐           ┌─ ours, in this process
-//!                                             ├─ picture ─┤                              ─ median times; counts by the labels
-//! sets of a split, but for its reported side ─┘           └─ peers/matchers.py, one a peer
+//! shipped photos, parts drawn on their tables ─┐           ┌─ our side, in this process
+//!                                              ├─ picture ─┤                              ─ median times; counts by the labels
+//! sets of a split, without its reported side ──┘           └─ peers/matchers.py, one process per peer
 //! ```
-//! Every side has its turn at every picture before the next one, another one first each time. Ours accepts from a score of 0.5. A peer
-//! has no score that says so: it gets the least score at which found less wrong ones and false alarms are most on the very set, which
-//! nobody knows beforehand.
+//! All sides process a picture before the next one, starting with another side each time. Our side accepts detections
+//! from a score of 0.5. The peers have no such threshold, so each gets the best one for the same set (most found parts
+//! minus wrong detections and false alarms), which a user cannot know beforehand.
 
 mod counts;
 mod peer;
@@ -32,13 +33,13 @@ use crate::results::rewrite;
 /// `sdg-bench matchers`
 #[derive(Debug, ClapArgs)]
 pub struct MatchersArgs {
-    /// The repository
+    /// Root of the repository
     #[arg(long, default_value = ".", value_name = "DIR")]
     root: PathBuf,
-    /// The folder that the split's sets lie in; without it, or where it is not there, shipped parts alone
+    /// Folder of the split's sets; without it, or if it does not exist, only shipped parts are measured
     #[arg(long, value_name = "DIR")]
     sets: Option<PathBuf>,
-    /// Runs of each side at each picture
+    /// Number of timed runs of each side per picture
     #[arg(long, default_value_t = 3, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100))]
     rounds: u32,
     /// Threads of each side
@@ -49,12 +50,12 @@ pub struct MatchersArgs {
     results: Option<PathBuf>,
 }
 
-/// Model S with the part's size fixed, as the peers have it, and free, as it is by default.
+/// Model S with the part's size fixed, as for the peers, and free, which is the default.
 const OURS: [&str; 2] = ["ours, size fixed", "ours, size 0.75 to 1.35"];
-/// A detection of ours is accepted from this score on.
+/// Minimum score of an accepted detection of our side.
 const ACCEPTED: f64 = 0.5;
 
-/// What a side made of the pictures of a group.
+/// The results of a side on the pictures of a group.
 struct Side {
     title: String,
     seconds: Vec<f64>,
@@ -92,7 +93,7 @@ pub fn run(args: &MatchersArgs) -> Result<()> {
     Ok(())
 }
 
-/// Every side at every picture of a group.
+/// Runs every side on every picture of a group.
 fn measure(group: &Group, python: &Path, args: &MatchersArgs) -> Result<Vec<Side>> {
     let titles = OURS.iter().chain(PEERS.iter().map(|(_, title)| title));
     let new = |(idx, title): (usize, &&str)| Side {
@@ -119,7 +120,7 @@ fn measure_case(case: &Case, python: &Path, args: &MatchersArgs, sides: &mut [Si
     for (number, picture) in pictures.into_iter().enumerate() {
         let pixels = sdg_inputs::read_image(&picture.path)?;
         let mut first: Vec<Option<Tested>> = vec![None; sides.len()];
-        // The first round does not count: it reads the picture and makes ready.
+        // The first round does not count: it reads the picture and prepares caches.
         for round in 0..=args.rounds as usize {
             for turn in 0..sides.len() {
                 let idx = (round + turn + number) % sides.len();

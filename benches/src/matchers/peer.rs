@@ -1,4 +1,4 @@
-//! `peers/matchers.py`, one process a peer and a photo.
+//! Runs `peers/matchers.py`, one process per peer and photo.
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
@@ -13,14 +13,14 @@ use serde_json::json;
 
 use super::sets::Case;
 
-/// Their names in `matchers.py`, and in the table.
+/// Names of the peers in `matchers.py` and in the table.
 pub const PEERS: [(&str, &str); 3] = [
     ("corrmatch", "corrmatch 0.2.5"),
     ("matchtemplate", "OpenCV matchTemplate, every 5°, coarse to fine"),
     ("linemod", "OpenCV LINEMOD, every 5°"),
 ];
 
-/// A running peer, and what its places mean.
+/// A running peer, and the transform from its results to grasps.
 pub struct PeerProcess {
     kind: &'static str,
     child: Child,
@@ -34,7 +34,7 @@ pub struct PeerProcess {
 #[derive(Deserialize)]
 struct Answer {
     seconds: f64,
-    /// Middle of the outline's box, turn in degrees, score.
+    /// Centre of the outline's box, angle in degrees, score.
     found: Vec<[f64; 4]>,
 }
 
@@ -54,14 +54,16 @@ impl PeerProcess {
             .stdout(Stdio::piped())
             .spawn()
             .with_context(|| python.display().to_string())?;
-        let (Some(input), Some(output)) = (child.stdin.take(), child.stdout.take()) else { bail!("{kind}: no pipes") };
+        let (Some(input), Some(output)) = (child.stdin.take(), child.stdout.take()) else {
+            bail!("{kind}: expected pipes to the process")
+        };
         let grasp = *annotation.require_grasp()?;
         let width_px = annotation.jaw_width.unwrap_or_else(|| grasp.opening_across(&outline));
         let output = BufReader::new(output);
         let mut peer = Self { kind, child, input, output, outline, grasp, width_px };
         let ready = peer.line()?;
         if !ready.contains("\"ready\"") {
-            bail!("{kind}: expected that it is ready, found {ready}");
+            bail!("{kind}: expected the message \"ready\", found {ready}");
         }
         Ok(peer)
     }
@@ -69,12 +71,12 @@ impl PeerProcess {
     fn line(&mut self) -> Result<String> {
         let mut line = String::new();
         if self.output.read_line(&mut line)? == 0 {
-            bail!("{}: it ended; its words are on standard error", self.kind);
+            bail!("{}: the process ended; standard error has the reason", self.kind);
         }
         Ok(line)
     }
 
-    /// Seconds, and what was found, best first.
+    /// Returns the seconds, and the detections with the best first.
     pub fn find(&mut self, picture: &Path) -> Result<(f64, Vec<GraspDetection>)> {
         writeln!(self.input, "{}", json!({"image": absolute(picture)?}))?;
         let line = self.line()?;

@@ -1,4 +1,4 @@
-//! The pictures: shipped parts laid on their tables, and the sets of a split but for those that are only reported.
+//! The pictures: shipped parts drawn on their tables, and the sets of a split, except sets of the reported side.
 
 use std::path::{Path, PathBuf};
 
@@ -16,10 +16,11 @@ use crate::works::read_demonstration;
 /// Shipped parts that have no symmetry.
 const SHIPPED: [&str; 6] = ["circuit_board", "housing", "key", "pendulum", "pliers", "rod_end"];
 const SIZE: [u32; 2] = [640, 480];
-/// Parts and strokes beside them in the pictures of each shipped part; the last one shows another part.
+/// Numbers of parts and of strokes beside them in the pictures of each shipped part; the last picture shows a different
+/// part.
 const CONTENTS: [(u32, u32); 4] = [(1, 0), (2, 20), (3, 40), (0, 20)];
 
-/// A photo to learn, and where its pictures are.
+/// A photo to teach, and the pictures to search.
 pub struct Case {
     pub photo: PathBuf,
     pub demonstration: Demonstration,
@@ -28,20 +29,20 @@ pub struct Case {
 }
 
 enum Source {
-    /// Drawn, with the truth.
+    /// Drawn pictures, with ground truth.
     Drawn(Vec<LabelledPicture>),
-    /// A folder with labels.
+    /// A folder of pictures with labels.
     Folder(PathBuf),
 }
 
-/// Pictures that have rows of their own.
+/// Pictures that have their own rows in the table.
 pub struct Group {
     pub name: String,
     pub cases: Vec<Case>,
 }
 
 impl Case {
-    /// Its pictures and their truth.
+    /// The pictures with their ground truth.
     pub fn pictures(&self, detector: &Perception) -> Result<Vec<LabelledPicture>> {
         match &self.source {
             Source::Drawn(pictures) => Ok(pictures.clone()),
@@ -90,7 +91,7 @@ fn instance(demonstration: &Demonstration, pose: &PlanarSimilarity) -> Result<In
     Ok(Instance { bbox: outline.transformed(pose).bounds(), grasp: Some(grasp), optional: false, extent: None })
 }
 
-/// Strokes that cover no part.
+/// Draws strokes that cover no part.
 fn strokes_beside(drawn: &mut RgbImage, count: u32, instances: &[Instance]) {
     let bare = drawn.clone();
     add_strokes(drawn, count);
@@ -102,7 +103,7 @@ fn strokes_beside(drawn: &mut RgbImage, count: u32, instances: &[Instance]) {
     }
 }
 
-/// The sets of datasets/split.toml that constants are or were fitted on and that are there; nothing of the others is opened.
+/// The existing sets of datasets/split.toml on which constants are or were fitted; no file of the other sets is opened.
 pub fn of_split(root: &Path, sets: &Path) -> Result<Vec<Group>> {
     let split = read_split(&root.join("datasets/split.toml"))?;
     let mut groups = Vec::new();

@@ -1,4 +1,4 @@
-//! Which work, and the files that it needs.
+//! Arguments of a work.
 
 use std::path::PathBuf;
 
@@ -7,7 +7,7 @@ use clap::Args as ClapArgs;
 /// `sdg-bench work`
 #[derive(Debug, ClapArgs)]
 pub struct WorkArgs {
-    /// Which work; `compare --help` lists them
+    /// Name of the work; `compare --help` lists them
     pub name: String,
     /// Weights written by `sdg-bench weights`
     #[arg(long, value_name = "FILE")]
@@ -15,10 +15,10 @@ pub struct WorkArgs {
     /// Folder with image.png and annotation.json
     #[arg(long, value_name = "DIR")]
     pub demonstration: Option<PathBuf>,
-    /// The grasp model that the work `teaching` writes and `edge-grasp` reads
+    /// Grasp model that the work `teaching` writes and `edge-grasp` reads
     #[arg(long, value_name = "FILE")]
     pub model: Option<PathBuf>,
-    /// Threads, where a work starts some of its own
+    /// Number of threads, for works that start their own
     #[arg(long, default_value_t = 2, value_name = "N")]
     pub threads: usize,
 }

@@ -9,7 +9,7 @@ use crate::protocol::Work;
 use crate::works::demonstration::read_demonstration;
 use crate::works::facts::facts;
 
-/// Samples a run; `peers/augmentation.py` makes as many.
+/// Samples per run, as in `peers/augmentation.py`.
 const SAMPLES: usize = 64;
 
 pub fn samples(demonstration: &Path, threads: usize) -> Result<Work> {

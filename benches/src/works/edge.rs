@@ -1,4 +1,4 @@
-//! The `edge` preset: detection to a grasp, a training step.
+//! The works of the `edge` preset: detection up to a grasp, and a training step.
 
 use std::path::Path;
 
@@ -16,12 +16,13 @@ use crate::scene;
 use crate::works::facts::{facts, mean};
 use crate::works::r50::sampled;
 
-/// Parts a picture: more than go through the keypoint head, so that it has the same to do on both sides.
+/// Columns and rows of parts in a picture: more parts than go through the keypoint head, so that its
+/// work is the same on both sides.
 const GRID: (u32, u32) = (3, 2);
 const BATCH: u32 = 4;
-/// So low that the weights stay as they are: the hundredth step has the same to do as the first.
+/// So low that the weights hardly change, so the hundredth step does the same work as the first.
 const LEARNING_RATE: f64 = 1e-5;
-/// As `sdg-training` sets them.
+/// As in `sdg-training`.
 const WEIGHT_DECAY: f64 = 1e-4;
 const MAX_GRADIENT_NORM: f64 = 10.0;
 
@@ -56,7 +57,7 @@ pub fn training_step(weights: &Path) -> Result<Work> {
     let mut detector = Network::Edge.load(&Device::flex().autodiff(), weights)?;
     let transform = detector.image_transform();
     let target = scene::target(GRID.0, GRID.1, sdg_grasp::NUM_KEYPOINTS);
-    // Ready made, as the trainer has them from another thread.
+    // Prepared beforehand, because the trainer gets them from another thread.
     let images: Vec<TransformedImage> =
         (0..BATCH).map(|number| transform.apply(&scene::picture(number))).collect::<sdg_detection::Result<_>>()?;
     let counts = keypoint_rois(sampled(&detector, &images, &target));
@@ -72,7 +73,7 @@ pub fn training_step(weights: &Path) -> Result<Work> {
     }))
 }
 
-/// The preset bounds how many positive proposals go through the keypoint head.
+/// Limits the positive ROIs to the number that the preset sends through the keypoint head.
 fn keypoint_rois(mut counts: Facts) -> Facts {
     let head = Network::Edge.config().roi_heads.keypoint_head;
     if let (Some(most), Some(count)) =

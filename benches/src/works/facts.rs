@@ -1,4 +1,4 @@
-//! Facts of a work beside its time.
+//! Facts about a work's result.
 
 use crate::protocol::Facts;
 
@@ -7,7 +7,7 @@ pub fn facts<const N: usize>(entries: [(&str, f64); N]) -> Facts {
     entries.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
 }
 
-/// The mean; 0 of nothing.
+/// The mean; 0 without values.
 pub fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
     let (sum, count) = values.into_iter().fold((0.0, 0), |(sum, count), value| (sum + value, count + 1));
     sum / f64::from(count.max(1))

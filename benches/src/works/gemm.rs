@@ -1,10 +1,10 @@
-//! A square product, to measure the machine by.
+//! A product of square matrices, which measures the machine.
 
 use burn::tensor::{Device, Distribution, Tensor};
 
 use crate::protocol::{Facts, Work};
 
-/// Side of both matrices; `peers/gemm.py` has the same.
+/// Side of both matrices, as in `peers/gemm.py`.
 const SIDE: usize = 2048;
 
 pub fn product() -> Work {

@@ -1,4 +1,4 @@
-//! Our side of every work, by the crates' public interfaces.
+//! Our side of every work, through the crates' public interfaces.
 
 mod args;
 mod augmentation;
@@ -17,7 +17,7 @@ pub use demonstration::read_demonstration;
 use crate::network::Network;
 use crate::protocol::Work;
 
-/// Builds the work of that name.
+/// Builds the work with the name in `args`.
 pub fn build(args: &WorkArgs) -> Result<Work> {
     let weights = || args.weights.as_deref().context("expected --weights FILE, found none");
     let demonstration = || args.demonstration.as_deref().context("expected --demonstration DIR, found none");
@@ -50,7 +50,8 @@ mod tests {
         for work in WORKS.iter().chain([&GEMM]) {
             let args =
                 WorkArgs { name: work.name.to_owned(), weights: None, demonstration: None, model: None, threads: 2 };
-            // Without its files a work is refused for them, not for its name.
+            // A work without its files is rejected because of them, not because of its
+            // name.
             let refused = build(&args).err().map(|error| error.to_string());
             assert!(refused.is_none_or(|error| !error.contains("expected a work")), "{}", work.name);
         }

@@ -1,4 +1,4 @@
-//! R50-FPN: the backbone, whole detectors, training steps.
+//! The works of R50-FPN: the backbone, complete detectors, training steps.
 
 use std::path::Path;
 
@@ -20,11 +20,11 @@ use crate::protocol::{Facts, Work};
 use crate::scene;
 use crate::works::facts::{facts, mean};
 
-/// Parts a picture: columns and rows.
+/// Columns and rows of parts in a picture.
 const GRID: (u32, u32) = (8, 4);
 const BATCH: u32 = 2;
-/// Detectron2's solver, but for a learning rate that leaves the weights as they are: the hundredth step has the same
-/// to do as the first.
+/// Detectron2's solver, except for the learning rate, which hardly changes the weights, so the hundredth step does
+/// the same work as the first.
 const LEARNING_RATE: f64 = 1e-5;
 const MOMENTUM: f64 = 0.9;
 const WEIGHT_DECAY: f32 = 1e-4;
@@ -98,7 +98,7 @@ pub fn training_step(network: Network, weights: &Path) -> Result<Work> {
     }))
 }
 
-/// How many proposals go through the box head and through the head behind it.
+/// Number of proposals that go through the box head, and through the second head.
 pub fn sampled(detector: &GeneralizedRcnn, images: &[TransformedImage], target: &Target) -> Facts {
     let tensor = batch(images, &detector.device());
     let [_, _, height, width] = tensor.dims();
@@ -113,7 +113,7 @@ pub fn sampled(detector: &GeneralizedRcnn, images: &[TransformedImage], target: 
     facts([("rois", rois.len() as f64), ("head_rois", positive as f64)])
 }
 
-/// The boxes of a target in pixels of the resized image; sampling looks at nothing else.
+/// The boxes of a target in pixels of the resized image; the sampler uses only them.
 fn resized(image: &TransformedImage, target: &Target) -> ResizedTarget {
     ResizedTarget {
         boxes: target.boxes.iter().map(|of_part| image.resized_box(of_part)).collect(),

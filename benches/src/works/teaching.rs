@@ -1,4 +1,4 @@
-//! From a demonstration to a validated model, and that model at work.
+//! Works from a demonstration to a validated model, and with that model.
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -10,7 +10,7 @@ use crate::protocol::{Facts, Work};
 use crate::works::demonstration::read_demonstration;
 use crate::works::facts::facts;
 
-/// Teaches once and writes the model, for [`grasp`].
+/// Teaches once and writes the model, which [`grasp`] uses.
 pub fn teaching(demonstration: &Path, model: &Path) -> Result<Work> {
     let demonstrations = [read_demonstration(demonstration)?];
     let model = model.to_owned();
@@ -31,7 +31,7 @@ pub fn teaching(demonstration: &Path, model: &Path) -> Result<Work> {
     Ok(Work { warm_up: false, ..Work::new(Facts::new(), run) })
 }
 
-/// Finds the part in the photo that it was taught on, verified by the demonstration.
+/// Finds the part in its own photo, verified against the demonstration.
 pub fn grasp(demonstration: &Path, model: &Path) -> Result<Work> {
     let photo = read_demonstration(demonstration)?.image;
     let bytes = std::fs::read(model).with_context(|| model.display().to_string())?;

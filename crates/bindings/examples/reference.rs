@@ -1,7 +1,7 @@
 //! Prints detections as JSON with all digits, one line per picture: the reference for tests of the Python package and
 //! the C library. It does not use `sdg-bindings`.
 //!
-//! `reference MODEL CAMERA|- PICTURE…`
+//! Usage: `reference MODEL CAMERA|- PICTURE…`
 
 use std::path::Path;
 

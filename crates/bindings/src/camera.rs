@@ -1,4 +1,4 @@
-//! A calibrated camera over its table.
+//! A calibrated camera and its pose.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -10,12 +10,12 @@ use sdg_inputs::camera_files;
 
 use crate::fault::{Fault, FaultKind, Result};
 
-/// A calibrated camera with its pose over the table; cheap to clone.
+/// A calibrated camera with its pose relative to the table; cheap to clone.
 #[derive(Debug, Clone)]
 pub struct Camera(Arc<CalibratedCamera>);
 
 impl Camera {
-    /// Reads a camera's file: ROS camera_info YAML, with `table:` for the camera's pose.
+    /// Reads a camera file: ROS camera_info YAML, with `table:` for the camera's pose.
     ///
     /// # Errors
     /// The file cannot be read, or has no pose of the camera.
@@ -28,10 +28,10 @@ impl Camera {
         read().map_err(Fault::of_kind_or(FaultKind::Camera))
     }
 
-    /// The same from the text of a file.
+    /// Reads a camera from the text of a file.
     ///
     /// # Errors
-    /// As [`Self::read`].
+    /// The errors of [`Self::read`].
     pub fn from_yaml(text: &str) -> Result<Self> {
         let read = || {
             let camera = CalibratedCamera::from_yaml(text)?;
@@ -41,12 +41,12 @@ impl Camera {
         read().map(|camera| Self(Arc::new(camera))).map_err(Fault::of_kind(FaultKind::Camera))
     }
 
-    /// Width and height of its pictures.
+    /// Width and height of the camera's pictures, in pixels.
     pub fn size_px(&self) -> [u32; 2] {
         [self.0.intrinsics.width, self.0.intrinsics.height]
     }
 
-    /// The frame of its poses: `table` or `base`.
+    /// The frame of the camera's poses: `table` or `base`.
     pub fn frame(&self) -> Option<&'static str> {
         self.0.table.as_ref().map(|table| table.frame.name())
     }

@@ -1,5 +1,5 @@
-//! Shared by the Python package and the C library: a taught model with a camera, trackers, teaching and evaluation;
-//! every error has a kind and a text.
+//! Common code of the Python package and the C library: a taught model with a camera, trackers, teaching and
+//! evaluation. Every error has a kind and a text.
 //!
 //! ```text
 //! file ─ Model::read ─┐

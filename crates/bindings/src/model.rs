@@ -25,10 +25,10 @@ pub enum RegionChoice {
     Part([u32; 4]),
 }
 
-/// Search options for a picture.
+/// Options for the search of a picture.
 #[derive(Debug, Clone, Default)]
 pub struct View {
-    /// The calibrated camera that took it.
+    /// The calibrated camera that took the picture.
     pub camera: Option<Camera>,
     /// The searched region.
     pub region: RegionChoice,
@@ -36,7 +36,7 @@ pub struct View {
     pub threads: Option<usize>,
 }
 
-/// A grasp model, with the perception that was used last; can be shared among threads.
+/// A grasp model and its last perception; can be used by several threads.
 #[derive(Debug)]
 pub struct Model {
     model: GraspModel,
@@ -44,7 +44,7 @@ pub struct Model {
     last: Mutex<Option<LastPerception>>,
 }
 
-/// The last perception, and the inputs it was made for.
+/// A perception and the inputs it was made for.
 #[derive(Debug)]
 struct LastPerception {
     camera: Option<Camera>,
@@ -69,10 +69,10 @@ pub struct Detections {
     records: Vec<Record>,
 }
 
-/// A record of `sdg detect --json`, without advice, whose text is for the command line.
+/// A record of `sdg detect --json`, without the advice, whose text is for the command line.
 #[derive(Debug, Clone, Serialize)]
 pub struct Record {
-    /// In pixels, and with a camera also in metres.
+    /// The detection, in pixels, and with a camera also in metres.
     #[serde(flatten)]
     pub found: FoundRecord,
     /// The part's size relative to its nominal size; absent with a camera.
@@ -81,7 +81,7 @@ pub struct Record {
 }
 
 impl Model {
-    /// Reads a model's file.
+    /// Reads a model file.
     ///
     /// # Errors
     /// The file cannot be read, is not a grasp model, is damaged, or has another version.
@@ -93,7 +93,7 @@ impl Model {
         })
     }
 
-    /// Writes the model's file atomically; it replaces only an existing grasp model.
+    /// Writes the model file atomically; it replaces only an existing grasp model.
     ///
     /// # Errors
     /// The path is a file of another kind, or cannot be written.
@@ -102,7 +102,7 @@ impl Model {
         Ok(sdg_files::write(path, &self.model.to_bytes()?)?)
     }
 
-    /// The model itself.
+    /// The grasp model.
     pub fn grasp_model(&self) -> &GraspModel {
         &self.model
     }
@@ -125,10 +125,10 @@ impl Model {
         })?
     }
 
-    /// The model with a camera, or for pictures of any camera.
+    /// The model's perception with a camera, or for pictures of any camera.
     ///
     /// # Errors
-    /// As [`Self::detect`].
+    /// The errors of [`Self::detect`].
     pub fn perception(&self, camera: Option<&Camera>, region: RegionChoice) -> Result<Arc<Perception>> {
         let last = || self.last.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(last) = last().as_ref().filter(|last| last.is_for(camera, region)) {

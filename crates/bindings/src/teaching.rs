@@ -14,9 +14,9 @@ use crate::threads::check_process;
 /// The calibrated camera that took the photo.
 #[derive(Debug, Clone)]
 pub struct CameraTeaching {
-    /// Its file.
+    /// The camera file.
     pub file: PathBuf,
-    /// Height of the marks over the table, in metres.
+    /// Height of the marks above the table, in metres.
     pub mark_height_m: f64,
     /// Height at which the gripper closes, in metres.
     pub grasp_height_m: f64,
@@ -33,8 +33,8 @@ pub struct Teaching {
     pub camera: Option<CameraTeaching>,
 }
 
-/// Teaches like `sdg teach`; `observe` may end the teaching early. The model equals the one in the file, whose weights
-/// are rounded.
+/// Teaches like `sdg teach`; `observe` may end the teaching early. The model is the one that a file contains, with
+/// rounded weights.
 ///
 /// # Errors
 /// Files cannot be read, photos or marks are unsuitable for teaching, or the teaching was ended before there was a model.

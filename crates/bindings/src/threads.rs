@@ -10,7 +10,7 @@ use crate::fault::{Fault, FaultKind, Result};
 
 /// Idle pools: concurrent callers use one each.
 static IDLE_POOLS: Mutex<Vec<ThreadPool>> = Mutex::new(Vec::new());
-/// Id of the process that computed first and has the threads; 0 before.
+/// Id of the process that was the first to compute and has the threads; 0 if none was.
 static COMPUTING_PID: AtomicU32 = AtomicU32::new(0);
 /// Maximum number of threads.
 const MAX_THREADS: usize = 1024;
@@ -46,7 +46,7 @@ pub fn on_threads<T: Send>(threads: Option<usize>, work: impl FnOnce() -> T + Se
     Ok(done)
 }
 
-/// A forked process does not have the threads of its parent, and would wait for them for ever.
+/// Rejects a forked process: it does not have the threads of its parent, and would wait for them forever.
 ///
 /// # Errors
 /// The process was forked from one that had computed.
@@ -55,8 +55,8 @@ pub(crate) fn check_process() -> Result<()> {
     match COMPUTING_PID.compare_exchange(0, own, Ordering::Relaxed, Ordering::Relaxed) {
         Err(first) if first != own => Err(Fault::new(
             FaultKind::Forked,
-            "expected a process that was started anew (spawn), found one that was forked after its parent had computed: the threads that \
-             compute are not in it",
+            "expected a new process (spawn), found a process that was forked after its parent had detected or taught: the threads of the \
+             parent do not exist in it",
         )),
         _ => Ok(()),
     }

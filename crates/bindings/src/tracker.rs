@@ -30,11 +30,11 @@ struct Record {
 }
 
 impl Tracker {
-    /// A tracker without known parts. With `search_frames`, a search's result is used this number of frames later,
-    /// identically on every machine; otherwise as soon as the search has ended.
+    /// Makes a tracker without known parts. With `search_frames`, a search's result is used this number of frames
+    /// later, identically on every machine; otherwise as soon as the search has ended.
     ///
     /// # Errors
-    /// Those of [`Model::detect`]; the system refuses a thread.
+    /// The errors of [`Model::detect`]; the system refuses a thread.
     pub fn new(model: &Model, view: &View, search_frames: Option<u32>) -> Result<Self> {
         check_process()?;
         let perception = model.perception(view.camera.as_ref(), view.region)?;
@@ -55,7 +55,7 @@ impl Tracker {
             return Err(Fault::new(
                 FaultKind::Argument,
                 format!(
-                    "expected captured_s of at least {}, that of the frame before, found {captured_secs}",
+                    "expected captured_s of at least {}, the previous frame's, found {captured_secs}",
                     self.last_secs
                 ),
             ));

@@ -1,16 +1,16 @@
 /* sdg.h: grasps that were taught from one photo, found in pictures. docs/c.md is the guide.
  *
- * Written by a test from crates/capi/src: change those, then run it with SDG_WRITE_HEADER=1.
+ * Generated from crates/capi/src by a test: change the sources, then run the test with SDG_WRITE_HEADER=1.
  *
  * Handles. Models, cameras and detections are numbers; each is freed once, with sdg_free, in any order. A handle that was freed, or
- * is of another kind of object, gives SDG_ERROR_HANDLE. Requirement: pointers are NULL or point to the memory that a function describes.
+ * is of another kind of object, gives SDG_ERROR_HANDLE. Pointers must be NULL or point to memory as each function describes it.
  *
  * Threads. Every function may be called from any thread at any time, and handles may be shared. A detection uses one thread per core,
- * or sdg_options.threads; callers that do not set a number share their threads. sdg_last_error is per
+ * or sdg_options.threads. Detections that run at the same time share the threads unless they set a number. sdg_last_error is per
  * thread. A process that is forked after a detection or a teaching must call exec, otherwise it gets SDG_ERROR_FORKED.
  *
- * Errors. Every function but sdg_abi_version and sdg_last_error returns SDG_OK or the kind of an error; results are written with
- * SDG_OK only. No exception is thrown, and no panic leaves the library.
+ * Errors. Every function but sdg_abi_version and sdg_last_error returns SDG_OK or the kind of an error; results are written only
+ * with SDG_OK. No exception is thrown, and no panic leaves the library.
  */
 #ifndef SDG_H
 #define SDG_H
@@ -98,7 +98,7 @@ typedef int32_t sdg_status;
 /* sdg_detection.turn_source: a source unknown to this header. */
 #define SDG_TURN_OTHER 0u
 
-/* sdg_detection.turn_source: the network's class of the box's crop (model A). */
+/* sdg_detection.turn_source: the network's angle class of the box's crop (model A). */
 #define SDG_TURN_CROP 1u
 
 /* sdg_detection.turn_source: the line through the keypoints (models B and C). */
@@ -110,10 +110,10 @@ typedef int32_t sdg_status;
 /* sdg_detection.turn_source: the mask's outline (model D). */
 #define SDG_TURN_OUTLINE 4u
 
-/* sdg_detection.turn_source: search over all turns (model S). */
+/* sdg_detection.turn_source: search over all angles (model S). */
 #define SDG_TURN_SEARCH 5u
 
-/* sdg_teaching.symmetry: the part looks the same in every turn. */
+/* sdg_teaching.symmetry: the part looks the same at every angle. */
 #define SDG_SYMMETRY_FULL 4294967295u
 
 /* Bytes of sdg_detection.refused. */
@@ -160,7 +160,7 @@ typedef struct {
 typedef struct {
     /* SDG_ABI_VERSION. */
     uint32_t abi_version;
-    /* Number of turns in which the part looks the same: 2 for half a turn, ..., SDG_SYMMETRY_FULL for a disc; 0 and 1
+    /* Number of angles at which the part looks the same: 2 for half a turn, ..., SDG_SYMMETRY_FULL for a disc; 0 and 1
      * for none. */
     uint32_t symmetry;
     /* File of the photo. */
@@ -171,9 +171,9 @@ typedef struct {
     const char *model;
     /* File of the calibrated camera that took the photo, for poses in metres; NULL for none. */
     const char *camera;
-    /* Height of the marks over the table in metres, with a camera. */
+    /* Height of the marks above the table in metres, with a camera. */
     double mark_height_m;
-    /* Height over the table at which the gripper closes, in metres, with a camera; 0 for half of mark_height_m. */
+    /* Height above the table at which the gripper closes, in metres, with a camera; 0 for half of mark_height_m. */
     double grasp_height_m;
     /* Seed of the random numbers; 0 for 1, the default of `sdg teach`. */
     uint64_t seed;
@@ -191,11 +191,11 @@ typedef struct {
     double surface;
     /* Hue. */
     double hue;
-    /* Share of the part in agreeing regions. */
+    /* Fraction of the part in agreeing regions. */
     double visible;
     /* Size compared with the expected one. */
     double size;
-    /* Share of the part outside the picture. */
+    /* Fraction of the part outside the picture. */
     double outside;
     /* Resemblance to other objects. */
     double resemblance;
@@ -205,7 +205,7 @@ typedef struct {
     double details;
     /* Table at places where the part should be. */
     double table;
-    /* Share of the outline without an edge. */
+    /* Fraction of the outline without an edge. */
     double rim;
     /* Edges that are not in the photo. */
     double added;
@@ -249,7 +249,7 @@ typedef struct {
     uint32_t frame;
     /* 1 if it is accepted, 0 if it is refused. */
     uint32_t is_accepted;
-    /* SDG_TURN_CROP, ...: the initial source of the turn. */
+    /* SDG_TURN_CROP, ...: the initial source of the angle. */
     uint32_t turn_source;
     /* Number of corners of the outline; see sdg_detections_polygon. */
     uint32_t num_polygon;

@@ -20,17 +20,20 @@ pub fn status(work: impl FnOnce() -> Result<()>) -> sdg_status {
     let (status, text) = match catch_unwind(AssertUnwindSafe(work)) {
         Ok(Ok(())) => return SDG_OK,
         Ok(Err(fault)) => (fault.kind as sdg_status, fault.text),
-        Err(_) => (SDG_ERROR_INTERNAL, "a fault of libsdg, described on standard error; please report it".to_owned()),
+        Err(_) => (
+            SDG_ERROR_INTERNAL,
+            "an internal error of libsdg, described on standard error; please report it".to_owned(),
+        ),
     };
     // Has no effect in a thread that only runs its destructors.
     _ = LAST_ERROR.try_with(|last| *last.borrow_mut() = text);
     status
 }
 
-/// Copies the thread's last error to the buffer, as [`copy_text`].
+/// Copies the thread's last error to the buffer, like [`copy_text`].
 ///
 /// # Safety
-/// As [`copy_text`].
+/// The conditions of [`copy_text`].
 pub unsafe fn copy_last_error(buffer: *mut c_char, num_bytes: usize) -> usize {
     let text = LAST_ERROR.try_with(|last| last.borrow().clone()).unwrap_or_default();
     // SAFETY: the caller promises the same.
@@ -59,7 +62,7 @@ pub fn null(name: &str) -> Fault {
     Fault::new(FaultKind::Argument, format!("expected a pointer as {name}, found NULL"))
 }
 
-/// A path from the caller; errors call it `name`.
+/// The path at a pointer from the caller; errors call it `name`.
 ///
 /// # Safety
 /// `path` is null or a zero-terminated string that is not changed during the call.

@@ -70,7 +70,7 @@ pub fn view(options: Option<&sdg_options>) -> Result<View> {
     Ok(View { camera, region, threads: (options.threads > 0).then_some(options.threads as usize) })
 }
 
-/// The default of `sdg teach`.
+/// The default seed of `sdg teach`.
 const DEFAULT_SEED: u64 = 1;
 /// Maximum number of training steps.
 const MAX_STEPS: u64 = 1_000_000;
@@ -123,7 +123,7 @@ pub unsafe fn teaching(from: &sdg_teaching) -> Result<(Teaching, TeachOptions)> 
     Ok((Teaching { demonstrations, negatives: Vec::new(), camera }, options))
 }
 
-/// Checks a height in metres over the table; a height given in millimetres would exceed the maximum.
+/// Checks a height above the table, in metres; a height given in millimetres would exceed the maximum.
 fn height(name: &str, height_m: f64) -> Result<f64> {
     const MAX_HEIGHT_M: f64 = 0.5;
     if (0.0..=MAX_HEIGHT_M).contains(&height_m) {
@@ -137,7 +137,7 @@ fn height(name: &str, height_m: f64) -> Result<f64> {
 pub fn detection(record: &Record) -> sdg_detection {
     let found = &record.found.detection;
     let mut refused = [0; SDG_REFUSED_BYTES as usize];
-    // SAFETY: the buffer has the length that is given.
+    // SAFETY: the buffer has the length passed with it.
     unsafe { copy_text(found.refused.unwrap_or_default(), refused.as_mut_ptr(), refused.len()) };
     let absent = f64::NAN;
     let pose = record.found.pose.as_ref();

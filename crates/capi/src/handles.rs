@@ -1,4 +1,4 @@
-//! Objects identified by numbers, each used only once per process.
+//! Objects identified by numbers, which are used only once per process.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -56,16 +56,16 @@ fn object(handle: sdg_handle, expected: &str) -> Result<Object> {
 impl Table {
     fn unknown(&self, handle: sdg_handle, expected: &str) -> Fault {
         let found = match handle {
-            0 => "0, which is none".to_owned(),
+            0 => "0, which is no handle".to_owned(),
             _ if handle <= self.last => format!("{handle}, which was freed"),
-            _ => format!("{handle}, which was never given"),
+            _ => format!("{handle}, which never existed"),
         };
         Fault::new(FaultKind::Closed, format!("expected the handle of {expected}, found {found}"))
     }
 }
 
 fn other(object: &Object, handle: sdg_handle, expected: &str) -> Fault {
-    let text = format!("expected the handle of {expected}, found {handle}, which is that of {}", object.name());
+    let text = format!("expected the handle of {expected}, found {handle}, the handle of {}", object.name());
     Fault::new(FaultKind::Closed, text)
 }
 

@@ -114,17 +114,17 @@ fn function(signature: &str) -> String {
 const HEAD: &str = "\
 /* sdg.h: grasps that were taught from one photo, found in pictures. docs/c.md is the guide.
  *
- * Written by a test from crates/capi/src: change those, then run it with SDG_WRITE_HEADER=1.
+ * Generated from crates/capi/src by a test: change the sources, then run the test with SDG_WRITE_HEADER=1.
  *
  * Handles. Models, cameras and detections are numbers; each is freed once, with sdg_free, in any order. A handle that was freed, or
- * is of another kind of object, gives SDG_ERROR_HANDLE. Requirement: pointers are NULL or point to the memory that a function describes.
+ * is of another kind of object, gives SDG_ERROR_HANDLE. Pointers must be NULL or point to memory as each function describes it.
  *
  * Threads. Every function may be called from any thread at any time, and handles may be shared. A detection uses one thread per core,
- * or sdg_options.threads; callers that do not set a number share their threads. sdg_last_error is per
+ * or sdg_options.threads. Detections that run at the same time share the threads unless they set a number. sdg_last_error is per
  * thread. A process that is forked after a detection or a teaching must call exec, otherwise it gets SDG_ERROR_FORKED.
  *
- * Errors. Every function but sdg_abi_version and sdg_last_error returns SDG_OK or the kind of an error; results are written with
- * SDG_OK only. No exception is thrown, and no panic leaves the library.
+ * Errors. Every function but sdg_abi_version and sdg_last_error returns SDG_OK or the kind of an error; results are written only
+ * with SDG_OK. No exception is thrown, and no panic leaves the library.
  */
 #ifndef SDG_H
 #define SDG_H

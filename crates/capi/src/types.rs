@@ -60,7 +60,7 @@ pub const SDG_FRAME_BASE: u32 = 2;
 
 /// sdg_detection.turn_source: a source unknown to this header.
 pub const SDG_TURN_OTHER: u32 = 0;
-/// sdg_detection.turn_source: the network's class of the box's crop (model A).
+/// sdg_detection.turn_source: the network's angle class of the box's crop (model A).
 pub const SDG_TURN_CROP: u32 = 1;
 /// sdg_detection.turn_source: the line through the keypoints (models B and C).
 pub const SDG_TURN_KEYPOINTS: u32 = 2;
@@ -68,10 +68,10 @@ pub const SDG_TURN_KEYPOINTS: u32 = 2;
 pub const SDG_TURN_TEXTURE: u32 = 3;
 /// sdg_detection.turn_source: the mask's outline (model D).
 pub const SDG_TURN_OUTLINE: u32 = 4;
-/// sdg_detection.turn_source: search over all turns (model S).
+/// sdg_detection.turn_source: search over all angles (model S).
 pub const SDG_TURN_SEARCH: u32 = 5;
 
-/// sdg_teaching.symmetry: the part looks the same in every turn.
+/// sdg_teaching.symmetry: the part looks the same at every angle.
 pub const SDG_SYMMETRY_FULL: u32 = 4294967295;
 
 /// Bytes of sdg_detection.refused.
@@ -124,7 +124,7 @@ pub struct sdg_options {
 pub struct sdg_teaching {
     /// SDG_ABI_VERSION.
     pub abi_version: u32,
-    /// Number of turns in which the part looks the same: 2 for half a turn, ..., SDG_SYMMETRY_FULL for a disc; 0 and 1
+    /// Number of angles at which the part looks the same: 2 for half a turn, ..., SDG_SYMMETRY_FULL for a disc; 0 and 1
     /// for none.
     pub symmetry: u32,
     /// File of the photo.
@@ -135,9 +135,9 @@ pub struct sdg_teaching {
     pub model: *const c_char,
     /// File of the calibrated camera that took the photo, for poses in metres; NULL for none.
     pub camera: *const c_char,
-    /// Height of the marks over the table in metres, with a camera.
+    /// Height of the marks above the table in metres, with a camera.
     pub mark_height_m: f64,
-    /// Height over the table at which the gripper closes, in metres, with a camera; 0 for half of mark_height_m.
+    /// Height above the table at which the gripper closes, in metres, with a camera; 0 for half of mark_height_m.
     pub grasp_height_m: f64,
     /// Seed of the random numbers; 0 for 1, the default of `sdg teach`.
     pub seed: u64,
@@ -157,11 +157,11 @@ pub struct sdg_evidence {
     pub surface: f64,
     /// Hue.
     pub hue: f64,
-    /// Share of the part in agreeing regions.
+    /// Fraction of the part in agreeing regions.
     pub visible: f64,
     /// Size compared with the expected one.
     pub size: f64,
-    /// Share of the part outside the picture.
+    /// Fraction of the part outside the picture.
     pub outside: f64,
     /// Resemblance to other objects.
     pub resemblance: f64,
@@ -171,7 +171,7 @@ pub struct sdg_evidence {
     pub details: f64,
     /// Table at places where the part should be.
     pub table: f64,
-    /// Share of the outline without an edge.
+    /// Fraction of the outline without an edge.
     pub rim: f64,
     /// Edges that are not in the photo.
     pub added: f64,
@@ -217,7 +217,7 @@ pub struct sdg_detection {
     pub frame: u32,
     /// 1 if it is accepted, 0 if it is refused.
     pub is_accepted: u32,
-    /// SDG_TURN_CROP, ...: the initial source of the turn.
+    /// SDG_TURN_CROP, ...: the initial source of the angle.
     pub turn_source: u32,
     /// Number of corners of the outline; see sdg_detections_polygon.
     pub num_polygon: u32,

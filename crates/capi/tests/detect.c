@@ -96,7 +96,7 @@ static void print_detection(sdg_handle detections, size_t idx) {
     if (!found.is_accepted) {
         printf("\"refused\":\"%s\",", found.refused);
     } else if (found.refused[0] != 0) {
-        fprintf(stderr, "expected no reason of an accepted detection, found %s\n", found.refused);
+        fprintf(stderr, "expected no reason for refusal of an accepted detection, found %s\n", found.refused);
         exit(1);
     }
     printf("\"turn_source\":\"%s\"}", turn_sources[found.turn_source]);

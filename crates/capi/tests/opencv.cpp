@@ -1,4 +1,4 @@
-// OpenCV's Mat, with blue first and, for a part of another Mat, with padded rows, in two threads that share a model.
+// Detects in OpenCV's Mat (blue first; padded rows in a part of another Mat), in two threads that share a model.
 // Prints the detections of each picture as written by the library. Usage: opencv MODEL PICTURE.ppm...
 #include <opencv2/core.hpp>
 #include <sdg.h>

@@ -1,4 +1,4 @@
-"""The C library: the same detections as from Rust and Python to the bit, no error or leak under valgrind, wrong input, the guide.
+"""Tests the C library: the same detections as from Rust and Python, to the bit; no error or leak under valgrind; wrong input; the guide.
 
 Models and pictures are those of python/tests.
 """
@@ -167,12 +167,12 @@ BAD_INPUT = {
     "region_kind": (1, "expected region_kind of SDG_REGION_OF_MODEL, _ALL or _PART, found 9"),
     "region": (6, "expected"),
     "camera_of_model_without": (5, "camera"),
-    "camera_is_model": (9, "which is that of a model"),
+    "camera_is_model": (9, ", the handle of a model"),
     "picture_null": (1, "expected a pointer as picture, found NULL"),
     "result_null": (1, "expected a pointer as detections, found NULL"),
-    "handle_none": (9, "expected the handle of a model, found 0, which is none"),
-    "handle_never_given": (9, "found 12345678, which was never given"),
-    "handle_of_camera": (9, "which is that of a camera"),
+    "handle_none": (9, "expected the handle of a model, found 0, which is no handle"),
+    "handle_never_given": (9, "found 12345678, which never existed"),
+    "handle_of_camera": (9, ", the handle of a camera"),
     "detect": (0, ""),
     "best": (0, ""),
     "best_null": (1, "expected a pointer as found, found NULL"),

@@ -1,6 +1,7 @@
 //! Times of a forward pass and a training step of the `edge` preset, part by part.
 //!
-//! `cargo run --release -p sdg-detection --features training --example profile -- [batch]`
+//! Usage: `cargo run --release -p sdg-detection --features training --example profile --
+//! [batch]`
 
 use std::time::Instant;
 
@@ -43,7 +44,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let found = valid.detect(&images[..1]);
         println!("detect, 1 image: {:.3} s, {} found", start.elapsed().as_secs_f64(), found[0].boxes.len());
     }
-    // The parts of a forward pass without gradients.
+    // The parts of a forward pass, without autodiff.
     let inner = Device::flex();
     let x = Tensor::<4>::zeros([batch, 3, 256, 320], &inner);
     for _ in 0..2 {

@@ -37,8 +37,8 @@ pub fn base_anchors(size_px: f64, config: &AnchorConfig) -> Vec<Corners> {
 
 /// The anchors of each level, in pixels of the padded image.
 ///
-/// `image_height`, `image_width` are those of the padded batch; they are used only by
-/// [`AnchorStride::ImageOverGrid`].
+/// `image_height` and `image_width` are those of the padded batch; only
+/// [`AnchorStride::ImageOverGrid`] uses them.
 pub fn grid_anchors(
     config: &AnchorConfig,
     grids: &[GridSize; 5],

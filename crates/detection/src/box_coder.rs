@@ -1,7 +1,7 @@
-//! Box deltas: a box relative to another, in numbers suitable for regression.
+//! Box deltas: a box relative to a reference box, as numbers suitable for regression.
 //!
-//! `dx = wx·(gx - ax)/aw`, `dy = wy·(gy - ay)/ah`, `dw = ww·ln(gw/aw)`, `dh = wh·ln(gh/ah)`, where
-//! `a` is the reference box (anchor or proposal), `g` the other, x and y are centres.
+//! `dx = wx·(gx - ax)/aw`, `dy = wy·(gy - ay)/ah`, `dw = ww·ln(gw/aw)`, `dh = wh·ln(gh/ah)`, where `a` is the reference
+//! box (anchor or proposal), `g` the target box, and x and y are centres.
 
 use crate::boxes::Corners;
 use crate::config::BoxCoderConfig;
@@ -83,7 +83,7 @@ mod tests {
             let coder = BoxCoder::new(&ROI);
             let back = coder.decode(&reference, &coder.encode(&reference, &target));
             for (b, t) in back.iter().zip(target) {
-                // Single precision over coordinates of a few hundred pixels.
+                // Rounding error of single precision at coordinates of a few hundred pixels.
                 prop_assert!((b - t).abs() < 2e-3, "{back:?} {target:?}");
             }
         }

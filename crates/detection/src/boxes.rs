@@ -1,6 +1,6 @@
 //! Boxes inside the detector: corners `[x1, y1, x2, y2]` in pixels of the resized image, `f32`.
 
-/// A box by its corners, pixels of the resized image.
+/// A box by its corners, in pixels of the resized image.
 pub type Corners = [f32; 4];
 
 /// Area; zero for a box without area.
@@ -22,7 +22,7 @@ pub fn clip(b: &Corners, width: f32, height: f32) -> Corners {
     [b[0].clamp(0.0, width), b[1].clamp(0.0, height), b[2].clamp(0.0, width), b[3].clamp(0.0, height)]
 }
 
-/// Whether both sides exceed `min_size` and no coordinate is infinite or not a number.
+/// Whether both sides exceed `min_size` and all coordinates are finite.
 pub fn is_usable(b: &Corners, min_size: f32) -> bool {
     b.iter().all(|v| v.is_finite()) && b[2] - b[0] > min_size && b[3] - b[1] > min_size
 }
@@ -34,7 +34,7 @@ mod tests {
 
     #[test]
     fn iou_of_a_quarter_overlap() {
-        // Two 2x2 boxes that share one cell: 1 / (4 + 4 - 1).
+        // Two 2x2 boxes with one common cell: 1 / (4 + 4 - 1).
         let value = iou(&[0.0, 0.0, 2.0, 2.0], &[1.0, 1.0, 3.0, 3.0]);
         assert!((value - 1.0 / 7.0).abs() < 1e-6);
         assert_eq!(iou(&[0.0; 4], &[0.0; 4]), 0.0);

@@ -1,8 +1,8 @@
 //! The configuration of a detector: every setting in which R-CNN implementations differ.
 //!
-//! This module computes nothing. Each enum names a choice that a bare bool or number would hide;
-//! the two values of most choices are Detectron2's and torchvision's. A configuration is plain data
-//! and serialises, so that a model file can contain the one of its training.
+//! This module computes nothing. Each enum names a choice that a bare bool or number would hide; the two values of most
+//! choices are Detectron2's and torchvision's. A configuration is plain data that can be serialised, so a model file
+//! can contain the configuration of its training.
 
 mod mask_head;
 mod roi_pooler;
@@ -16,7 +16,7 @@ pub use sdg_layers::NormKind;
 /// The whole detector.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RcnnConfig {
-    /// From the given image to the network's input.
+    /// Conversion of the given image to the network's input.
     pub input: ImageTransformConfig,
     /// The residual network, "bottom-up" of the feature pyramid.
     pub backbone: ResNetConfig,
@@ -51,11 +51,10 @@ pub enum PixelRange {
 /// How an image is resampled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ResizeFilter {
-    /// A triangle filter that widens when shrinking, rounded to bytes after each pass: Pillow's
-    /// `BILINEAR`, used by Detectron2.
+    /// A triangle filter that widens when shrinking, rounded to bytes after each pass: Pillow's `BILINEAR`, which
+    /// Detectron2 uses.
     AntialiasedBytes,
-    /// Two by two neighbours at any scale, not rounded: `torch.nn.functional.interpolate`, used by
-    /// torchvision.
+    /// Two by two neighbours at any scale, not rounded: `torch.nn.functional.interpolate`, which torchvision uses.
     Bilinear,
 }
 
@@ -64,23 +63,23 @@ pub enum ResizeFilter {
 pub enum ResizeRule {
     /// Short side to `short_px` unless the long side would exceed `max_long_px`.
     ShortSide {
-        /// Short side after resizing.
+        /// Short side after resizing, in pixels.
         short_px: u32,
-        /// Bound on the long side.
+        /// Maximum long side, in pixels.
         max_long_px: u32,
-        /// From the exact size to whole pixels.
+        /// Rounding of the exact size to whole pixels.
         rounding: SizeRounding,
     },
-    /// The largest size within `width_px` by `height_px`, rounded to nearest.
+    /// The largest size within `width_px` by `height_px`, rounded to the nearest pixel.
     FitWithin {
-        /// Bound on the width.
+        /// Maximum width, in pixels.
         width_px: u32,
-        /// Bound on the height.
+        /// Maximum height, in pixels.
         height_px: u32,
     },
 }
 
-/// From an exact size to whole pixels.
+/// Rounding of an exact size to whole pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum SizeRounding {
     /// `int(x + 0.5)`: Detectron2.
@@ -89,7 +88,7 @@ pub enum SizeRounding {
     Floor,
 }
 
-/// Resize, channel order, normalisation, padding.
+/// Resizing, channel order, normalisation and padding of images.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ImageTransformConfig {
     /// Size of the resized image.
@@ -104,11 +103,11 @@ pub struct ImageTransformConfig {
     pub mean: [f32; 3],
     /// Divides each channel, in `channel_order` and `pixel_range`.
     pub std: [f32; 3],
-    /// Width and height are padded with zeros (after normalisation) to multiples of this.
+    /// Width and height are padded with zeros (after normalisation) to multiples of this number.
     pub size_divisibility: usize,
 }
 
-/// Residual block.
+/// Kind of residual block.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum BlockKind {
     /// Two 3×3 convolutions: ResNet-18, -34.
@@ -117,7 +116,7 @@ pub enum BlockKind {
     Bottleneck {
         /// Channels of the inner convolutions in res2; doubled in each later stage.
         inner_channels: usize,
-        /// The position of the stride in a stage.
+        /// The convolution with the stride.
         stride_in: StrideIn,
     },
 }
@@ -142,7 +141,7 @@ pub enum Freeze {
     ThroughRes2,
     /// The stem, res2 and res3 are frozen.
     ThroughRes3,
-    /// The residual network, the pyramid and the region proposal network are frozen: the second stage alone is trained.
+    /// The residual network, the pyramid and the region proposal network are frozen; only the second stage is trained.
     FirstStage,
 }
 
@@ -151,11 +150,11 @@ pub enum Freeze {
 pub struct ResNetConfig {
     /// Channels after the 7×7 stem.
     pub stem_channels: usize,
-    /// Channels that res2 gives; doubled in each later stage.
+    /// Output channels of res2; doubled in each later stage.
     pub res2_channels: usize,
     /// Blocks in res2, res3, res4, res5.
     pub num_blocks: [usize; 4],
-    /// Basic or bottleneck, and where a bottleneck strides.
+    /// Kind of block, and the position of a bottleneck's stride.
     pub block: BlockKind,
     /// Norm after every convolution.
     pub norm: NormKind,
@@ -179,7 +178,7 @@ pub struct FpnConfig {
     pub norm: NormKind,
 }
 
-/// The base anchor's corners.
+/// Rounding of the base anchors' corners.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum AnchorRounding {
     /// As computed: Detectron2.
@@ -202,31 +201,31 @@ pub enum AnchorStride {
 pub struct AnchorConfig {
     /// Side of the square anchor on p2 to p6, in pixels of the resized image.
     pub sizes_px: [f64; 5],
-    /// Height over width.
+    /// Aspect ratios, height over width.
     pub aspect_ratios: Vec<f64>,
     /// Centre of the first anchor, in strides. Detectron2 and torchvision: 0.
     pub offset: f64,
     /// Rounding of the base anchors.
     pub rounding: AnchorRounding,
-    /// Distance between neighbours.
+    /// Distance between neighbouring anchors.
     pub stride: AnchorStride,
 }
 
-/// Weights of the box coder: dx, dy, dw, dh.
+/// Settings of the box coder.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct BoxCoderConfig {
     /// Factors on dx, dy, dw, dh.
     pub weights: [f64; 4],
 }
 
-/// The penalty on a difference of box deltas.
+/// Loss of a difference of box deltas.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum RegressionLoss {
     /// `|d|`.
     L1,
     /// `d² / (2 beta)` below `beta`, `|d| - beta/2` above.
     SmoothL1 {
-        /// Where the parabola meets the line.
+        /// Difference at which the parabola becomes a line.
         beta: f64,
     },
 }
@@ -236,54 +235,54 @@ pub enum RegressionLoss {
 pub enum RpnNormaliser {
     /// Nominal samples per image times images: Detectron2.
     NominalSamples,
-    /// Samples actually drawn: torchvision.
+    /// Number of sampled anchors: torchvision.
     DrawnSamples,
 }
 
-/// Thresholds by which a matcher makes boxes positive, negative, or ignored.
+/// Thresholds by which a matcher classifies boxes as positive, negative, or ignored.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct MatcherConfig {
     /// IoU below which a box is negative.
     pub negative_below: f64,
-    /// IoU from which a box is positive; between the two it is ignored.
+    /// Minimum IoU of a positive box; between the two thresholds a box is ignored.
     pub positive_from: f64,
-    /// Whether an object without a positive box takes its best boxes anyway.
+    /// Whether an object without a positive box is matched with its best boxes anyway.
     pub low_quality: LowQualityMatches,
 }
 
-/// Whether an object without a positive box takes its best boxes anyway.
+/// Whether an object without a positive box is matched with its best boxes anyway.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum LowQualityMatches {
-    /// They become positive: the region proposal network.
+    /// The best boxes become positive: the region proposal network.
     Allowed,
-    /// They stay unmatched: the ROI heads.
+    /// The best boxes stay unmatched: the ROI heads.
     Forbidden,
 }
 
-/// Number of boxes of an image in a loss.
+/// Number of boxes per image in a loss.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SamplerConfig {
     /// Boxes per image.
     pub batch_size_per_image: usize,
-    /// Largest positive share of them.
+    /// Maximum fraction of positive boxes.
     pub positive_fraction: f64,
 }
 
-/// A number that differs between training and inference.
+/// A number with different values for training and inference.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PerMode {
-    /// While training.
+    /// Value in training.
     pub train: usize,
-    /// In inference.
+    /// Value in inference.
     pub test: usize,
 }
 
 /// The region proposal network.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RpnConfig {
-    /// Matching of anchors to objects.
+    /// Thresholds for matching anchors to objects.
     pub matcher: MatcherConfig,
-    /// Anchors in the loss.
+    /// Number of anchors in the loss.
     pub sampler: SamplerConfig,
     /// Weights of the deltas from anchors, or from proposals, to boxes.
     pub box_coder: BoxCoderConfig,
@@ -293,7 +292,7 @@ pub struct RpnConfig {
     pub post_nms_top_n: PerMode,
     /// IoU above which the lower-scoring of two proposals of a level is dropped.
     pub nms_threshold: f64,
-    /// Proposals with a side of at most this are dropped, pixels.
+    /// Maximum side, in pixels, of the proposals that are dropped.
     pub min_box_size_px: f64,
     /// Loss on deltas.
     pub regression_loss: RegressionLoss,
@@ -324,15 +323,15 @@ pub enum BoxDeltas {
 pub struct RoiHeadsConfig {
     /// Object classes, without background.
     pub num_classes: usize,
-    /// Matching of proposals to objects.
+    /// Thresholds for matching proposals to objects.
     pub matcher: MatcherConfig,
-    /// Proposals in the loss.
+    /// Number of proposals in the loss.
     pub sampler: SamplerConfig,
-    /// Share of the negatives among them that are the proposals of the highest objectness; the others are drawn. At 0,
-    /// as in Detectron2 and torchvision, all are drawn, and most lie on the bare table.
+    /// Fraction of the sampled negatives that are the proposals with the highest objectness; the others are sampled at
+    /// random. At 0, as in Detectron2 and torchvision, all are sampled at random, and most are on the bare table.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub hard_negative_share: f64,
-    /// Classes and refined boxes of the proposals.
+    /// Settings of the head that computes classes and refined boxes of the proposals.
     pub box_head: BoxHeadConfig,
     /// The keypoint head, if the detector has one.
     pub keypoint_head: Option<KeypointHeadConfig>,
@@ -365,20 +364,20 @@ pub struct BoxHeadConfig {
     pub nms_threshold: f64,
     /// Detections kept per image.
     pub detections_per_image: usize,
-    /// Detections with a side of at most this are dropped, pixels of the resized image.
+    /// Maximum side, in pixels of the resized image, of the detections that are dropped.
     pub min_box_size_px: f64,
 }
 
-/// From heatmap to keypoint.
+/// Method of computing a keypoint from its heatmap.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum KeypointReadout {
-    /// The map is resized to the box's ceiling by a bicubic filter, and the centre of the highest
-    /// pixel taken: Detectron2 and torchvision.
+    /// The map is resized to the box's size, rounded up, by a bicubic filter, and the centre of the highest pixel is
+    /// the keypoint: Detectron2 and torchvision.
     BicubicArgmax,
-    /// The mean position under the map's softmax in a square of `2 radius + 1` cells around its
-    /// highest cell: finer than a cell, and cheaper.
+    /// The mean position, weighted by the map's softmax, in a square of `2 radius + 1` cells around its highest cell:
+    /// finer than a cell, and cheaper.
     LocalMean {
-        /// Cells on each side of the highest.
+        /// Number of cells on each side of the highest cell.
         radius: usize,
     },
 }
@@ -405,9 +404,9 @@ pub struct KeypointHeadConfig {
     pub max_train_rois_per_image: Option<usize>,
     /// Factor on the keypoint loss.
     pub loss_weight: f64,
-    /// From heatmap to keypoint.
+    /// Method of computing a keypoint from its heatmap.
     pub readout: KeypointReadout,
-    /// Which value of the heatmap's peak is the score.
+    /// The score of a keypoint.
     pub score: KeypointScore,
 }
 

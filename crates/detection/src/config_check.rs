@@ -1,4 +1,4 @@
-//! Whether a configuration can be built.
+//! Checks whether a detector can be built from a configuration.
 
 use crate::config::{NormKind, RcnnConfig, ResizeRule};
 use crate::error::{DetectionError, Result};
@@ -11,7 +11,7 @@ fn check(holds: bool, field: &'static str, expected: &str, found: impl ToString)
 }
 
 impl RcnnConfig {
-    /// Checks that every value is usable and that values that depend on each other agree.
+    /// Checks that every value is valid, and that values that depend on each other agree.
     ///
     /// # Errors
     /// [`DetectionError::Config`] names the first invalid field.

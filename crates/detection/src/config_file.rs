@@ -1,4 +1,4 @@
-//! A detector's configuration from JSON: complete, or as differences from a preset.
+//! Reads a detector's configuration from JSON, complete or as differences from a preset.
 
 use serde::Deserialize;
 use serde::de::IgnoredAny;
@@ -7,21 +7,21 @@ use crate::config::{BlockKind, RcnnConfig, ResizeRule};
 use crate::error::{DetectionError, Result};
 use crate::presets::{RcnnKind, r50_detectron2, r50_torchvision};
 
-/// Differences from a preset, with the keys of the reference outputs' `config.json`.
+/// Differences from a preset, with the keys of `config.json` in the reference outputs.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct PresetChanges {
     /// `faster`, `keypoint` or `mask`.
     kind: String,
-    /// `detectron2` (if absent) or `torchvision`.
+    /// `detectron2` (the default) or `torchvision`.
     numerics: Option<String>,
     classes: Option<usize>,
     keypoints: Option<usize>,
-    /// Short side of the network's input, pixels.
+    /// Short side of the network's input, in pixels.
     min_size_test: Option<u32>,
-    /// Bound on the long side.
+    /// Maximum long side, in pixels.
     max_size_test: Option<u32>,
-    /// For each level, in training and in inference.
+    /// Per level, in training and in inference.
     pre_nms_topk: Option<usize>,
     post_nms_topk_test: Option<usize>,
     post_nms_topk_train: Option<usize>,
@@ -36,7 +36,7 @@ struct PresetChanges {
     box_head_fc: Option<usize>,
     keypoint_convs: Option<usize>,
     mask_convs: Option<usize>,
-    /// The origin and the outputs of the reference: not used for building.
+    /// Origin and outputs of the reference, which are not used.
     #[serde(rename = "width")]
     _width: Option<IgnoredAny>,
     #[serde(rename = "seed")]
@@ -51,12 +51,12 @@ impl RcnnConfig {
     /// or [`r50_torchvision`] of that kind, such as `fpn_channels`.
     ///
     /// # Errors
-    /// [`DetectionError::ConfigFile`] gives the position of unreadable text; [`DetectionError::Config`] the
-    /// value that is out of range.
+    /// [`DetectionError::ConfigFile`] gives the position of unreadable text; [`DetectionError::Config`] gives
+    /// the value that is out of range.
     pub fn from_json(text: &str) -> Result<Self> {
         let failed = |error: serde_json::Error| DetectionError::ConfigFile { reason: error.to_string() };
         let value: serde_json::Value = serde_json::from_str(text).map_err(failed)?;
-        // Parsed again from the text, because only then do errors contain line and column.
+        // Parsed from the text a second time, because only then errors contain line and column.
         let config = if value.get("kind").is_some() {
             serde_json::from_str::<PresetChanges>(text).map_err(failed)?.applied()?
         } else {

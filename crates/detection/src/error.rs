@@ -5,7 +5,7 @@ use thiserror::Error;
 /// An input with which the detector cannot work. Each message gives the expected and the found value.
 #[derive(Debug, Error, Clone, PartialEq)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "the messages say what the fields are")]
+#[allow(missing_docs, reason = "the messages explain the fields")]
 pub enum DetectionError {
     /// A configuration value is outside its range, or two values contradict each other.
     #[error("detector configuration: {field} must be {expected}, found {found}")]
@@ -24,8 +24,8 @@ pub enum DetectionError {
         /// The unreadable part, and its position.
         reason: String,
     },
-    /// A batch holds another number of targets than of images.
-    #[error("a batch needs one target an image: expected {expected} targets, found {found}")]
+    /// A batch in which the numbers of targets and images differ.
+    #[error("a batch needs one target per image: expected {expected} targets, found {found}")]
     BatchSize { expected: usize, found: usize },
     /// The batch is empty.
     #[error("a training batch needs at least one image, found none")]

@@ -36,7 +36,7 @@ pub struct Fpn {
 }
 
 impl Fpn {
-    /// Draws the parameters, for stages with `stage_channels` channels.
+    /// Initialises the parameters at random, for stages with `stage_channels` channels.
     pub fn init(config: &FpnConfig, stage_channels: [usize; 4], init: &mut Initializer) -> Self {
         let mut conv = |in_channels, kernel| {
             let shape = Conv2dShape::new(in_channels, config.channels, kernel);
@@ -70,7 +70,7 @@ impl Fpn {
         let merged3 = lateral(&self.fpn_lateral3, res3, merged4.clone());
         let merged2 = lateral(&self.fpn_lateral2, res2, merged3.clone());
         let p5 = self.fpn_output5.forward(merged5);
-        // Max pooling with a kernel of one cell and stride 2.
+        // Max pooling with a kernel of one cell and stride 2 is subsampling.
         let p6 = p5.clone().slice(s![.., .., ..;2, ..;2]);
         [
             self.fpn_output2.forward(merged2),

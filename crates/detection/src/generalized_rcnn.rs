@@ -1,4 +1,4 @@
-//! The whole detector: transform, backbone, proposals, ROI heads, back to the original image.
+//! The whole detector: transform, backbone, proposals, ROI heads, and the conversion back to the original image.
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor, TensorData, read_sync};
@@ -40,24 +40,24 @@ impl Backbone {
 /// prefix `backbone.fpn.`, and `conv_fcn1`, `mask_fcn1` are called `conv_fcn.0`, `mask_fcn.0`.
 #[derive(Module, Debug)]
 pub struct GeneralizedRcnn {
-    /// From the image to feature maps.
+    /// Computes feature maps from the image.
     pub backbone: Backbone,
-    /// From feature maps to proposals.
+    /// Computes proposals from feature maps.
     pub proposal_generator: RegionProposalNetwork,
-    /// From proposals to detections.
+    /// Computes detections from proposals.
     pub roi_heads: RoiHeads,
     #[module(skip)]
     config: RcnnConfig,
 }
 
-/// A keypoint as detected, in pixels of the original image.
+/// A detected keypoint, in pixels of the original image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ScoredKeypoint {
-    /// Pixels, x right.
+    /// Position in pixels, x right.
     pub x: f64,
-    /// Pixels, y down.
+    /// Position in pixels, y down.
     pub y: f64,
-    /// See [`crate::config::KeypointScore`].
+    /// Score; see [`crate::config::KeypointScore`].
     pub score: f64,
 }
 
@@ -72,12 +72,12 @@ pub struct Detections {
     pub classes: Vec<usize>,
     /// Keypoints of each box; empty lists without a keypoint head.
     pub keypoints: Vec<Vec<ScoredKeypoint>>,
-    /// Mask of each box, as large as the image; none without a mask head.
+    /// Mask of each box, as large as the image; empty without a mask head.
     pub masks: Vec<Mask>,
 }
 
 impl RcnnConfig {
-    /// Builds the detector with parameters drawn from a seed.
+    /// Builds the detector with random parameters from a seed.
     ///
     /// For training the device must carry autodiff (`device.autodiff()`, feature `training`).
     ///
@@ -87,7 +87,7 @@ impl RcnnConfig {
         self.build(Initializer::new(device, seed))
     }
 
-    /// Builds the detector on `device` without initial values, for a caller that sets all parameters next.
+    /// Builds the detector on `device` without initial values, for a caller that then sets all parameters.
     ///
     /// # Errors
     /// A configuration that contradicts itself.
@@ -117,17 +117,17 @@ impl RcnnConfig {
 }
 
 impl GeneralizedRcnn {
-    /// The configuration that the detector was built from.
+    /// The configuration of the detector.
     pub fn config(&self) -> &RcnnConfig {
         &self.config
     }
 
-    /// The transform that images go through before [`Self::losses`] and [`Self::detect`].
+    /// The transform of images for [`Self::losses`] and [`Self::detect`].
     pub fn image_transform(&self) -> ImageTransform {
         ImageTransform::new(&self.config.input)
     }
 
-    /// The device that the parameters are on, autodiff included.
+    /// The device of the parameters, including autodiff.
     pub fn device(&self) -> Device {
         self.roi_heads.box_head.fc1.weight.val().device()
     }
@@ -142,24 +142,25 @@ impl GeneralizedRcnn {
 
     /// Returns the training losses of a batch.
     ///
-    /// `seed` draws the anchors and proposals in the losses; pass another one in each step. Images
-    /// without objects are allowed: they teach the background.
+    /// `seed` determines the sampled anchors and proposals; pass a different seed in each step. Images without objects
+    /// are allowed: they teach the background.
     ///
     /// # Errors
-    /// If images and targets differ in number, or a target contradicts the configuration.
+    /// Different numbers of images and targets, or a target that contradicts the configuration.
     pub fn losses(&self, images: &[TransformedImage], targets: &[Target], seed: u64) -> Result<Losses> {
         let targets = self.resized_targets(images, targets)?;
         Ok(self.losses_of_resized(images, &targets, seed))
     }
 
-    /// The same with targets in pixels of the resized images, unchecked.
+    /// Like [`Self::losses`], with targets in pixels of the resized images and without checks.
     pub(crate) fn losses_of_resized(
         &self,
         images: &[TransformedImage],
         targets: &[ResizedTarget],
         seed: u64,
     ) -> Losses {
-        // A stream for each image and purpose, so that the draws of one image do not change those of the others.
+        // A random stream for each image and purpose, so that the samples of one image do not affect those of the
+        // others.
         let rngs = |purpose: u128| -> Vec<Pcg64Mcg> {
             let state = |idx: usize| purpose << 64 | u128::from(seed.wrapping_add((idx as u64) << 40));
             (0..images.len()).map(|idx| Pcg64Mcg::from_seed((state(idx) << 1 | 1).to_le_bytes())).collect()
@@ -178,12 +179,12 @@ impl GeneralizedRcnn {
 
     /// Finds the objects in each image.
     ///
-    /// On a detector in training, call this on `valid()`, so that no gradients are recorded.
+    /// On a detector in training, call this method on `valid()`, so that no gradients are recorded.
     pub fn detect(&self, images: &[TransformedImage]) -> Vec<Detections> {
         read_sync(self.detect_async(images))
     }
 
-    /// [`Self::detect`], asynchronous; for browsers, which give access to results of a graphics card only in this way.
+    /// [`Self::detect`], asynchronous, for browsers, which give access to a graphics card's results only in this way.
     pub async fn detect_async(&self, images: &[TransformedImage]) -> Vec<Detections> {
         if images.is_empty() {
             return Vec::new();
@@ -196,7 +197,7 @@ impl GeneralizedRcnn {
         self.detections(images, &features, &proposals).await
     }
 
-    /// The second stage, converted to pixels of the original images.
+    /// The detections of the second stage, in pixels of the original images.
     pub(crate) async fn detections(
         &self,
         images: &[TransformedImage],

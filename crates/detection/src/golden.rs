@@ -5,8 +5,8 @@
 //! targets.* ─ losses.* ─ gradients.<parameter>                                   one step of training
 //! ```
 //!
-//! The reference is a list of tensors by these names. Tensors that it lacks are not compared. Detections are in
-//! pixels of the given image, targets in those of the resized image; polygons are x0 y0 x1 y1 …, one per box; masks
+//! The reference is a list of tensors with these names. Tensors that it lacks are not compared. Detections are in
+//! pixels of the given image, targets in pixels of the resized image; polygons are x0 y0 x1 y1 …, one per box; masks
 //! are 0 or 1.
 
 use std::fmt;
@@ -28,43 +28,42 @@ use crate::target::ObjectMask;
 use crate::target::ResizedTarget;
 use sdg_layers::state_dict::{StateDict, WeightTensor};
 
-/// Number of samples per image, large enough that every anchor and proposal enters the reference's losses: nothing is
-/// drawn.
+/// Number of samples per image, large enough that every anchor and proposal enters the losses, as in the reference.
 const ALL_SAMPLES: usize = 1_000_000;
 
-/// Gradients smaller than this share of the network's largest are zero except for rounding, for example that of a bias
-/// before a softmax over positions, since adding to all positions changes nothing. Relative to themselves they are
-/// noise.
+/// Gradients smaller than this fraction of the network's largest gradient are zero except for rounding, for example
+/// the gradient of a bias before a softmax over positions, because adding a constant to all positions changes nothing.
+/// Their relative differences are only noise.
 const NOISE_OF_GRADIENTS: f32 = 1e-6;
 
 /// Tolerances of a stage.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Tolerance {
-    /// Largest difference over the largest magnitude expected.
+    /// Maximum difference, relative to the largest expected magnitude.
     Relative(f64),
-    /// Largest difference, in the tensor's own unit.
+    /// Maximum difference, in the tensor's own unit.
     Absolute(f64),
-    /// Share of an image's pixels that may differ.
+    /// Maximum fraction of an image's pixels that differ.
     Pixels(f64),
 }
 
-/// One tensor compared.
+/// The comparison of one tensor.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StageDifference {
     /// Name in the reference.
     pub name: String,
-    /// Values compared.
+    /// Number of compared values.
     pub count: usize,
-    /// Largest difference; infinite where shapes differ or a value is not finite.
+    /// Maximum difference; infinite if shapes differ or a value is not finite.
     pub max_absolute: f64,
-    /// Largest difference over the largest magnitude expected.
+    /// Maximum difference, relative to the largest expected magnitude.
     pub max_relative: f64,
-    /// Largest difference that passes.
+    /// The tolerance of the difference.
     pub tolerance: Tolerance,
     /// Whether the difference is within the tolerance.
     pub passed: bool,
-    /// A further remark, such as two shapes that differ.
+    /// A further remark, for example about two different shapes.
     pub remark: Option<String>,
 }
 
@@ -103,7 +102,7 @@ impl fmt::Display for GoldenReport {
 }
 
 impl RcnnConfig {
-    /// The same with every anchor and proposal in the losses, as in the reference outputs.
+    /// The configuration with every anchor and proposal in the losses, as in the reference outputs.
     pub fn without_sampling(mut self) -> Self {
         self.rpn.sampler.batch_size_per_image = ALL_SAMPLES;
         self.roi_heads.sampler.batch_size_per_image = ALL_SAMPLES;
@@ -129,7 +128,7 @@ pub fn verify(detector: &GeneralizedRcnn, image: &RgbImage, reference: &StateDic
 }
 
 /// Runs `detector` on `image` and returns the tensors that [`verify`] would compare, as a reference for another device
-/// or another precision. If `targets` has the tensors for a training step, the result also contains the losses, the
+/// or another precision. If `targets` has the tensors of a training step, the result also contains the losses, the
 /// gradients of all parameters, and the targets themselves.
 ///
 /// # Errors
@@ -147,7 +146,7 @@ pub fn record(detector: &GeneralizedRcnn, image: &RgbImage, targets: &StateDict)
 struct Comparer<'a> {
     reference: &'a StateDict,
     stages: Vec<StageDifference>,
-    /// If present, found tensors are stored there and not compared.
+    /// If present, computed tensors are stored here instead of compared.
     recorded: Option<StateDict>,
 }
 
@@ -253,7 +252,7 @@ impl<'a> Comparer<'a> {
         }
     }
 
-    /// Positions and scores of the reference's `[N, K, 3]`, which have separate tolerances.
+    /// Compares positions and scores of the reference's `[N, K, 3]`, which have separate tolerances.
     fn keypoints(&mut self, found: &Detections) {
         let name = "detections.keypoints";
         if self.recorded.is_some() {
@@ -318,7 +317,7 @@ impl<'a> Comparer<'a> {
         Ok(())
     }
 
-    /// Masks of `count` objects: `targets.masks`, as large as the resized image, or else `targets.polygons`.
+    /// Masks of `count` objects from `targets.masks`, as large as the resized image, or else from `targets.polygons`.
     fn target_masks(&self, count: usize) -> Result<Vec<ObjectMask>> {
         let named = |name| self.reference.get(name).filter(|tensor| tensor.shape.first() == Some(&count));
         if let Some(WeightTensor { shape, values }) = named("targets.masks")
@@ -342,7 +341,7 @@ impl<'a> Comparer<'a> {
         Ok(values.chunks_exact((values.len() / count).max(1)).map(|row| polygon(row).into()).collect())
     }
 
-    /// The objects on which the reference was trained for one step.
+    /// The objects with which the reference was trained for one step.
     fn target(&self, config: &RcnnConfig) -> Result<ResizedTarget> {
         let get = |name: &'static str, columns: usize| -> Result<&[f32]> {
             let found = self.reference.get(name);
@@ -378,7 +377,7 @@ impl<'a> Comparer<'a> {
         let broken = |field, found: usize| DetectionError::Target {
             image_idx: 0,
             field,
-            expected: format!("{count}, one a box"),
+            expected: format!("{count}, one per box"),
             found: found.to_string(),
         };
         let heads = &config.roi_heads;
@@ -398,7 +397,7 @@ impl<'a> Comparer<'a> {
     }
 }
 
-/// Position and score of every keypoint of every detection.
+/// The largest magnitude of the values.
 fn largest(values: &[f32]) -> f32 {
     values.iter().fold(0.0, |most, value| most.max(value.abs()))
 }
@@ -407,7 +406,7 @@ fn keypoint_values(found: &Detections) -> Vec<f32> {
     found.keypoints.iter().flatten().flat_map(|k| [k.x as f32, k.y as f32, k.score as f32]).collect()
 }
 
-/// Collects the gradients that the reference has, or all.
+/// Collects the gradients in the reference, or all gradients.
 struct GradientVisitor<'a> {
     path: Vec<String>,
     gradients: &'a Gradients,

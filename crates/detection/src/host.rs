@@ -1,7 +1,8 @@
-//! From the device to the host: the input of host steps (top-k, NMS, decoding) has to be read first.
+//! Reads tensors from the device, for the steps on the host (top-k, NMS, decoding).
 //!
-//! Inference is written asynchronously, because a browser gives results of its graphics card only to asynchronous code.
-//! Elsewhere burn's `read_sync` makes an ordinary function of it, which panics in a browser with a graphics card.
+//! Inference is written asynchronously, because a browser gives the results of its graphics card only to asynchronous
+//! code. Elsewhere burn's `read_sync` makes an ordinary function of it; in a browser with a graphics card that function
+//! panics.
 
 use burn::tensor::{Tensor, Transaction, read_sync};
 
@@ -12,13 +13,13 @@ pub(crate) fn host_values<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
 
 /// [`host_values`], asynchronous.
 pub(crate) async fn read<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
-    let data = tensor.into_data_async().await.expect("what the device computes can be read");
-    data.try_to_vec_as::<f32>().expect("a float tensor reads as f32")
+    let data = tensor.into_data_async().await.expect("expected readable results of the device");
+    data.try_to_vec_as::<f32>().expect("expected f32 values of a float tensor")
 }
 
-/// Both at once, with one wait for the device.
+/// Reads two tensors with one wait for the device.
 pub(crate) async fn read_both<const D: usize, const E: usize>(a: Tensor<D>, b: Tensor<E>) -> [Vec<f32>; 2] {
     let read = Transaction::default().register(a).register(b).execute_async().await;
-    let read: [_; 2] = read.expect("what the device computes can be read").try_into().expect("two were requested");
-    read.map(|data| data.try_to_vec_as::<f32>().expect("a float tensor reads as f32"))
+    let read: [_; 2] = read.expect("expected readable results of the device").try_into().expect("expected two results");
+    read.map(|data| data.try_to_vec_as::<f32>().expect("expected f32 values of a float tensor"))
 }

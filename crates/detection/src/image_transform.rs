@@ -1,8 +1,8 @@
-//! From the given image to the network's input, and back.
+//! Converts the given image to the network's input, and boxes back.
 //!
-//! The transform runs on the host without tensors, so that threads that prepare batches can run it.
-//! Coordinates scale with the pixel edges: `x_resized = x_original · width_resized /
-//! width_original`, which holds for pixel centres at (0.5, 0.5).
+//! The transform runs on the host without tensors, so threads that prepare batches can run it. Coordinates
+//! scale with the pixel edges: `x_resized = x_original · width_resized / width_original`, which holds for
+//! pixel centres at (0.5, 0.5).
 
 use image::RgbImage;
 use sdg_geometry::BoundingBox;
@@ -34,7 +34,7 @@ pub struct TransformedImage {
 }
 
 impl ImageTransform {
-    /// A transform as configured.
+    /// A transform with the given configuration.
     pub fn new(config: &ImageTransformConfig) -> Self {
         Self { config: config.clone() }
     }
@@ -47,10 +47,11 @@ impl ImageTransform {
         self.apply_part(image, image.dimensions().into())
     }
 
-    /// The same for a part of an image of width and height `whole`, resized by the factor of the whole image.
+    /// Like [`Self::apply`], for a part of an image of width and height `whole`, resized by the factor of the
+    /// whole image.
     ///
     /// # Errors
-    /// As [`Self::apply`].
+    /// The errors of [`Self::apply`].
     pub fn apply_part(&self, image: &RgbImage, whole: [u32; 2]) -> Result<TransformedImage> {
         let (original_width, original_height) = image.dimensions();
         if original_width == 0 || original_height == 0 {
@@ -110,7 +111,7 @@ pub fn resized_size(rule: ResizeRule, width: u32, height: u32) -> (usize, usize)
     (round(w * scale), round(h * scale))
 }
 
-/// Width and height of a part of an image after the whole image was resized.
+/// Width and height of a part of an image when the whole image is resized.
 fn part_size(rule: ResizeRule, part: [u32; 2], whole: [u32; 2]) -> (usize, usize) {
     let (width, height) = resized_size(rule, whole[0], whole[1]);
     let side = |part: u32, whole: u32, resized: usize| {
@@ -126,13 +127,13 @@ impl TransformedImage {
         [self.width as f64 / self.original_width as f64, self.height as f64 / self.original_height as f64]
     }
 
-    /// A box of the original image in resized pixels.
+    /// Converts a box of the original image to resized pixels.
     pub fn resized_box(&self, original: &BoundingBox) -> Corners {
         let [sx, sy] = self.resized_from_original();
         [(original.x1 * sx) as f32, (original.y1 * sy) as f32, (original.x2 * sx) as f32, (original.y2 * sy) as f32]
     }
 
-    /// A box of the resized image in original pixels, clipped to the original image.
+    /// Converts a box of the resized image to original pixels, clipped to the original image.
     pub fn original_box(&self, resized: &Corners) -> BoundingBox {
         let [sx, sy] = self.resized_from_original();
         let [x1, y1, x2, y2] = resized.map(f64::from);

@@ -6,8 +6,8 @@
 //! ```
 //!
 //! Shapes: F hidden width, C channels, P side of a pooled square, K keypoints, M prototypes. h and f are the classified
-//! features; m, n, s, c, b and e, t are learnt in pretraining, for all parts together. Both are linear in h and f, so
-//! that they can be written as a row of the box predictor and a kernel of the keypoint head's transposed convolution.
+//! features; m, n, s, c, b and e, t are learnt in pretraining, for all parts together. Both results are linear in h and
+//! f, so they can be written as a row of the box predictor and a kernel of the keypoint head's transposed convolution.
 //!
 //! # Source
 //! Snell, Swersky and Zemel, Prototypical Networks for Few-shot Learning (2017); Qi, Brown and Lowe, Low-Shot Learning
@@ -32,14 +32,14 @@ const FIRST_SCALE: f64 = 0.05;
 /// Computes last layers from features.
 #[derive(Module, Debug)]
 pub struct Imprint {
-    /// For the box predictor.
+    /// Computes rows of the box predictor.
     pub class: ClassImprint,
-    /// For the keypoint head.
+    /// Computes kernels of the keypoint head.
     pub keypoint: KeypointImprint,
 }
 
 impl Imprint {
-    /// Draws the parameters for a box head of this many hidden values and a keypoint head of this many channels.
+    /// Initialises the parameters for a box head with `hidden` values and a keypoint head with `channels` channels.
     pub fn init(hidden: usize, channels: usize, init: &mut Initializer) -> Self {
         let class = ClassImprint::init(hidden, init);
         let mut constant = |count: usize, value| init.param([count], Distribution::Constant(value));
@@ -48,7 +48,7 @@ impl Imprint {
     }
 }
 
-/// A row of the box predictor from a prototype.
+/// Computes a row of the box predictor from a prototype.
 #[derive(Module, Debug)]
 pub struct ClassImprint {
     /// m, `[F]`.
@@ -64,7 +64,7 @@ pub struct ClassImprint {
 }
 
 impl ClassImprint {
-    /// Draws the parameters for this many hidden values.
+    /// Initialises the parameters for `hidden` values.
     pub fn init(hidden: usize, init: &mut Initializer) -> Self {
         let mut constant = |count: usize, value| init.param([count], Distribution::Constant(value));
         Self {
@@ -76,7 +76,7 @@ impl ClassImprint {
         }
     }
 
-    /// Weights `[M, F]` and biases `[M]` of the classes whose prototypes are `[M, F]`, against a background of zero.
+    /// Weights `[M, F]` and biases `[M]` of the classes with prototypes `[M, F]`, against a background score of zero.
     pub fn classifier(&self, prototypes: Tensor<2>) -> (Tensor<2>, Tensor<1>) {
         let [m, _] = prototypes.dims();
         let centred = prototypes - self.mean.val().unsqueeze();
@@ -86,7 +86,7 @@ impl ClassImprint {
     }
 }
 
-/// A kernel of the keypoint head from a descriptor.
+/// Computes a kernel of the keypoint head from a descriptor.
 #[derive(Module, Debug)]
 pub struct KeypointImprint {
     /// e, `[C]`.
@@ -96,14 +96,14 @@ pub struct KeypointImprint {
 }
 
 impl KeypointImprint {
-    /// Weights `[M, C]` of the keypoints whose descriptors are `[M, C]`.
+    /// Weights `[M, C]` of the keypoints with descriptors `[M, C]`.
     pub fn weights(&self, descriptors: Tensor<2>) -> Tensor<2> {
         (descriptors - self.mean.val().unsqueeze()) * self.scale.val().unsqueeze()
     }
 }
 
 /// Cells of a pooled square of `side` cells and their weights, for linear interpolation of the square at a keypoint;
-/// `None` if it is unlabelled or outside the box. Pixels of the resized image.
+/// `None` if the keypoint is unlabelled or outside the box. Coordinates are in pixels of the resized image.
 pub fn reading_weights(keypoint: &Keypoint, corners: &Corners, side: usize) -> Option<[(usize, f32); 4]> {
     let [x1, y1, x2, y2] = corners.map(f64::from);
     let is_inside = (x1..=x2).contains(&keypoint.x) && (y1..=y2).contains(&keypoint.y);
@@ -126,7 +126,7 @@ pub fn reading_weights(keypoint: &Keypoint, corners: &Corners, side: usize) -> O
     ])
 }
 
-/// Kernel of four cells that doubles a map linearly, in the form of the transposed convolution.
+/// Kernel of four cells that doubles a map by linear interpolation, in the form of the transposed convolution.
 const DOUBLING: [f32; 4] = [0.25, 0.75, 0.75, 0.25];
 
 /// Number of images evaluated at a time.
@@ -134,7 +134,8 @@ const BATCH: usize = 16;
 
 impl Imprint {
     /// Returns the last layers of a detector of one class, by the parameters' names: class scores, and keypoint maps
-    /// added to those of the detector. The first object of each image is a view; without one the result is empty.
+    /// that are added to the detector's maps. The first object of each image is a view; without any view the result is
+    /// empty.
     ///
     /// # Errors
     /// Targets that do not fit the images.
@@ -196,14 +197,14 @@ impl Imprint {
 /// The keypoint head's features at each keypoint, summed over views.
 #[derive(Default)]
 struct Descriptors {
-    /// `[K, C]`.
+    /// Sum of the features, `[K, C]`.
     sum: Option<Tensor<2>>,
     /// Number of views of each keypoint.
     counts: Vec<f32>,
 }
 
 impl Descriptors {
-    /// Adds views: `maps` `[R, C, P, P]`.
+    /// Adds views from `maps` `[R, C, P, P]`.
     fn add(&mut self, maps: Tensor<4>, rois: &[Roi], keypoints: &[Vec<Keypoint>]) {
         let [count, channels, side, _] = maps.dims();
         let num_keypoints = keypoints.first().map_or(0, Vec::len);
@@ -223,7 +224,7 @@ impl Descriptors {
         self.sum = Some(self.sum.take().map_or(read.clone(), |sum| sum + read));
     }
 
-    /// `[K, C]`; `None` if a keypoint was in no view.
+    /// Mean features `[K, C]`; `None` if a keypoint was in no view.
     fn means(self) -> Option<Tensor<2>> {
         let sum = self.sum.filter(|_| self.counts.iter().all(|count| *count > 0.0))?;
         let counts = Tensor::<1>::from_floats(self.counts.as_slice(), &sum.device()).reshape([self.counts.len(), 1]);
@@ -320,8 +321,8 @@ mod tests {
             assert_eq!(scores[2 * row + 1], 0.0);
         }
 
-        // The keypoint's kernel adds the product of the descriptor with the map, doubled as by the interpolation,
-        // except near the border, where the transposed convolution sees zeros.
+        // The keypoint's kernel adds the product of the descriptor with the map, doubled like the interpolation, except
+        // near the border, where the transposed convolution reads zeros.
         let [head, own_head] = [&detector, &imprinted].map(|d| d.roi_heads.keypoint_head.as_ref().unwrap());
         let maps = head.hidden(&features, &rois);
         let added = own_head.score_lowres.forward(maps.clone()) - head.score_lowres.forward(maps.clone());
@@ -361,7 +362,7 @@ mod tests {
     fn a_square_is_read_where_the_keypoint_lies() {
         let corners = [10.0, 20.0, 24.0, 34.0];
         let read = |x: f64, y: f64| reading_weights(&Keypoint::visible([x, y].into()), &corners, 14);
-        // The centre of a cell is that cell; between two cells both count.
+        // At the centre of a cell, only this cell counts; between two cells, both count.
         assert_eq!(read(13.5, 20.5).unwrap()[0], (3, 1.0));
         let [left, right, ..] = read(14.0, 20.5).unwrap();
         assert_eq!((left, right), ((3, 0.5), (4, 0.5)));

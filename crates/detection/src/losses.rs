@@ -56,7 +56,7 @@ pub fn binary_cross_entropy(logits: Tensor<1>, targets: &[f32]) -> Tensor<1> {
     binary_cross_entropies(logits, targets).sum()
 }
 
-/// The same with a weight for each.
+/// Binary cross-entropy of logits, each with a weight, summed.
 ///
 /// # Shapes
 /// - `logits`, `targets`, `weights`: `[S]`, targets from 0 to 1
@@ -79,7 +79,7 @@ fn binary_cross_entropies(logits: Tensor<1>, targets: &[f32]) -> Tensor<1> {
 /// - `targets`: `S` classes; `None` skips the row
 pub fn cross_entropy(logits: Tensor<2>, targets: &[Option<usize>]) -> Tensor<1> {
     let [rows, _] = logits.dims();
-    assert_eq!(rows, targets.len(), "one target for each row");
+    assert_eq!(rows, targets.len(), "expected one target per row");
     let device = logits.device();
     let idxs: Vec<i32> = targets.iter().map(|t| t.unwrap_or(0) as i32).collect();
     let idxs = Tensor::<2, Int>::from_data(TensorData::new(idxs, [rows, 1]), &device);

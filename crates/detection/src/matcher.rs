@@ -16,17 +16,16 @@ pub enum Match {
 
 /// Matches every candidate to the ground-truth box with the largest overlap.
 ///
-/// Without ground truth every candidate is negative. With [`LowQualityMatches::Allowed`], the
-/// candidates with the largest overlap of a ground-truth box are positive at any IoU; each is then
-/// matched to the box that it overlaps most itself, which may be another one (Detectron2 and
-/// torchvision agree in this).
+/// Without ground truth every candidate is negative. With [`LowQualityMatches::Allowed`], the candidates with the
+/// largest overlap with a ground-truth box are positive at any IoU; each of them is then matched to the box that it
+/// overlaps most, which may be a different one (Detectron2 and torchvision do the same).
 pub fn match_boxes(candidates: &[Corners], gt_boxes: &[Corners], config: &MatcherConfig) -> Vec<Match> {
     if gt_boxes.is_empty() {
         return vec![Match::Negative; candidates.len()];
     }
     let mut matched_idxs = vec![0usize; candidates.len()];
     let mut best_iou = vec![0f32; candidates.len()];
-    // Few of the tens of thousands of anchors touch an object: the overlaps of the others, all 0, are not computed.
+    // Few of the tens of thousands of anchors touch an object; the other overlaps are 0 and not computed.
     let touching: Vec<Vec<(usize, f32)>> = gt_boxes
         .iter()
         .map(|gt| {
@@ -58,7 +57,7 @@ pub fn match_boxes(candidates: &[Corners], gt_boxes: &[Corners], config: &Matche
     if config.low_quality == LowQualityMatches::Allowed {
         for overlaps in &touching {
             let best = overlaps.iter().fold(0f32, |best, &(_, overlap)| best.max(overlap));
-            // For an object outside every candidate the best overlap is 0 with all of them.
+            // For an object that touches no candidate, the best overlap is 0 for all of them.
             if best <= 0.0 {
                 continue;
             }
@@ -70,7 +69,7 @@ pub fn match_boxes(candidates: &[Corners], gt_boxes: &[Corners], config: &Matche
     matches
 }
 
-/// Whether two boxes share any area.
+/// Whether two boxes have a common area.
 fn touch(a: &Corners, b: &Corners) -> bool {
     a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3]
 }

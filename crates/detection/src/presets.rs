@@ -1,4 +1,4 @@
-//! Ready configurations.
+//! Presets of the detector's configuration.
 
 mod detectron2;
 mod edge;
@@ -26,7 +26,7 @@ pub enum RcnnKind {
     },
     /// Boxes and keypoints of one class.
     Keypoint {
-        /// Keypoints of an object.
+        /// Number of keypoints per object.
         num_keypoints: usize,
     },
     /// Boxes, classes and masks.

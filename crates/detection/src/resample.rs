@@ -1,11 +1,12 @@
-//! Two resizing methods, each (nearly) bit for bit equal to a reference implementation.
+//! Two resizing methods, each equal or nearly equal to a reference implementation, bit for bit.
 
 use image::RgbImage;
 
 /// Fraction bits of Pillow's fixed-point filter coefficients.
 const PRECISION_BITS: u32 = 22;
 
-/// One output position of a separable filter: the first input and the weights from there.
+/// One output position of a separable filter: the first input and the weights of it and the
+/// following inputs.
 struct Taps {
     first: usize,
     weights: Vec<i32>,
@@ -80,7 +81,7 @@ pub fn antialiased_bytes(image: &RgbImage, width: usize, height: usize) -> Vec<u
     resized
 }
 
-/// Resizes by the two by two nearest pixels, not rounded, 0 to 255.
+/// Resizes by interpolation between the two by two nearest pixels, not rounded, from 0 to 255.
 ///
 /// Returns interleaved RGB, `[height, width, 3]`.
 ///

@@ -23,7 +23,7 @@ pub struct Stem {
 }
 
 impl Stem {
-    /// `[N, 3, H, W]` to `[N, C, H/4, W/4]`.
+    /// Computes `[N, C, H/4, W/4]` from `[N, 3, H, W]`.
     fn forward(&self, x: Tensor<4>) -> Tensor<4> {
         max_pool2d(self.conv1.forward_relu(x), MaxPool2dParams { kernel: [3, 3], stride: [2, 2], padding: [1, 1] })
     }
@@ -70,7 +70,7 @@ impl ResidualBlock {
         Self { conv1, conv2, conv3, shortcut }
     }
 
-    /// `[N, C_in, H, W]` to `[N, C_out, H/stride, W/stride]`.
+    /// Computes `[N, C_out, H/stride, W/stride]` from `[N, C_in, H, W]`.
     fn forward(&self, x: Tensor<4>) -> Tensor<4> {
         let identity = match &self.shortcut {
             Some(shortcut) => shortcut.forward(x.clone()),
@@ -100,7 +100,7 @@ pub struct ResNet {
 }
 
 impl ResNet {
-    /// Draws the parameters and freezes the configured part.
+    /// Initialises the parameters at random and freezes the configured part.
     pub fn init(config: &ResNetConfig, init: &mut Initializer) -> Self {
         let shape = Conv2dShape::new(3, config.stem_channels, 7).with_stride(2);
         let stem = Stem { conv1: shape.init(Distribution::he_normal(shape.fan_out()), config.norm, init) };

@@ -1,4 +1,5 @@
-//! Crops of one size from the pyramid, each from the level that matches its box's size.
+//! Pools boxes into crops of one size, each from the pyramid level that matches the box's
+//! size.
 
 use burn::tensor::{Tensor, TensorData};
 use sdg_kernels::{RoiAlignParams, permute_maps, roi_align};
@@ -7,15 +8,15 @@ use crate::anchors::LEVEL_STRIDES;
 use crate::boxes::{Corners, area};
 use crate::config::{LevelEpsilon, RoiAlignment, RoiPoolerConfig, SamplingRatio};
 
-/// Levels from which boxes are pooled: p2 to p5.
+/// Pyramid levels from which boxes are pooled: p2 to p5.
 const POOLED_LEVELS: std::ops::RangeInclusive<usize> = 2..=5;
 
 /// A box and its image in the batch.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Roi {
-    /// Index in the batch.
+    /// Index of the image in the batch.
     pub image_idx: usize,
-    /// Pixels of the resized image.
+    /// The box, in pixels of the resized image.
     pub corners: Corners,
 }
 
@@ -38,7 +39,7 @@ pub fn assign_level(corners: &Corners, config: &RoiPoolerConfig) -> usize {
 /// - `features`: p2 to p6 (p6 is not used), `[N, C, H_l, W_l]`
 /// - output: `[R, C, S, S]`, R > 0
 pub fn pool(features: &[Tensor<4>; 5], rois: &[Roi], config: &RoiPoolerConfig) -> Tensor<4> {
-    assert!(!rois.is_empty(), "at least one ROI");
+    assert!(!rois.is_empty(), "expected at least one ROI");
     let device = features[0].device();
     let mut of_level: [Vec<usize>; 4] = Default::default();
     for (idx, roi) in rois.iter().enumerate() {
@@ -78,7 +79,7 @@ pub fn pool(features: &[Tensor<4>; 5], rois: &[Roi], config: &RoiPoolerConfig) -
     for (row, roi) in order.iter().enumerate() {
         row_of_roi[*roi] = row;
     }
-    // Used in their memory order, channels last, so that whole crops are copied.
+    // Channels last, the order of the crops in memory, so that whole crops are copied.
     let pooled = pooled.into_iter().map(|crops| crops.permute([0, 2, 3, 1])).collect();
     permute_maps(Tensor::cat(pooled, 0), &row_of_roi).permute([0, 3, 1, 2])
 }

@@ -1,11 +1,13 @@
-//! The region proposal network: a score and a box for every anchor, then the best few.
+//! The region proposal network: computes a score and a box for every anchor, then selects the best
+//! ones.
 //!
 //! Shapes: N images, C channels, A anchors per cell, L anchors of an image over all levels, in the
 //! order level, row, column, aspect ratio.
 //!
-//! Glossary: *objectness logits* are the scores of the anchors before the sigmoid; *deltas* lead
-//! from an anchor to a box; *proposals* are the boxes that remain after top-k and NMS. The network
-//! runs on the device; anchors, matching, decoding and NMS run on the host, after one read each.
+//! Glossary: *objectness logits* are the scores of the anchors before the sigmoid; *deltas*
+//! describe a box relative to its anchor; *proposals* are the boxes that remain after top-k and
+//! NMS. The network runs on the device; anchors, matching, decoding and NMS run on the host, after
+//! one read each.
 
 use burn::module::Module;
 use burn::tensor::{Int, Tensor, read_sync};
@@ -24,7 +26,7 @@ use crate::sampler::sample;
 /// Standard deviation of the initial weights, in every layer of the head.
 const HEAD_STD: f64 = 0.01;
 
-/// The convolutions that run over every level.
+/// The convolutions that are applied to every level.
 #[derive(Module, Debug)]
 pub struct RpnHead {
     /// 3×3.
@@ -35,10 +37,10 @@ pub struct RpnHead {
     pub anchor_deltas: Conv2d,
 }
 
-/// Scores every anchor and moves it onto an object: boxes that may contain one.
+/// Computes a score and a box for every anchor, and proposals from them.
 #[derive(Module, Debug)]
 pub struct RegionProposalNetwork {
-    /// Convolutions that all levels share.
+    /// Convolutions with the same parameters for all levels.
     pub rpn_head: RpnHead,
     #[module(skip)]
     config: RpnConfig,
@@ -49,11 +51,11 @@ pub struct RegionProposalNetwork {
 /// The head's output for a batch, with its anchors.
 #[derive(Debug, Clone)]
 pub struct RpnPredictions {
-    /// `[N, L]`.
+    /// Objectness of each anchor, `[N, L]`.
     pub objectness_logits: Tensor<2>,
-    /// `[N, L, 4]`.
+    /// Deltas of each anchor, `[N, L, 4]`.
     pub deltas: Tensor<3>,
-    /// Anchors of each level; L in all.
+    /// Anchors of each level, L in total.
     pub anchors: [Vec<Corners>; 5],
 }
 
@@ -62,7 +64,7 @@ pub struct RpnPredictions {
 pub struct Proposals {
     /// Boxes in pixels of the resized image.
     pub boxes: Vec<Corners>,
-    /// One logit per anchor, in the order of the anchors.
+    /// One logit per box, in the order of the boxes.
     pub objectness_logits: Vec<f32>,
 }
 
@@ -79,7 +81,7 @@ pub enum Mode {
 }
 
 impl RegionProposalNetwork {
-    /// Draws the parameters for a pyramid of `channels` channels.
+    /// Initialises the parameters at random, for a pyramid of `channels` channels.
     pub fn init(config: &RpnConfig, anchors: &AnchorConfig, channels: usize, init: &mut Initializer) -> Self {
         let num_anchors = anchors.aspect_ratios.len();
         let normal = Distribution::Normal { std: HEAD_STD };
@@ -97,7 +99,7 @@ impl RegionProposalNetwork {
         }
     }
 
-    /// Runs the head over every level.
+    /// Applies the head to every level.
     ///
     /// # Shapes
     /// - `features`: p2 to p6, `[N, C, H_l, W_l]`
@@ -125,7 +127,8 @@ impl RegionProposalNetwork {
         }
     }
 
-    /// Selects the proposals of each image: best anchors of each level, decoded, clipped, NMS.
+    /// Selects the proposals of each image: the best anchors of each level, decoded, clipped,
+    /// after NMS.
     pub fn propose(&self, predictions: &RpnPredictions, image_sizes: &[ImageSize], mode: Mode) -> Vec<Proposals> {
         read_sync(self.propose_async(predictions, image_sizes, mode))
     }
@@ -169,7 +172,7 @@ impl RegionProposalNetwork {
                 let at = (start + idx) * 4;
                 let delta = [deltas[at], deltas[at + 1], deltas[at + 2], deltas[at + 3]];
                 let decoded = coder.decode(&level_anchors[idx], &delta);
-                // Infinite corners would survive clipping as the whole image.
+                // Clipping would turn infinite corners into the whole image.
                 if !is_usable(&decoded, f32::NEG_INFINITY) {
                     continue;
                 }
@@ -193,7 +196,8 @@ impl RegionProposalNetwork {
 
     /// Returns the losses on objectness and deltas.
     ///
-    /// `gt_boxes` of each image in pixels of the resized image; `rngs` draws the anchors of each.
+    /// `gt_boxes` of each image are in pixels of the resized image; `rngs` has the random numbers
+    /// for sampling the anchors of each image.
     pub fn losses(
         &self,
         predictions: RpnPredictions,
@@ -238,7 +242,7 @@ impl RegionProposalNetwork {
     }
 }
 
-/// Indices of the `k` largest values, largest first; equal ones in their order.
+/// Indices of the `k` largest values, largest first; equal values keep their order.
 fn top_k(values: &[f32], k: usize) -> Vec<usize> {
     let mut order: Vec<usize> = (0..values.len()).filter(|i| !values[*i].is_nan()).collect();
     let by_value = |a: &usize, b: &usize| values[*b].total_cmp(&values[*a]).then(a.cmp(b));

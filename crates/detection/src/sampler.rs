@@ -1,4 +1,4 @@
-//! Selection of the matched boxes in a loss.
+//! Samples the matches that enter a loss.
 
 use rand::seq::SliceRandom;
 use rand_pcg::Pcg64Mcg;
@@ -6,7 +6,7 @@ use rand_pcg::Pcg64Mcg;
 use crate::config::SamplerConfig;
 use crate::matcher::Match;
 
-/// Indices drawn from a list of matches.
+/// Indices sampled from a list of matches.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Sampled {
     /// Indices of the positive samples.
@@ -15,15 +15,15 @@ pub struct Sampled {
     pub negative: Vec<usize>,
 }
 
-/// Draws positives up to the configured fraction and fills up with negatives.
+/// Samples positives up to the configured fraction, and negatives for the rest.
 ///
-/// If everything fits, all are taken in order and the generator is not used.
+/// If there are no more boxes than needed, all are taken in order and the generator is not used.
 pub fn sample(matches: &[Match], config: &SamplerConfig, rng: &mut Pcg64Mcg) -> Sampled {
     sample_with_first(matches, config, 0.0, rng)
 }
 
-/// [`sample`] with a share of the negatives taken from the start of the list, which for proposals are those of the
-/// highest objectness.
+/// Like [`sample`], with the fraction `first_share` of the negatives taken from the start of the list, which for
+/// proposals has the highest objectness.
 pub fn sample_with_first(matches: &[Match], config: &SamplerConfig, first_share: f64, rng: &mut Pcg64Mcg) -> Sampled {
     let mut positive = Vec::new();
     let mut negative = Vec::new();
@@ -44,7 +44,7 @@ pub fn sample_with_first(matches: &[Match], config: &SamplerConfig, first_share:
     Sampled { positive, negative }
 }
 
-/// Keeps `count` of `idxs`, drawn without replacement.
+/// Keeps `count` of `idxs`, sampled without replacement.
 pub fn draw(idxs: &mut Vec<usize>, count: usize, rng: &mut Pcg64Mcg) {
     if idxs.len() > count {
         let (kept, _) = idxs.partial_shuffle(rng, count);

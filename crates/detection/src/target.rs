@@ -1,4 +1,4 @@
-//! The objects in an image, and the same in pixels of the resized image.
+//! The objects in an image, in pixels of the original and of the resized image.
 
 use sdg_geometry::{BoundingBox, Keypoint, Mask, Polygon};
 
@@ -10,7 +10,7 @@ use crate::image_transform::TransformedImage;
 /// The objects in one image, in pixels of the original image.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Target {
-    /// Boxes; none for an image without objects.
+    /// Boxes; empty for an image without objects.
     pub boxes: Vec<BoundingBox>,
     /// Class of each box, from 0.
     pub labels: Vec<usize>,
@@ -23,7 +23,7 @@ pub struct Target {
 /// The objects of one image, in pixels of the resized image.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ResizedTarget {
-    /// One box per object, in pixels of the resized image.
+    /// Boxes, in pixels of the resized image.
     pub boxes: Vec<Corners>,
     /// Class of each box.
     pub labels: Vec<usize>,
@@ -36,7 +36,7 @@ pub struct ResizedTarget {
 /// The area of an image that an object covers.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ObjectMask {
-    /// The union of these, in pixels.
+    /// The union of these polygons, in pixels.
     Polygons(Vec<Polygon>),
     /// A bit per pixel, of the image's size.
     Bitmap(Mask),
@@ -64,7 +64,8 @@ impl ObjectMask {
             }
             Self::Bitmap(mask) => mask,
         };
-        // Pillow takes the pixel under the centre, torch the one under the corner.
+        // Pillow takes the pixel below the new pixel's centre, torch the pixel below its
+        // corner.
         let offset = match kind {
             MaskTargets::Rasterized => 0.5,
             MaskTargets::Pooled => 0.0,
@@ -83,7 +84,7 @@ impl Target {
             |field, expected: String, found: String| Err(DetectionError::Target { image_idx, field, expected, found });
         let count = self.boxes.len();
         if self.labels.len() != count {
-            return fail("labels", format!("{count}, one a box"), self.labels.len().to_string());
+            return fail("labels", format!("{count}, one per box"), self.labels.len().to_string());
         }
         if let Some(label) = self.labels.iter().find(|l| **l >= heads.num_classes) {
             return fail("labels", format!("classes below {}", heads.num_classes), label.to_string());
@@ -96,7 +97,7 @@ impl Target {
         }
         if let Some(head) = &heads.keypoint_head {
             if self.keypoints.len() != count {
-                return fail("keypoints", format!("{count}, one list a box"), self.keypoints.len().to_string());
+                return fail("keypoints", format!("{count}, one list per box"), self.keypoints.len().to_string());
             }
             for keypoints in &self.keypoints {
                 if keypoints.len() != head.num_keypoints {
@@ -110,7 +111,7 @@ impl Target {
         }
         if heads.mask_head.is_some() {
             if self.masks.len() != count {
-                return fail("masks", format!("{count}, one a box"), self.masks.len().to_string());
+                return fail("masks", format!("{count}, one per box"), self.masks.len().to_string());
             }
             for mask in &self.masks {
                 match mask {
@@ -140,7 +141,7 @@ impl Target {
         Ok(())
     }
 
-    /// The target in pixels of the resized image.
+    /// Converts the target to pixels of the resized image.
     pub(crate) fn resized(&self, image: &TransformedImage, heads: &RoiHeadsConfig) -> ResizedTarget {
         let [sx, sy] = image.resized_from_original();
         let scaled =
@@ -157,7 +158,7 @@ impl Target {
     }
 }
 
-/// The pixels whose centres lie in any of the polygons.
+/// The pixels whose centres are in any of the polygons.
 pub(crate) fn union(polygons: &[Polygon], width: u32, height: u32) -> Mask {
     let parts: Vec<Mask> = polygons.iter().map(|polygon| polygon.rasterize(width, height)).collect();
     Mask::from_fn(width, height, |x, y| parts.iter().any(|part| part.get(x, y)))

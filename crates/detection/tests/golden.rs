@@ -74,7 +74,7 @@ fn renamed(name: &str) -> String {
         name = name.replace(&format!("mask_head.{level}.0."), &format!("mask_head.mask_fcn.{level}."));
     }
     for layer in 0..8 {
-        // torchvision numbers the activations in between, too.
+        // torchvision also numbers the activations between them.
         let theirs = format!("keypoint_head.{}.", 2 * layer);
         name = name.replace(&theirs, &format!("keypoint_head.conv_fcn.{layer}."));
     }
@@ -99,7 +99,7 @@ fn agrees(folder: &Path) {
     agrees_but_for(folder, &|_| false);
 }
 
-/// As `agrees`; a stage outside its tolerance may be excused.
+/// Like `agrees`, but a stage outside its tolerance may be excused.
 fn agrees_but_for(folder: &Path, excused: &dyn Fn(&StageDifference) -> bool) {
     let report = compared(&detector(folder), folder);
     println!("{}\n{report}", folder.display());
@@ -141,16 +141,15 @@ fn torchvision_mask_agrees_at_every_stage() {
     agrees(&golden("torchvision/mask"));
 }
 
-/// Relative difference of a gradient from the one in double precision.
+/// Maximum relative difference of a gradient from double precision.
 ///
-/// In a whole network some of millions of activations lie within rounding of zero, and a ReLU lets a gradient through
-/// in one precision and not in the other. So torch's own single precision differs by up to 1.65e-3 from its double
-/// precision (after the keypoint head's eight convolutions with a ReLU each), ours by 1.1e-3, and the two differ by
-/// 1.7e-3. Both are therefore compared with double precision: ours must be within the required bound, or at least as
-/// close as torch's.
+/// In a whole network some of millions of activations are within rounding of zero, and a ReLU passes a gradient in one
+/// precision and not in the other. So torch's own single precision differs by up to 1.65e-3 from its double precision
+/// (after the keypoint head's eight convolutions with a ReLU each), ours by 1.1e-3, and the two differ by 1.7e-3.
+/// Therefore both are compared with double precision: ours must be within this bound, or at least as close as torch's.
 const WHOLE_GRADIENTS: f64 = 1e-3;
 
-/// The largest difference over the largest magnitude expected.
+/// The maximum difference, relative to the largest expected magnitude.
 fn relative_difference(found: &WeightTensor, expected: &WeightTensor) -> f64 {
     assert_eq!(found.shape, expected.shape);
     assert!(found.values.iter().all(|value| value.is_finite()));

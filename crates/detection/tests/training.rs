@@ -1,4 +1,4 @@
-//! A small detector learns, repeatably, and every parameter contributes.
+//! Tests that a small detector learns, that the result is repeatable, and that every parameter contributes.
 
 use burn::module::{Module, ModuleVisitor, Param};
 use burn::optim::{AdamWConfig, GradientsParams};
@@ -11,7 +11,7 @@ use sdg_geometry::{BoundingBox, GraspLine, Mask, Polygon};
 
 const NUM_KEYPOINTS: usize = 3;
 
-/// `edge`, shrunk to fit a test: fewer channels and pixels, the same structure.
+/// `edge`, reduced for a test: fewer channels and pixels, the same structure.
 fn tiny() -> RcnnConfig {
     tiny_of(RcnnKind::Keypoint { num_keypoints: NUM_KEYPOINTS })
 }
@@ -87,7 +87,7 @@ fn a_tiny_detector_learns_one_image() {
     assert!(found.scores[0] > 0.5, "score {}", found.scores[0]);
     for (keypoint, wanted) in found.keypoints[0].iter().zip(&target.keypoints[0]) {
         let distance = (keypoint.x - wanted.x).hypot(keypoint.y - wanted.y);
-        // A tenth of the bar's length.
+        // Maximum distance: a tenth of the bar's length.
         assert!(distance < 10.0, "{keypoint:?} is {distance} px from {wanted:?}");
     }
 }
@@ -98,7 +98,7 @@ fn a_tiny_mask_detector_learns_one_image() {
     let mut detector = tiny_of(RcnnKind::Mask { num_classes: 1 }).init(&device, 3).unwrap();
     let (image, target) = scene();
     let images = [transformed(&detector, &image)];
-    // The lower right half of the bar, which a box alone does not determine.
+    // The lower right half of the bar, which the box alone does not determine.
     let corners = [[160.0, 70.0], [160.0, 110.0], [60.0, 110.0]];
     let triangle = Polygon { vertices: corners.map(Into::into).to_vec() };
     let targets = [Target { masks: vec![triangle.clone().into()], ..target }];
@@ -128,7 +128,7 @@ fn a_bitmap_teaches_as_its_polygon_does() {
     let bitmap = loss(polygon.rasterize(256, 192).into());
     let empty = loss(Mask::empty(256, 192).into());
     let polygon = loss(polygon.into());
-    // An initial network is undecided, ln 2 per cell, so that the difference is the sum over the cells that differ.
+    // An initial network is undecided, with ln 2 per cell, so the difference is the sum over the cells that differ.
     assert!((bitmap - polygon).abs() < 0.1 * (empty - polygon).abs(), "{bitmap} {polygon} {empty}");
 }
 
@@ -150,7 +150,7 @@ fn the_seed_decides_every_bit() {
     assert_ne!(run(1, 1), run(1, 2));
 }
 
-/// Parameters by path, and whether a gradient reached them.
+/// Parameters by path, and those that a gradient reached.
 struct GradientCheck<'a> {
     path: Vec<String>,
     gradients: &'a Gradients,

@@ -12,14 +12,14 @@ use crate::folder::folder_of;
 /// Writes `bytes` to `path` so that a reader sees either the old or the new contents, never a part.
 ///
 /// # Errors
-/// Those of [`AtomicFile`]. In each case the file at `path` is unchanged.
+/// The errors of [`AtomicFile`]. In each case the file at `path` is unchanged.
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
     let mut file = AtomicFile::create(path)?;
     file.as_file().write_all(bytes).map_err(failed(path, "writing"))?;
     file.commit()
 }
 
-/// A file that gets its name when it is complete; if it is dropped before, nothing remains.
+/// A file that gets its name when it is complete; if it is dropped before that, nothing remains.
 ///
 /// The bytes are written to a hidden temporary file in the same folder, flushed to the disk, and the file is renamed in
 /// one step. A symbolic link at the path is followed, so the link is kept. The folder must exist.
@@ -31,7 +31,7 @@ pub struct AtomicFile {
 }
 
 impl AtomicFile {
-    /// Begins a file at this path.
+    /// Starts a file at this path.
     ///
     /// # Errors
     /// [`FileError::NotAFile`] when `path` cannot name a file, [`FileError::Write`] when the folder is missing or read-only.

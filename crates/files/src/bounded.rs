@@ -46,7 +46,7 @@ mod tests {
     fn larger_than_allowed_is_refused() {
         let error = read(Path::new(env!("CARGO_MANIFEST_PATH")), 3).unwrap_err();
         assert!(error.to_string().contains("expected at most 3 bytes"));
-        // By its length, before any of it is read.
+        // The length is checked before any of the file is read.
         assert!(matches!(error, FileError::TooLarge { found: Some(1..), .. }), "{error}");
         let error = read_bounded([0; 4].as_slice(), Path::new("standard input"), 3).unwrap_err();
         assert_eq!(error.to_string(), "standard input: expected at most 3 bytes, found more");

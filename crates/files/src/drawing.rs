@@ -1,5 +1,5 @@
-//! PNG files marked in their text as drawings of this program, so that a drawing may replace another one but never a
-//! photo.
+//! PNG files that are marked in their text as drawings of this program, so that a drawing may replace another
+//! drawing but never a photo.
 
 use std::fs::File;
 use std::io::Read;
@@ -13,13 +13,13 @@ use crate::inputs;
 
 const KEYWORD: &str = "Software";
 const TEXT: &str = "sdg drawing";
-/// The text precedes the pixels and follows 33 bytes of signature and size.
+/// Maximum end of the text, which precedes the pixels and follows 33 bytes of signature and size.
 const MAX_TEXT_END: u64 = 100;
 
 /// Writes a picture as PNG, atomically, never over an input or a file of another kind.
 ///
 /// # Errors
-/// As [`crate::write`].
+/// The errors of [`crate::write`].
 pub fn write_png(path: &Path, picture: &RgbImage) -> Result<()> {
     let mut bytes = std::io::Cursor::new(Vec::new());
     let encoded = picture.write_to(&mut bytes, image::ImageFormat::Png);
@@ -30,7 +30,7 @@ pub fn write_png(path: &Path, picture: &RgbImage) -> Result<()> {
 /// Writes a drawing atomically.
 ///
 /// # Errors
-/// The path is an input, or a picture that is not a drawing of this program; or the system refuses.
+/// The path is an input, or a picture that is not a drawing of this program; or the system does not allow it.
 pub fn write_drawing(path: &Path, drawing: &RgbImage) -> Result<()> {
     check_replaces_a_drawing(path)?;
     let bytes = encode(drawing).map_err(|source| FileError::Png { path: path.to_owned(), source })?;
@@ -49,7 +49,7 @@ fn encode(drawing: &RgbImage) -> Result<Vec<u8>, png::EncodingError> {
     Ok(bytes)
 }
 
-/// Checks that a drawing replaces only an earlier one, an empty file or nothing.
+/// Checks that a drawing replaces only an earlier drawing, an empty file or nothing.
 ///
 /// # Errors
 /// Another file.

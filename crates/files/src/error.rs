@@ -4,13 +4,13 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
-/// The result of what this crate does.
+/// The result of this crate's functions.
 pub type Result<T, E = FileError> = std::result::Result<T, E>;
 
 /// A file that could not be read, written or locked; every message names it.
 #[derive(Debug, Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "the messages say what the fields are")]
+#[allow(missing_docs, reason = "the messages explain the fields")]
 pub enum FileError {
     /// A system call failed.
     #[error("{}: cannot {step}", path.display())]
@@ -25,7 +25,7 @@ pub enum FileError {
     TooLarge {
         path: PathBuf,
         max_bytes: u64,
-        /// Its length, if known.
+        /// Length of the file, if known.
         found: Option<u64>,
     },
     /// A folder in place of a file.
@@ -36,7 +36,7 @@ pub enum FileError {
         expected: &'static str,
     },
     /// The output path leads to an input.
-    #[error("{}: expected a name of its own for what is written, found an input of this command", path.display())]
+    #[error("{}: expected an output path that is not an input, found an input of this command", path.display())]
     Input { path: PathBuf },
     /// A file of another kind has the output's name.
     #[error("{}: expected a new name, or {written} to replace, found {found}", path.display())]
@@ -71,17 +71,17 @@ pub enum FileError {
         /// The kind of the path.
         found: &'static str,
     },
-    /// Another process writes the file.
-    #[error("{}: expected a file that no other process writes, found one of {holder}", path.display())]
+    /// Another process is writing the file.
+    #[error("{}: expected a file that no other process is writing, found it locked by {holder}", path.display())]
     Held {
         path: PathBuf,
-        /// The process, as it named itself.
+        /// The process, as named in its lock file.
         holder: String,
     },
 }
 
 impl FileError {
-    /// For `map_err`: the system's error at a step with a file.
+    /// For `map_err`: wraps the system's error at a step with a file.
     pub(crate) fn at(path: &std::path::Path, step: &'static str) -> impl FnOnce(std::io::Error) -> Self {
         let path = path.to_owned();
         move |source| Self::System { path, step, source }

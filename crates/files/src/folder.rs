@@ -41,7 +41,7 @@ pub(crate) fn folder_of(file: &Path) -> &Path {
 pub(crate) fn check_folder_writable(folder: &Path) -> Result<()> {
     let probe = folder.join(format!(".sdg-probe-{}.tmp", std::process::id()));
     File::create_new(&probe).map_err(FileError::at(folder, "write into this folder"))?;
-    fs::remove_file(&probe).map_err(FileError::at(&probe, "remove a file of ours"))
+    fs::remove_file(&probe).map_err(FileError::at(&probe, "remove a temporary file"))
 }
 
 /// Creates a folder (and its parents) if missing, and checks that files can be written to it.

@@ -13,7 +13,7 @@ use crate::kind::check_replaces_its_kind;
 /// Files opened for reading by this process: [`write`] does not replace them.
 static INPUTS: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
-/// The file and its length.
+/// Opens a file and returns it with its length.
 pub(crate) fn open(path: &Path) -> Result<(File, u64)> {
     let file = File::open(path).map_err(FileError::at(path, "read"))?;
     let metadata = file.metadata().map_err(FileError::at(path, "read"))?;
@@ -69,15 +69,15 @@ pub fn keep(path: &Path) {
 /// Writes a file atomically, never over an input of this process or over a file of another kind.
 ///
 /// # Errors
-/// The path leads to such a file, or the system refuses.
+/// The path leads to such a file, or the system does not allow it.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     extend(path, None, bytes)
 }
 
-/// The same for a file that may be `own`, which this process has read in order to keep its contents.
+/// Like [`write`], for a file that may be `own`, which this process has read in order to keep its contents.
 ///
 /// # Errors
-/// As [`write`].
+/// The errors of [`write`].
 pub fn extend(path: &Path, own: Option<&Path>, bytes: &[u8]) -> Result<()> {
     check_is_no_input(path, own)?;
     check_replaces_its_kind(path, bytes)?;
@@ -92,10 +92,10 @@ pub fn check_writable(path: &Path) -> Result<()> {
     check_extendable(path, None)
 }
 
-/// The same for a file that may be `own`, as for [`extend`].
+/// Like [`check_writable`], for a file that may be `own`, as in [`extend`].
 ///
 /// # Errors
-/// As [`check_writable`].
+/// The errors of [`check_writable`].
 pub fn check_extendable(path: &Path, own: Option<&Path>) -> Result<()> {
     check_is_no_input(path, own)?;
     if path.is_dir() {

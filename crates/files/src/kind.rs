@@ -9,7 +9,8 @@ use crate::error::{FileError, Result};
 /// Number of bytes that identify a picture's format.
 const MAX_SIGNATURE: u64 = 64;
 
-/// Checks that a file is replaced only by one of the same kind: no photo by a report, no marks by a camera.
+/// Checks that a file is replaced only by one of the same kind: a report does not replace a photo, and a
+/// camera file does not replace marks.
 ///
 /// # Errors
 /// The existing file is of another kind.

@@ -1,4 +1,4 @@
-//! Locks between processes. The system releases a lock when its process ends, in whatever way.
+//! Locks between processes. The system releases a lock when its process ends, however it ends.
 
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{Read, Seek, Write};
@@ -15,8 +15,8 @@ pub enum Access {
     Shared,
 }
 
-/// The lock of a file, held until it is dropped. A file system without locks grants it to every process, so that
-/// working alone is always possible.
+/// The lock of a file, held until it is dropped. A file system without locks grants it to every process, so a single
+/// process can always work.
 #[derive(Debug)]
 pub struct Lock(#[allow(dead_code, reason = "the system keeps the lock as long as the file is open")] File);
 
@@ -37,7 +37,7 @@ impl Lock {
     }
 }
 
-/// The file, and whether its lock was taken.
+/// Tries to lock a file; returns the file, and whether the lock was taken.
 fn try_lock(file: File, access: Access) -> (File, bool) {
     let locked = match access {
         Access::Alone => file.try_lock(),
@@ -46,7 +46,7 @@ fn try_lock(file: File, access: Access) -> (File, bool) {
     (file, !matches!(locked, Err(TryLockError::WouldBlock)))
 }
 
-/// A lock on writing a file, in a hidden file beside it that names the holder. The hidden file is removed at the end;
+/// A lock for writing a file, in a hidden file beside it that names the holder. The hidden file is removed at the end;
 /// if it remains, the next holder takes it over.
 #[derive(Debug)]
 pub struct WriterLock {
@@ -70,7 +70,7 @@ impl WriterLock {
                 let mut holder = String::new();
                 // The other process may have taken the lock a moment ago, without having written its name.
                 let _ = file.read_to_string(&mut holder);
-                let holder = if holder.is_empty() { "process unknown" } else { holder.trim() }.to_owned();
+                let holder = if holder.is_empty() { "an unknown process" } else { holder.trim() }.to_owned();
                 return Err(FileError::Held { path: written.to_owned(), holder });
             }
             // The previous holder may have removed the file after it was opened here.
@@ -88,7 +88,7 @@ impl WriterLock {
 
 impl Drop for WriterLock {
     fn drop(&mut self) {
-        // A remaining file is taken over.
+        // If the file cannot be removed, the next holder takes it over.
         let _ = fs::remove_file(&self.path);
     }
 }
@@ -100,7 +100,7 @@ fn is_at(file: &File, path: &Path) -> bool {
     matches!((file.metadata(), fs::metadata(path)), (Ok(file), Ok(path)) if id(file.clone()) == id(path.clone()))
 }
 
-/// On other systems, an open file is not removed.
+/// Other systems do not remove an open file.
 #[cfg(not(unix))]
 fn is_at(_: &File, _: &Path) -> bool {
     true
@@ -140,14 +140,15 @@ mod tests {
         assert!(WriterLock::take(&folder.path().join("no/folder.json")).unwrap().is_none());
         drop(held);
         assert!(!file.exists());
-        // A file of a process that ended without removing it.
+        // The lock file of a process that ended without removing it.
         fs::write(&file, "process 1\n").unwrap();
         let taken = WriterLock::take(&marks).unwrap();
         assert_eq!(fs::read_to_string(&file).unwrap(), format!("{process}\n"));
         drop(taken);
     }
 
-    /// A holder removes the file, which another has opened by then and a third makes anew: two files, of which one counts.
+    /// A holder removes the lock file after another process has opened it, and a third process creates a new one: only
+    /// one of the two files counts.
     #[cfg(unix)]
     #[test]
     fn a_lock_of_a_file_that_was_removed_counts_for_nothing() {

@@ -246,11 +246,11 @@ impl<C: CheckpointStrategy> KernelBackend for Autodiff<Flex, C> {
 }
 
 thread_local! {
-    /// Nodes that got a gradient from an operation of this crate that has not been taken yet.
+    /// Nodes whose gradient was given by an operation of this crate and not yet taken.
     static GIVEN: RefCell<HashSet<u64>> = RefCell::default();
 }
 
-/// The gradient of a node's output, for the rest of the backward pass.
+/// The gradient of a node's output, as an input of the rest of the backward pass.
 macro_rules! consumed {
     ($grads:ident, $node:expr) => {{
         GIVEN.with_borrow_mut(|given| given.remove(&$node.id.value));
@@ -258,7 +258,8 @@ macro_rules! consumed {
     }};
 }
 
-/// The earlier gradient of a map, if it came from this crate: it is taken out, to be stored again with more added.
+/// The earlier gradient of a map if it came from this crate: it is removed, to be stored again with another gradient
+/// added.
 ///
 /// burn itself adds a second gradient to the first, but reads both in the order of their shape, which is the slowest
 /// for channels-last maps: a tenth of a training step of the `edge` preset. This is a macro because a node's type has
@@ -297,7 +298,7 @@ struct Conv2dKept {
     x: Option<FlexTensor>,
     weight: Option<FlexTensor>,
     scale: Option<FlexTensor>,
-    /// If a ReLU follows.
+    /// The output, if a ReLU follows.
     output: Option<FlexTensor>,
     shape: ConvShape,
     keep: Keep,
@@ -350,8 +351,7 @@ impl Backward<Flex, 4> for Conv2dBackward {
     }
 }
 
-/// A transposed convolution's output corresponds to the convolution's input, so that the gradients are
-/// exchanged, too.
+/// A transposed convolution's output corresponds to the convolution's input, so their gradients are also exchanged.
 #[derive(Debug)]
 struct ConvTranspose2dBackward;
 

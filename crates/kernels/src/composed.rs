@@ -65,7 +65,7 @@ fn row<B: Backend>(tensor: FloatTensor<B>, idx: isize) -> FloatTensor<B> {
     B::float_slice(tensor, &[Slice::new(idx, Some(idx + 1), 1), Slice::full()])
 }
 
-/// All values as `[1, count]`.
+/// Reshapes a tensor to `[1, count]`.
 fn in_a_row<B: Backend>(tensor: FloatTensor<B>) -> FloatTensor<B> {
     let count = tensor.shape().num_elements();
     B::float_reshape(tensor, Shape::from(vec![1, count]))

@@ -37,7 +37,7 @@ pub fn conv2d(x: Tensor<4>, weight: Tensor<4>, bias: Option<Tensor<1>>, params: 
     conv2d_fused(x, weight, bias, params, Conv2dEpilogue::default())
 }
 
-/// Further operations on a convolution's result before it is written: `activation(scale · conv + bias + residual)`.
+/// Operations on a convolution's result before it is written: `activation(scale · conv + bias + residual)`.
 #[derive(Clone, Debug, Default)]
 pub struct Conv2dEpilogue {
     /// A factor for each channel, `[Co]`, such as that of a frozen batch norm. It is a constant without a gradient.
@@ -156,8 +156,7 @@ fn check_parameters(name: &str, x: [usize; 4], weight: [usize; 4], params: Conv2
     );
 }
 
-/// The extension's methods take tensors, not options of tensors, so that an absent bias is a tensor
-/// of zeros without a gradient.
+/// The bias, or zeros without a gradient in its place, because the extension's methods take no optional tensors.
 fn bias_or_zeros(name: &str, bias: Option<Tensor<1>>, out_channels: usize, x: &Tensor<4>) -> Tensor<1> {
     match bias {
         Some(bias) => {

@@ -48,14 +48,14 @@ pub(crate) struct Kept {
 /// Maps whose cells have length 1, channels first, so that a row of a map is a run of values.
 #[derive(Clone, Debug)]
 struct UnitMaps {
-    /// `[N, C, H, W]`; of the other maps with `reach` cells of zeros on each side.
+    /// The maps `[N, C, H, W]`; the maps of `other` have `reach` cells of zeros on each side.
     values: Vec<f32>,
     /// Lengths of the cells before normalisation, `[N, H, W]`.
     lengths: Vec<f32>,
 }
 
 impl UnitMaps {
-    /// From channels-last maps, `[N, H, W, C]`.
+    /// Normalises channels-last maps, `[N, H, W, C]`.
     fn new(isa: Isa, values: &[f32], [num_images, channels, height, width]: [usize; 4], epsilon: f32) -> Self {
         let pixels = height * width;
         let mut values = channels_last(isa, values, num_images, pixels, channels);

@@ -1,4 +1,4 @@
-//! The extension on burn's `Cube`, which covers every device that CubeCL compiles for: wgpu's and CUDA's.
+//! The extension on burn's `Cube`, which covers every device that CubeCL compiles for: those of wgpu and CUDA.
 //!
 //! burn's own operations are fast there, so that the composed defaults suffice, except for ROIAlign: its default reads
 //! the ROIs from the device and so waits, once for every level of the pyramid and every head, until all earlier work is

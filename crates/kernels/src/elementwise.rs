@@ -18,7 +18,8 @@ pub(crate) fn channel_sums(isa: Isa, values: &[f32], channels: usize) -> Vec<f32
     })
 }
 
-/// The gradient where a ReLU passed its value, and its sums over positions.
+/// The gradient at values that a ReLU passed, zero at others, and its sums over
+/// positions.
 pub(crate) fn relu_gradient(isa: Isa, grad: &[f32], output: &[f32], channels: usize) -> (Vec<f32>, Vec<f32>) {
     let masked = Output::new(grad.len());
     let sums = sum_chunks(grad.len() / channels, channels, |positions, sums| {
@@ -92,7 +93,7 @@ fn sum_chunks(
 
 /// `[N, C, P]` to `[N, P, C]`, or, with `channels` and `pixels` exchanged, back.
 pub(crate) fn channels_last(isa: Isa, values: &[f32], num_images: usize, channels: usize, pixels: usize) -> Vec<f32> {
-    /// Pixels of a unit: its 128 runs of 64 channels are 32 KB.
+    /// Pixels per unit: its 128 runs of 64 channels are 32 KB.
     const BLOCK: usize = 128;
     let output = Output::new(values.len());
     let blocks = pixels.div_ceil(BLOCK);

@@ -25,8 +25,8 @@ use crate::params::{Conv2dParams, FusedConv2dParams};
     Autodiff: cfg(feature = "autodiff")
 )]
 pub trait KernelBackend: Backend {
-    /// See [`conv2d_fused`](crate::conv2d_fused). If `params` say that there is no scale or residual, those are
-    /// tensors of one zero.
+    /// See [`conv2d_fused`](crate::conv2d_fused). If `params` have no scale or residual, a tensor of one zero is
+    /// passed in its place.
     fn kernel_conv2d(
         x: FloatTensor<Self>,
         weight: FloatTensor<Self>,
@@ -57,8 +57,8 @@ pub trait KernelBackend: Backend {
         composed::roi_align::<Self>(features, rois, params)
     }
 
-    /// See [`group_norm_residual`](crate::group_norm_residual). If `params` say that there is no residual, it is a
-    /// tensor of one zero.
+    /// See [`group_norm_residual`](crate::group_norm_residual). If `params` have no residual, a tensor of one zero
+    /// is passed in its place.
     fn kernel_group_norm(
         x: FloatTensor<Self>,
         gamma: FloatTensor<Self>,

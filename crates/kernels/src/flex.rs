@@ -64,7 +64,7 @@ impl KernelBackend for Flex {
         if !all_f32([&x, &weight, &bias]) {
             return composed::conv_transpose2d::<Self>(x, weight, bias, params);
         }
-        // A transposed convolution carries a convolution's gradient back to its input.
+        // A transposed convolution computes a convolution's gradient with respect to its input.
         let shape = ConvShape::transposed(shape4(&x), shape4(&weight), params);
         let (x, bias) = (channels_last(x), bias.to_contiguous());
         let epilogue = Epilogue { bias: Some(values(&bias)), ..Epilogue::default() };

@@ -7,7 +7,7 @@ use burn::tensor::{Bytes, DType, Shape};
 use crate::elementwise;
 use crate::simd::Isa;
 
-/// The kernels are for `f32`; other float types take the composed default.
+/// Whether all tensors are `f32`, which the kernels need; other float types use the composed default.
 pub(crate) fn all_f32<const N: usize>(tensors: [&FlexTensor; N]) -> bool {
     tensors.iter().all(|tensor| tensor.dtype() == DType::F32)
 }
@@ -42,7 +42,7 @@ fn is_channels_last(tensor: &FlexTensor) -> bool {
     (0..4).all(fits)
 }
 
-/// The same tensor in channels-last layout.
+/// Converts a tensor to channels-last layout.
 pub(crate) fn channels_last(tensor: FlexTensor) -> FlexTensor {
     if is_channels_last(&tensor) {
         return tensor;
@@ -54,7 +54,7 @@ pub(crate) fn channels_last(tensor: FlexTensor) -> FlexTensor {
     tensor_channels_last(moved, shape)
 }
 
-/// The same tensor, contiguous. A transposed matrix, such as the gradient of a fully connected layer, is transposed by
+/// Makes a tensor contiguous. A transposed matrix, such as the gradient of a fully connected layer, is transposed by
 /// our own kernel.
 pub(crate) fn contiguous(tensor: FlexTensor) -> FlexTensor {
     let shape = tensor.shape();

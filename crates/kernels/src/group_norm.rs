@@ -2,8 +2,8 @@
 //!
 //! Shapes: N images, C channels in G groups, P pixels; a group of an image has m = C/G · P values.
 //!
-//! Source: Wu and He, Group Normalization (2018), equations 1, 2 and 6; the variance is that of the whole
-//! group (divided by m), as in PyTorch's `group_norm`.
+//! Source: Wu and He, Group Normalization (2018), equations 1, 2 and 6; the variance is divided by m, as in
+//! PyTorch's `group_norm`.
 
 use burn::backend::Dispatch;
 use burn::tensor::Tensor;

@@ -1,7 +1,7 @@
 //! The logarithm of the softmax of each row.
 //!
 //! burn composes it from six operations over the whole tensor, and its gradient from as many; a keypoint head has rows
-//! of 3136 cells. Here a row stays in the cache: one pass for each direction.
+//! of 3136 cells. This kernel needs one pass for each direction, with a row in the cache.
 //!
 //! Legend: `z = x − max x`, `s = Σ exp z`, the result `z − ln s`, and with `g` the gradient of the result
 //! `∂x = g − exp z · Σ g / s`.
@@ -158,7 +158,7 @@ mod tests {
     use super::*;
     use crate::reference::{assert_close, random_values};
 
-    /// Rows of one value, of less than a vector, of all parts of a sum together, and of a keypoint's heatmap.
+    /// One value, less than a vector, a length that uses every part of the sum, and a keypoint's heatmap.
     const ROW_LENS: [usize; 4] = [1, 7, 128 + 40, 3136];
 
     #[test]

@@ -1,10 +1,10 @@
-//! How the process keeps freed memory.
+//! Makes the process keep freed memory.
 
-/// Makes the C library keep freed memory, for the whole process. To be called once, at the start of `main`.
+/// Makes the C library keep freed memory, for the whole process. Call it once, at the start of `main`.
 ///
-/// A network's maps are megabytes each. GNU's allocator takes such blocks from the system and returns them, so that the
+/// A network's maps are megabytes each. GNU's allocator takes such blocks from the system and returns them, so the
 /// pages of every operation's result must be mapped again: a sixth of a backbone's time on one core. In one heap they
-/// are reused. On other systems this does nothing.
+/// are reused. On other systems this function does nothing.
 pub fn keep_freed_memory() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     for (parameter, value) in [

@@ -1,4 +1,4 @@
-//! The extension on burn's `NdArray`: the composed defaults throughout. A reference, not fast.
+//! The extension on burn's `NdArray`: only composed defaults, as a reference that is not fast.
 
 // burn deprecates the backend in favour of `Flex`; it remains for comparisons.
 #![allow(deprecated)]

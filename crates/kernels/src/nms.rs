@@ -44,7 +44,7 @@ fn suppress(boxes: &[[f32; 4]], scores: &[f32], classes: Option<&[usize]>, iou_t
     // Stable, and -0 equals 0.
     order.sort_by(|&a, &b| scores[b].partial_cmp(&scores[a]).unwrap_or(std::cmp::Ordering::Equal));
 
-    // In the order of comparison, so that the inner loop reads memory sequentially.
+    // In the order of comparison, so the inner loop reads memory sequentially.
     let sorted: Vec<[f32; 4]> = order.iter().map(|&idx| boxes[idx]).collect();
     let areas: Vec<f32> = sorted.iter().copied().map(area).collect();
     let mut kept = Vec::new();
@@ -169,7 +169,7 @@ mod tests {
 
         #[test]
         fn agrees_with_the_definition((boxes, scores, classes) in boxes_scores_classes()) {
-            // 0.47 is not a ratio of the small whole areas here, so that rounding decides nothing.
+            // 0.47 is not a ratio of small integer areas, so rounding decides nothing.
             let kept = batched_nms(&boxes, &scores, &classes, 0.47);
             let before = |a: usize, b: usize| scores[a] > scores[b] || (scores[a] == scores[b] && a < b);
             prop_assert!(kept.windows(2).all(|pair| before(pair[0], pair[1])));

@@ -1,7 +1,7 @@
 //! Loops over independent units of work, on rayon's threads if there are any.
 //!
-//! Every unit writes data that no other unit writes, and the division into units depends on shapes alone,
-//! so that results are bit-identical for any number of threads.
+//! Every unit writes data that no other unit writes, and the division into units depends only on shapes, so
+//! results are bit-identical for any number of threads.
 
 use std::marker::PhantomData;
 use std::mem::MaybeUninit;

@@ -1,4 +1,4 @@
-//! The parameters of the operations besides their tensors, and the resulting sizes.
+//! The parameters of the operations other than tensors, and the sizes of their results.
 
 /// The movement of a convolution's kernel over its input. Every pair is `[vertical, horizontal]`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,7 +31,7 @@ impl Conv2dParams {
         Some(output)
     }
 
-    /// Size of the transposed convolution's output map, or `None` if the padding leaves nothing of it.
+    /// Size of the transposed convolution's output map, or `None` if the padding removes all of it.
     ///
     /// # Shapes
     /// `input` is `[Hi, Wi]`, `kernel` is `[Kh, Kw]`; the result is `[Ho, Wo]`.
@@ -149,22 +149,22 @@ pub struct RoiAlignParams {
 pub struct AdamWParams {
     /// Factor of the update at this step of the schedule.
     pub learning_rate: f32,
-    /// Share of the gradient's running mean that a step keeps.
+    /// Fraction of the gradient's running mean that a step keeps.
     pub beta_1: f32,
-    /// Share of the running mean of its squares that a step keeps.
+    /// Fraction of the running mean of its squares that a step keeps.
     pub beta_2: f32,
     /// Added to the root of the mean square.
     pub epsilon: f32,
-    /// Share of the value that a step of length 1 removes.
+    /// Fraction of the value that a step of length 1 removes.
     pub weight_decay: f32,
-    /// Gradients whose Euclidean norm is larger are scaled down to it.
+    /// Maximum Euclidean norm of the gradient; larger gradients are scaled down to it.
     pub max_norm: Option<f32>,
     /// Index of the step, from 1.
     pub step: i32,
 }
 
 impl AdamWParams {
-    /// The divisors of the moments, because they started at zero.
+    /// The divisors of the moments, which correct for their start at zero.
     pub(crate) fn corrections(&self) -> [f32; 2] {
         [1.0 - self.beta_1.powi(self.step), 1.0 - self.beta_2.powi(self.step)]
     }
@@ -173,7 +173,7 @@ impl AdamWParams {
 /// Parameters of [`cosines`](crate::cosines()).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CosineParams {
-    /// Largest distance of the compared cells, along each axis.
+    /// Maximum distance of the compared cells along each axis, in cells.
     pub reach: usize,
     /// Added to the square of a cell's length.
     pub epsilon: f32,

@@ -1,7 +1,7 @@
-//! Maps in another order.
+//! Permutes maps.
 //!
 //! burn's own `select` adds its gradient element by element, on one thread, because an index might occur twice.
-//! In a permutation none does, so that forwards and backwards whole maps are copied.
+//! In a permutation each index occurs once, so both directions copy whole maps.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use burn::tensor::Tensor;
 use crate::extension::KernelBackend;
 use crate::parallel::{Output, for_each_unit};
 
-/// The maps of `x` in another order: map i of the result is map `order[i]`.
+/// Permutes the maps of `x`: map i of the result is map `order[i]`.
 ///
 /// # Shapes
 /// `x` and the result are `[N, C, H, W]`.
@@ -38,7 +38,7 @@ pub(crate) fn inverse(order: &[usize]) -> Arc<[usize]> {
     Arc::from(back)
 }
 
-/// Runs of equal length, `order.len()` of them, in another order.
+/// Permutes runs of equal length, of which there are `order.len()`.
 pub(crate) fn permuted(values: &[f32], order: &[usize]) -> Vec<f32> {
     let run = values.len() / order.len().max(1);
     let output = Output::new(values.len());

@@ -2,9 +2,9 @@
 //!
 //! `out[i, j] (+)= Σ_o Σ_k left[i·step + o·outer + k·inner] · right[j + o·outer + k·inner]`
 //!
-//! for up to 32 columns j, a *panel*. Rows i are taken twelve at a time, so that 24 AVX-512 registers hold the
-//! sums and only complete sums are written. The depth has two loops (o, k), so that the left side may be a
-//! window of an image read in place: o runs over rows of the window, k along them.
+//! for up to 32 columns j, a *panel*. Twelve rows i are processed at a time, so 24 AVX-512 registers hold the
+//! sums, and only complete sums are written. The depth has two loops (o, k), so the left side may be a window of
+//! an image read in place: o runs over rows of the window, k along them.
 
 #![allow(clippy::needless_range_loop)] // Rows and columns of a tile are numbers, here and in the sources.
 
@@ -27,7 +27,7 @@ pub(crate) struct Operand<'a> {
     pub(crate) outer: usize,
 }
 
-/// The operations on a sum before it is written: `relu(sum · scale + bias + residual)`; absent terms are left out.
+/// Operations on a sum before it is written: `relu(sum · scale + bias + residual)`; absent terms are left out.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Epilogue<'a> {
     /// A factor for each column.
@@ -40,7 +40,7 @@ pub(crate) struct Epilogue<'a> {
 }
 
 impl<'a> Epilogue<'a> {
-    /// The epilogue of the columns from `first` on.
+    /// Scale and bias of the columns from `first` on.
     fn columns(&self, first: usize) -> [Option<&'a [f32]>; 2] {
         [self.scale.map(|values| &values[first..]), self.bias.map(|values| &values[first..])]
     }
@@ -49,7 +49,7 @@ impl<'a> Epilogue<'a> {
 /// One panel of a product.
 pub(crate) struct PanelProduct<'a> {
     pub(crate) rows: usize,
-    /// At most [`PANEL`].
+    /// Number of columns, at most [`PANEL`].
     pub(crate) columns: usize,
     /// Iterations of the outer and the inner loop over the depth.
     pub(crate) depth: [usize; 2],
@@ -60,7 +60,7 @@ pub(crate) struct PanelProduct<'a> {
     pub(crate) at: usize,
     /// Step from one row of the output to the next.
     pub(crate) row_step: usize,
-    /// Column of the epilogue's vectors that corresponds to the panel's first.
+    /// Column of the epilogue's vectors for the first column of the panel.
     pub(crate) first_column: usize,
     pub(crate) epilogue: Epilogue<'a>,
     /// Whether to add to the present values of the output.
@@ -76,7 +76,7 @@ pub(crate) struct Prefetch<'a> {
 }
 
 impl Prefetch<'_> {
-    /// The next lines, `steps` of them, or as many as available: their start, and their stride.
+    /// The next lines to prefetch, `steps` of them or fewer if there are no more: their start, and their stride.
     #[inline(always)]
     fn next(&mut self, steps: usize) -> (*const f32, usize) {
         for run in &mut self.runs {
@@ -111,7 +111,7 @@ impl PanelProduct<'_> {
         let [scale, bias] = self.epilogue.columns(self.first_column);
         assert!(scale.is_none_or(|scale| scale.len() >= self.columns));
         assert!(bias.is_none_or(|bias| bias.len() >= self.columns));
-        // SAFETY: every access is within what was asserted; `isa` is there.
+        // SAFETY: every access is within the asserted bounds, and the machine has `isa`.
         unsafe { panel(isa, self, output.at(self.at)) };
     }
 }
@@ -128,7 +128,7 @@ unsafe fn panel_lanes<L: Lanes>(product: &PanelProduct<'_>, output: *mut f32) {
     let mut row = 0;
     let mut prefetch = product.prefetch;
     for tile in 0..tiles {
-        // As equal as possible: short tiles wait for their sums.
+        // Tiles of nearly equal height, because short tiles wait for their sums.
         let rows = (product.rows - row).div_ceil(tiles - tile);
         let step = LANES * L::VECTORS;
         let mut column = 0;
@@ -191,7 +191,7 @@ unsafe fn tile<L: Lanes, const R: usize, const V: usize>(
         let mut right_run = right.values.as_ptr().add(column);
         let step = left.step;
         for _ in 0..outer {
-            // Four pointers three rows apart: an address is a pointer plus nothing, one step or two.
+            // Four pointers three rows apart: an address is a pointer plus 0, 1 or 2 steps.
             let mut at = [left_run, left_run, left_run, left_run];
             for (idx, at) in at.iter_mut().enumerate() {
                 *at = left_run.wrapping_add(3 * idx * step);

@@ -1,4 +1,4 @@
-//! References for the tests: the same operations as plain loops, and values to run them on.
+//! Reference implementations for the tests, as plain loops, and random values.
 
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -25,7 +25,8 @@ pub(crate) fn to_first(values: &[f32], [num_images, channels, height, width]: [u
     to_last(values, [num_images, height * width, channels, 1])
 }
 
-/// Sums in another order differ by a few units in the last place of their largest terms.
+/// Asserts equality up to rounding: sums in a different order differ by a few units in the last place of
+/// their largest terms.
 pub(crate) fn assert_close(found: &[f32], expected: &[f32], what: &str) {
     const TOLERANCE: f32 = 2e-5;
     assert_eq!(found.len(), expected.len(), "{what}: length");

@@ -1,4 +1,4 @@
-//! Max pooling, and doubling by repetition: the changes of resolution besides strides.
+//! Max pooling, and doubling by repetition: the changes of resolution other than strides.
 //!
 //! Results are channels last in memory, like those of [`conv2d`](crate::conv2d).
 
@@ -12,7 +12,7 @@ pub(crate) mod kernel;
 #[cfg(test)]
 mod tests;
 
-/// The largest value in every window. A NaN is larger than any number; of equal values the first gets the gradient.
+/// The maximum of every window. A NaN is larger than any number; of equal values the first gets the gradient.
 ///
 /// # Shapes
 /// `x` `[N, C, Hi, Wi]`; the result is `[N, C, Ho, Wo]` with `Ho = (Hi + 2·padding − Kh) / stride + 1`, rounded down.

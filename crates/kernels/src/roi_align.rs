@@ -3,12 +3,12 @@
 //! Shapes: N images, C channels, maps of H × W, R regions of interest, crops of Ph × Pw bins.
 //!
 //! Glossary: *ROI*, a box in image pixels with the index of its image; *bin*, one cell of the crop; *grid*,
-//! the samples that a bin averages along one axis. Bilinear sampling and averaging are separable, so that a
-//! bin is `Σ_y Σ_x weight_y · weight_x · feature(y, x)`, and [`AxisBins`] holds the weights of one axis.
+//! the samples that a bin averages along one axis. Bilinear sampling and averaging are separable, so a bin
+//! is `Σ_y Σ_x weight_y · weight_x · feature(y, x)`, and [`AxisBins`] holds the weights of one axis.
 //!
 //! Source: He et al., Mask R-CNN (2017), section 3; the conventions of Detectron2's `ROIAlign` (`aligned`)
-//! and torchvision's `roi_align`, which differ by [`RoiAlignment`]. Unlike there, samples are weighted in
-//! per-axis order, so that the last bits differ; and an ROI with a non-finite corner gives zeros.
+//! and torchvision's `roi_align`, which differ by [`RoiAlignment`]. Two intended differences: samples are
+//! weighted in per-axis order, so the last bits differ, and an ROI with a non-finite corner gives zeros.
 
 use burn::backend::Dispatch;
 use burn::tensor::Tensor;

@@ -1,4 +1,4 @@
-//! The feature pixels and weights of the bins of a ROI.
+//! The feature pixels and weights of the bins of an ROI.
 
 use crate::params::{RoiAlignParams, RoiAlignment, SamplingRatio};
 
@@ -125,7 +125,7 @@ impl AxisBins {
     }
 }
 
-/// Samples that may lie on the map, so that a huge ROI costs no more than the map's length.
+/// Range of samples that may lie on the map, so a huge ROI costs no more than the map's length.
 fn samples_on_map(start: f32, bin: f32, grid: usize, map_size: usize) -> std::ops::Range<usize> {
     let step = f64::from(bin) / grid as f64;
     if grid < 1024 || step.is_nan() || step <= 0.0 {

@@ -1,4 +1,4 @@
-//! Reusable buffers, so that operations need not request memory from the system.
+//! Reusable buffers, which avoid requests of memory from the system.
 
 use std::cell::RefCell;
 use std::ops::{Deref, DerefMut};
@@ -14,10 +14,10 @@ pub(crate) struct Scratch {
 }
 
 impl Scratch {
-    /// A buffer of `len` floats of any value.
+    /// A buffer of `len` floats with arbitrary values.
     pub(crate) fn take(len: usize) -> Self {
         let mut buffer = FREE.with_borrow_mut(|free| {
-            // The smallest sufficient one, otherwise the largest, which then grows.
+            // The smallest sufficient buffer, otherwise the largest one, which then grows.
             let fitting = (0..free.len()).filter(|&idx| free[idx].len() >= len).min_by_key(|&idx| free[idx].len());
             let chosen = fitting.or_else(|| (0..free.len()).max_by_key(|&idx| free[idx].len()));
             chosen.map_or_else(Vec::new, |idx| free.swap_remove(idx))
@@ -46,7 +46,8 @@ impl DerefMut for Scratch {
 impl Drop for Scratch {
     fn drop(&mut self) {
         let buffer = std::mem::take(&mut self.buffer);
-        // The thread may be ending, with its free list gone; then the buffer is freed, too.
+        // The thread may be ending, and its free list may be gone; then the buffer is also
+        // freed.
         let _ = FREE.try_with(|free| free.borrow_mut().push(buffer));
     }
 }

@@ -50,11 +50,11 @@ pub(crate) use widest;
 /// Compiles a kernel over [`Lanes`](lanes::Lanes) for every instruction set and selects one when called, with
 /// the set as first argument.
 ///
-/// Sums may be fused or not, so that the last bits may differ between instruction sets.
+/// Multiplications and additions may be fused, so the last bits may differ between instruction sets.
 macro_rules! lanes_kernel {
     ($(#[$meta:meta])* $vis:vis unsafe fn $name:ident($($arg:ident: $kind:ty),* $(,)?) = $generic:ident) => {
         $(#[$meta])*
-        #[allow(clippy::too_many_arguments)] // Of a kernel's inner loop.
+        #[allow(clippy::too_many_arguments)] // A kernel's inner loop has many.
         $vis unsafe fn $name(isa: $crate::simd::Isa, $($arg: $kind),*) {
             #[cfg(target_arch = "x86_64")]
             #[allow(clippy::too_many_arguments)]

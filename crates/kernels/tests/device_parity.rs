@@ -13,8 +13,8 @@ use sdg_kernels::{
     roi_align, upsample_nearest_2x,
 };
 
-/// Largest difference over the largest magnitude: sums of up to a thousand products in another order. Most of it
-/// comes from Winograd's transforms, which flex uses.
+/// Maximum difference, relative to the largest magnitude: sums of up to a thousand products in a different order.
+/// Most of it comes from Winograd's transforms, which flex uses.
 const RELATIVE: f32 = 2e-5;
 
 /// Devices to compare with `Flex`.
@@ -48,7 +48,7 @@ fn assert_agrees<const N: usize>(
     operation: impl Fn([Tensor<4>; N], &Device) -> Tensor<4>,
 ) {
     let run = |device: Device| -> Vec<Vec<f32>> {
-        // First without autodiff, which is another implementation.
+        // First without autodiff, which is a different implementation.
         let plain = std::array::from_fn(|i| random(inputs[i], i as u64, &device));
         let mut results = vec![values(operation(plain, &device))];
         let tracked = device.autodiff();
@@ -98,7 +98,7 @@ fn convolutions_agree() {
     });
 }
 
-/// Of a map of 13 × 17 pixels.
+/// Output size of a convolution of a map of 13 × 17 pixels.
 fn output_size(params: Conv2dParams, kernel: usize) -> [usize; 2] {
     [13, 17].map(|size| (size + 2 * params.padding[0] - kernel) / params.stride[0] + 1)
 }

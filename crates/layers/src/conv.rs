@@ -14,7 +14,7 @@ use crate::initialization::{Distribution, Initializer};
 /// Normalisation after a convolution.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum NormKind {
-    /// None: the convolution has a bias instead.
+    /// No norm: the convolution has a bias instead.
     Identity,
     /// Mean and variance over groups of channels of one image, trained.
     Group {
@@ -43,7 +43,7 @@ pub struct Norm {
     kind: NormKind,
 }
 
-/// Added to a group's variance.
+/// Added to the variance of a group.
 pub(crate) const GROUP_NORM_EPS: f32 = 1e-5;
 
 impl Norm {
@@ -112,22 +112,22 @@ impl Conv2dShape {
         Self { in_channels, out_channels, kernel, stride: 1 }
     }
 
-    /// The same with another stride.
+    /// The shape with a different stride.
     pub fn with_stride(self, stride: usize) -> Self {
         Self { stride, ..self }
     }
 
-    /// Weights that feed one output.
+    /// Number of weights that feed one output.
     pub fn fan_in(&self) -> usize {
         self.in_channels * self.kernel * self.kernel
     }
 
-    /// Weights that one input feeds.
+    /// Number of weights that one input feeds.
     pub fn fan_out(&self) -> usize {
         self.out_channels * self.kernel * self.kernel
     }
 
-    /// Draws the parameters. A norm replaces the bias.
+    /// Initialises the parameters at random. A norm replaces the bias.
     pub fn init(self, distribution: Distribution, norm: NormKind, init: &mut Initializer) -> Conv2d {
         let Self { in_channels, out_channels, kernel, stride } = self;
         let weight = init.param([out_channels, in_channels, kernel, kernel], distribution);
@@ -161,7 +161,7 @@ impl Conv2d {
     /// Convolves and normalises, adds `residual` and activates, all in one pass over the result.
     ///
     /// # Shapes
-    /// As for [`Self::forward`]; `residual` has the output's.
+    /// As for [`Self::forward`]; `residual` has the shape of the output.
     pub fn forward_then(&self, x: Tensor<4>, residual: Option<Tensor<4>>, activation: Activation) -> Tensor<4> {
         let params = Conv2dParams::square(self.stride, self.padding);
         let weight = self.weight.val();
@@ -194,9 +194,9 @@ pub struct ConvTranspose2x {
 }
 
 impl ConvTranspose2x {
-    /// Draws the parameters for a kernel of 2 or 4 cells; the bias is zero.
+    /// Initialises the parameters at random for a kernel of 2 or 4 cells; the bias is zero.
     pub fn init(in_channels: usize, out_channels: usize, kernel: usize, init: &mut Initializer) -> Self {
-        assert!(kernel == 2 || kernel == 4, "a kernel of {kernel} does not double the size");
+        assert!(kernel == 2 || kernel == 4, "expected a kernel of 2 or 4 cells, found {kernel}");
         // PyTorch counts the fan of a transposed convolution along its first axis.
         let distribution = Distribution::he_normal(in_channels * kernel * kernel);
         Self {
@@ -205,7 +205,7 @@ impl ConvTranspose2x {
         }
     }
 
-    /// Convolves, transposed.
+    /// Applies the transposed convolution.
     ///
     /// # Shapes
     /// - `x`: `[N, C_in, H, W]`
@@ -226,7 +226,7 @@ impl ConvTranspose2x {
 /// - output: `[N, C, 2S, 2S]`
 pub fn upsample_bilinear_2x(x: Tensor<4>) -> Tensor<4> {
     let [n, c, s, width] = x.dims();
-    assert_eq!(s, width, "maps are square");
+    assert_eq!(s, width, "expected square maps");
     let mut weights = vec![0f32; s * 2 * s];
     for output in 0..2 * s {
         let at = ((output as f32 + 0.5) / 2.0 - 0.5).max(0.0);
@@ -236,7 +236,8 @@ pub fn upsample_bilinear_2x(x: Tensor<4>) -> Tensor<4> {
         weights[second * 2 * s + output] += at - first as f32;
     }
     let stretch = Tensor::<1>::from_floats(weights.as_slice(), &x.device()).reshape([s, 2 * s]);
-    // Both axes by a matrix product over the last: [N·C·S, S] x [S, 2S], then the rows in the same way.
+    // Both axes by a matrix product over the last axis: [N·C·S, S] x [S, 2S], then the rows in the same
+    // way.
     let wide: Tensor<3> = x.reshape([n * c * s, s]).matmul(stretch.clone()).reshape([n * c, s, 2 * s]);
     wide.swap_dims(1, 2)
         .reshape([n * c * 2 * s, s])
@@ -257,7 +258,7 @@ mod tests {
 
     #[test]
     fn bilinear_upsampling_by_hand() {
-        // Rows [0, 4] become [0, 1, 3, 4]; columns 0 and 8 apart likewise.
+        // Within a row, [0, 4] becomes [0, 1, 3, 4]; within a column, [0, 8] becomes [0, 2, 6, 8].
         let x = tensor(&[0.0, 4.0, 8.0, 12.0], [1, 1, 2, 2]);
         let expected = [0.0, 1.0, 3.0, 4.0, 2.0, 3.0, 5.0, 6.0, 6.0, 7.0, 9.0, 10.0, 8.0, 9.0, 11.0, 12.0];
         assert_eq!(upsample_bilinear_2x(x).into_data().try_to_vec_as::<f32>().unwrap(), expected);
@@ -275,7 +276,7 @@ mod tests {
         let expected = tensor(&[-1.0, 1.0, -1.0, 1.0], [1, 4, 1, 1]);
         let found = conv.forward(x.clone()).into_data();
         found.assert_approx_eq::<f32>(&expected.into_data(), Tolerance::absolute(1e-4));
-        // With half of itself added: -0.5, 2.5, 4, 16, and negative values are cut.
+        // With half of the input added: -0.5, 2.5, 4, 16; the ReLU makes negative values 0.
         let expected = tensor(&[0.0, 2.5, 4.0, 16.0], [1, 4, 1, 1]);
         let found = conv.forward_then(x.clone(), Some(x / 2.0), Activation::Relu).into_data();
         found.assert_approx_eq::<f32>(&expected.into_data(), Tolerance::absolute(1e-4));
@@ -295,7 +296,7 @@ mod tests {
         let x = tensor(&[9.0], [1, 1, 1, 1]);
         let y: f32 = conv.forward(x.clone()).into_scalar();
         assert!((y - 8.0).abs() < 1e-5);
-        // With -10 added the ReLU cuts it.
+        // With -10 added, the ReLU makes the output 0.
         let residual = tensor(&[-10.0], [1, 1, 1, 1]);
         let y: f32 = conv.forward_then(x, Some(residual), Activation::Relu).into_scalar();
         assert_eq!(y, 0.0);

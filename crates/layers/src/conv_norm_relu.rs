@@ -1,6 +1,7 @@
 //! A convolution with group norm and ReLU, and sequences of them: the blocks of the small networks.
 //!
-//! [`Conv2d`](crate::Conv2d) is the same with any norm; its parameters have other names, which files of weights use.
+//! [`Conv2d`](crate::Conv2d) is the general convolution, with any norm; its parameters have other names, which
+//! weights files use.
 
 use burn::module::{Module, Param};
 use burn::tensor::Tensor;
@@ -30,7 +31,7 @@ pub struct ConvNormRelu {
 }
 
 impl ConvNormRelu {
-    /// Draws the parameters of `shape`, `[C_out, C_in, k, k]`.
+    /// Initialises the parameters of `shape`, `[C_out, C_in, k, k]`, at random.
     pub fn init(shape: [usize; 4], stride: usize, num_groups: usize, init: &mut Initializer) -> Self {
         let [channels, in_channels, kernel, _] = shape;
         let norm = GroupNorm {
@@ -41,7 +42,7 @@ impl ConvNormRelu {
         Self { weight, norm, stride, num_groups }
     }
 
-    /// `[N, C_in, H, W]` to `[N, C_out, H / stride, W / stride]`.
+    /// Convolves, normalises and rectifies: `[N, C_in, H, W]` to `[N, C_out, H / stride, W / stride]`.
     pub fn forward(&self, x: Tensor<4>) -> Tensor<4> {
         let weight = self.weight.val();
         let padding = weight.dims()[2] / 2;
@@ -52,9 +53,9 @@ impl ConvNormRelu {
     }
 }
 
-/// Convolutions at one size of map; the first halves it.
+/// Convolutions at one size of map; the first one halves the size.
 #[derive(Module, Debug)]
 pub struct Stage {
-    /// In order.
+    /// The convolutions, in order.
     pub convs: Vec<ConvNormRelu>,
 }

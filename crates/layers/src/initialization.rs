@@ -1,17 +1,17 @@
 //! Initial values of the parameters, from a seed.
 //!
-//! Values are drawn on the host, one parameter after the other in the order of construction, so
-//! that a seed gives the same bits on any device with any number of threads.
+//! Values are sampled on the host, one parameter after the other in the order of construction, so a seed gives
+//! the same bits on any device with any number of threads.
 
 use burn::module::Param;
 use burn::tensor::{Device, Tensor, TensorData};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
-/// Draws the parameters of one model.
+/// Initialises the parameters of one model.
 #[derive(Debug)]
 pub struct Initializer {
-    /// `None` draws nothing: all values are zero.
+    /// `None` sets all values to zero.
     rng: Option<Pcg64Mcg>,
     device: Device,
 }
@@ -28,7 +28,7 @@ pub enum Distribution {
     },
     /// Uniform between `-bound` and `bound`.
     Uniform {
-        /// Largest magnitude.
+        /// Maximum magnitude.
         bound: f64,
     },
 }
@@ -51,20 +51,20 @@ impl Initializer {
         Self { rng: Some(Pcg64Mcg::seed_from_u64(seed)), device: device.clone() }
     }
 
-    /// An initialiser for a network whose parameters are all set next: drawing millions of unused numbers took a
-    /// third of the time to open a grasp model.
+    /// An initialiser for a network whose parameters are all replaced afterwards: sampling millions of unused
+    /// numbers took a third of the time to open a grasp model.
     pub fn blank(device: &Device) -> Self {
         Self { rng: None, device: device.clone() }
     }
 
-    /// Draws a trainable parameter.
+    /// Samples a trainable parameter.
     pub fn param<const D: usize>(&mut self, dims: [usize; D], distribution: Distribution) -> Param<Tensor<D>> {
         let count = dims.iter().product();
         let values = self.values(count, distribution);
         Param::from_data(TensorData::new(values, dims), &self.device)
     }
 
-    /// Makes a parameter of one value that is never trained.
+    /// Makes a constant parameter that is never trained.
     pub fn frozen<const D: usize>(&mut self, dims: [usize; D], value: f64) -> Param<Tensor<D>> {
         self.param(dims, Distribution::Constant(value)).set_require_grad(false)
     }
@@ -83,9 +83,9 @@ impl Initializer {
     }
 }
 
-/// Box and Muller's transform.
+/// A normally distributed number by Box and Muller's transform.
 fn standard_normal(rng: &mut Pcg64Mcg) -> f64 {
-    // 1 - u lies in (0, 1], where the logarithm is finite.
+    // 1 - u is in (0, 1], where the logarithm is finite.
     let radius = (-2.0 * (1.0 - rng.random::<f64>()).ln()).sqrt();
     radius * (std::f64::consts::TAU * rng.random::<f64>()).cos()
 }

@@ -5,9 +5,10 @@
 //!                                          ◄ state_dict::import ◄
 //! ```
 //!
-//! Parameters are named as in PyTorch; a network's names are the paths of its fields, and files of weights hold them.
+//! Parameters are named as in PyTorch: a parameter's name is the path of its fields, and weights files use these
+//! names.
 //!
-//! Elsewhere: networks (crates `detection`, `orientation`, `comparison`), optimisers (crate `training`), files.
+//! In other crates: networks (`detection`, `orientation`, `comparison`), optimisers (`training`), files.
 //!
 //! # Example
 //! ```

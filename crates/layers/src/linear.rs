@@ -15,7 +15,7 @@ pub struct Linear {
 }
 
 impl Linear {
-    /// Draws the parameters; the bias is zero.
+    /// Initialises the weight at random; the bias is zero.
     pub fn init(in_features: usize, out_features: usize, distribution: Distribution, init: &mut Initializer) -> Self {
         Self {
             weight: init.param([out_features, in_features], distribution),
@@ -23,7 +23,7 @@ impl Linear {
         }
     }
 
-    /// Multiplies and adds.
+    /// Multiplies by the weight and adds the bias.
     ///
     /// # Shapes
     /// - `x`: `[N, in]`

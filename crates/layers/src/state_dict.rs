@@ -1,6 +1,7 @@
-//! A module's parameters by name, on the host: the content of a file or an import.
+//! A module's parameters by name, on the host: the content of a file or of an import.
 //!
-//! Names are the module path joined with dots, as Detectron2 and torch write them, so a key map is a map of strings.
+//! A name is the module path joined with dots, as Detectron2 and torch write it, so renaming is a map from strings
+//! to strings.
 
 use std::collections::BTreeMap;
 
@@ -26,9 +27,9 @@ pub struct ImportReport {
     pub applied: Vec<String>,
     /// Parameters of the module that the dict lacks; they kept their values.
     pub missing: Vec<String>,
-    /// Entries of the dict that no parameter took.
+    /// Entries of the dict that no parameter used.
     pub unused: Vec<String>,
-    /// Name, shape expected, shape found; they kept their values.
+    /// Parameters of another shape, with the expected and the found shape; they kept their values.
     pub mismatched: Vec<(String, Vec<usize>, Vec<usize>)>,
 }
 
@@ -46,7 +47,7 @@ pub fn export<M: Module>(module: &M) -> StateDict {
     exporter.dict
 }
 
-/// Sets every float parameter of `module` that `dict` has with the right shape, and reports the rest.
+/// Sets every float parameter of `module` for which `dict` has an entry of the correct shape, and reports the rest.
 pub fn import<M: Module>(module: M, dict: &StateDict) -> (M, ImportReport) {
     let mut importer = Importer { path: Vec::new(), dict, report: ImportReport::default() };
     let module = module.map(&mut importer);

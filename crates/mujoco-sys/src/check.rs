@@ -10,14 +10,14 @@ use crate::library::{self, Functions};
 /// Loads libmujoco, once per process, and checks that it matches these bindings.
 ///
 /// # Errors
-/// [`LibraryError`]: it could not be loaded, or is of another version; the same at every call.
+/// [`LibraryError`]: it cannot be loaded, or is another version; every later call returns the same error.
 pub fn load() -> Result<(), LibraryError> {
     library::load(check)
 }
 
 /// Checks the library's version and the size of every struct that MuJoCo initialises for us.
 ///
-/// It takes microseconds.
+/// Takes microseconds.
 fn check(functions: &Functions) -> Result<(), LibraryError> {
     // SAFETY: `mj_version` takes nothing and returns a constant.
     let found = unsafe { (functions.mj_version)() };
@@ -36,10 +36,10 @@ fn check(functions: &Functions) -> Result<(), LibraryError> {
     Ok(())
 }
 
-/// Lets `initialise` write into a buffer larger than `T`, twice and over two different fillings,
-/// and takes the last byte that is equal both times as the end of the struct.
+/// Measures the size of a struct: `initialise` writes to two buffers with different contents, both larger than `T`; the
+/// last byte in which they then agree is the end of the struct.
 ///
-/// Trailing padding need not be written, hence the tolerance of one alignment.
+/// The tolerance is one alignment, because trailing padding may remain unwritten.
 fn check_size<T>(name: &'static str, initialise: unsafe extern "C-unwind" fn(*mut T)) -> Result<(), LibraryError> {
     let written = [0x5a_u8, 0xa5].map(|filling| {
         let mut room: Box<[MaybeUninit<T>]> = (0..2).map(|_| MaybeUninit::uninit()).collect();
@@ -67,7 +67,7 @@ mod tests {
     #[test]
     fn the_installed_library_is_the_one_described() {
         assert_eq!(load(), Ok(()));
-        // And again, as every constructor of the simulation does.
+        // Every constructor of the simulation calls it again.
         assert_eq!(load(), Ok(()));
     }
 
@@ -75,7 +75,7 @@ mod tests {
     fn a_struct_of_another_size_is_noticed() {
         /// Writes a struct of 24 bytes for any `T`.
         unsafe extern "C-unwind" fn writes_24_bytes<T>(out: *mut T) {
-            // SAFETY: `check_size` hands over room for two `T`s of at least 16 bytes.
+            // SAFETY: `check_size` passes a buffer for two `T`s of at least 16 bytes.
             unsafe { ptr::write_bytes(out.cast::<u8>(), 0, 24) };
         }
         assert_eq!(check_size::<[u64; 3]>("same", writes_24_bytes), Ok(()));

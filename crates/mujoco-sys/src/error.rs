@@ -4,7 +4,7 @@
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LibraryError {
-    /// No library of the name, or one without a function.
+    /// No library with the expected name, or a function is missing in it.
     #[error(
         "MuJoCo could not be loaded ({reason}): expected version 2.2.2, on Debian 12 the package libmujoco2.2.2; elsewhere \
          LD_LIBRARY_PATH may name the folder of libmujoco.so.2.2.2"

@@ -14,7 +14,7 @@
 //! A build needs no libmujoco, and a program starts without it. The functions that `sdg-simulation` calls are in
 //! library.rs; the other functions declared by the bindings are not linked.
 //!
-//! Not included: everything safe (that is `sdg-simulation`), MuJoCo's small vector library, its
+//! Not included: safe wrappers (crate `sdg-simulation`), MuJoCo's small vector library, its
 //! user interface and its printing functions.
 //!
 //! ```

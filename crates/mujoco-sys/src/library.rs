@@ -13,7 +13,7 @@ use crate::bindings::{
 };
 use crate::error::LibraryError;
 
-/// Paths of the library in Debian and in MuJoCo's own archives, best first: the name of this version, then any.
+/// File names of the library in Debian and in MuJoCo's own archives: first this version, then any.
 const NAMES: [&str; 2] = ["libmujoco.so.2.2.2", "libmujoco.so"];
 
 /// Called with MuJoCo's message.
@@ -40,7 +40,7 @@ pub(crate) fn load(check: impl FnOnce(&Functions) -> Result<(), LibraryError>) -
 /// Unless [`crate::load`] has succeeded.
 pub unsafe fn set_handlers(on_error: Handler, on_warning: Handler) {
     let functions = functions();
-    // SAFETY: both point at statics of the library, which is never closed; the caller promises that nobody reads them now.
+    // SAFETY: both point at statics of the library, which is never closed; the caller promises that no thread reads them.
     unsafe {
         *functions.user_error = Some(on_error);
         *functions.user_warning = Some(on_warning);
@@ -54,7 +54,7 @@ fn functions() -> &'static Functions {
 
 macro_rules! functions {
     ($(fn $name:ident($($arg:ident: $type:ty),*) $(-> $out:ty)?;)*) => {
-        // Each signature is that of the header; nothing is linked for it.
+        // Checks the signature against the header's when compiled; nothing is linked.
         $(const _: unsafe extern "C-unwind" fn($($type),*) $(-> $out)? = bindings::$name;)*
 
         /// Addresses in the library.
@@ -69,8 +69,8 @@ macro_rules! functions {
         impl Functions {
             fn load() -> Result<Self, LibraryError> {
                 let library = open(&NAMES)?;
-                // SAFETY: the library's version is checked before anything but `mj_version` and the structs' defaults is called,
-                // and these symbols have the types of its header.
+                // SAFETY: until the version is checked, only `mj_version` and functions that set default values are called,
+                // and these symbols have the types of that version's header.
                 unsafe {
                     Ok(Self {
                         $($name: *symbol(&library, stringify!($name))?,)*
@@ -100,7 +100,7 @@ macro_rules! functions {
 
 // SAFETY: addresses of functions, and of two statics that are written through `set_handlers` alone.
 unsafe impl Send for Functions {}
-// SAFETY: as above; a shared reference allows no more.
+// SAFETY: as above; a shared reference allows nothing else.
 unsafe impl Sync for Functions {}
 
 fn open(names: &[&str]) -> Result<Library, LibraryError> {

@@ -1,11 +1,11 @@
-//! Angles as classes on a circle, and back with a fraction of a class.
+//! Angles as classes on a circle, and the conversion back to angles with a fraction of a class.
 //!
 //! K classes, class k centred on k · 360° / K (divided by the symmetry, see below). A *position* is a point on the
 //! circle of classes in [0, K), with fractions.
 //!
-//! A part that looks the same after a turn by 360° / n has n equivalent angles, and a network trained on one of
-//! them would learn their mean. So the angle is **folded**: n·θ replaces θ, one turn of the classes is one n-th of
-//! a turn of the part, and the loss does not depend on turns that no picture shows.
+//! A part that looks the same after a rotation by 360° / n has n equivalent angles, and a network trained on one of
+//! them would learn their mean. So the angle is **folded**: n·θ replaces θ, the circle of classes is one n-th of a
+//! full rotation of the part, and the loss does not depend on rotations that no picture shows.
 
 use std::f64::consts::TAU;
 
@@ -17,18 +17,19 @@ use serde::{Deserialize, Serialize};
 pub struct AngleClasses {
     /// Number of classes, K.
     pub num_classes: usize,
-    /// n: the number of turns, the full one included, after which the part looks the same; 1 for most parts.
+    /// n: the number of rotations, including the full one, after which the part looks the same; 1 for most parts.
     pub symmetry: usize,
 }
 
 /// The target distribution for a true angle.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Labels {
-    /// All in the nearest class, as in the paper: an error of one degree costs as much as one of 180.
+    /// The whole probability in the nearest class, as in the paper: an error of one degree costs as much as one of
+    /// 180.
     Hard,
     /// A bell around the exact angle, cyclic like the classes.
     VonMises {
-        /// Its standard deviation, in classes (degrees, for 360 classes and no symmetry).
+        /// Standard deviation, in classes (degrees, for 360 classes and no symmetry).
         sigma_classes: f64,
     },
 }
@@ -36,7 +37,7 @@ pub enum Labels {
 /// An angle from the network's output.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AngleReading {
-    /// In (-π, π] / n.
+    /// The angle, in (-π, π] / n.
     pub angle: Angle,
     /// Probability of the angles near this one, in [0, 1].
     pub confidence: f64,
@@ -47,7 +48,7 @@ impl AngleClasses {
     pub fn position(&self, angle: Angle) -> f64 {
         let turns = angle.radians() * self.symmetry as f64 / TAU;
         let position = turns.rem_euclid(1.0) * self.num_classes as f64;
-        // A very small negative angle rounds up to a full turn.
+        // A very small negative angle rounds up to a full rotation.
         if position < self.num_classes as f64 { position } else { 0.0 }
     }
 
@@ -62,13 +63,13 @@ impl AngleClasses {
         self.position(angle).round() as usize % self.num_classes
     }
 
-    /// The smallest visible turn between two angles of the part, in radians, [0, π / n].
+    /// The smallest visible rotation between two angles of the part, in radians, [0, π / n].
     pub fn distance(&self, one: Angle, other: Angle) -> f64 {
         let n = self.symmetry as f64;
         Angle::from_radians((one - other).radians() * n).radians().abs() / n
     }
 
-    /// The distribution over the classes for a true angle; sums to one.
+    /// The distribution over the classes for a true angle; its sum is one.
     pub fn targets(&self, angle: Angle, labels: Labels) -> Vec<f32> {
         match labels {
             Labels::Hard => {
@@ -94,12 +95,12 @@ impl AngleClasses {
             .collect()
     }
 
-    /// Computes the angle from probabilities `[K]` to a fraction of a class: the circular mean within `window`
+    /// Computes the angle from probabilities `[K]`, to a fraction of a class: the circular mean within `window`
     /// classes on both sides of the peak.
     ///
-    /// The peak is that of the probabilities smoothed over half a window, so that one high class among empty ones does
-    /// not win over a broad maximum. Classes beyond the window are confusions, often half a turn away, and must not
-    /// enter the mean.
+    /// The peak is that of the probabilities smoothed over half a window, so a single high class among empty ones does
+    /// not win over a broad maximum. Classes beyond the window are confusions, often at 180°, and must not enter the
+    /// mean.
     pub fn read(&self, probabilities: &[f64], window: usize) -> AngleReading {
         let k = self.num_classes;
         assert_eq!(probabilities.len(), k, "one probability a class");
@@ -132,7 +133,7 @@ mod tests {
     const DEGREES: AngleClasses = AngleClasses { num_classes: 360, symmetry: 1 };
     const SOFT: Labels = Labels::VonMises { sigma_classes: 4.0 };
 
-    /// Rounding of f32 targets, and the tails that the window cuts off.
+    /// Rounding error of f32 targets, and of the tails that the window truncates.
     const READOUT_TOLERANCE_DEGREES: f64 = 1e-3;
 
     #[test]
@@ -151,7 +152,7 @@ mod tests {
         for offset in 1..180 {
             assert!((targets[offset] - targets[360 - offset]).abs() < 1e-9, "{offset}");
         }
-        // Half way between classes 359 and 0 both have the same share.
+        // Halfway between classes 359 and 0, both have the same probability.
         let between = DEGREES.targets(Angle::from_degrees(-0.5), SOFT);
         assert!((between[359] - between[0]).abs() < 1e-7 && between[0] > between[1]);
         // One standard deviation from the peak: e^-½.

@@ -1,11 +1,12 @@
-//! The orientation CNN's shape and the reading of its output, as plain data that a model file can contain.
+//! The shape of the orientation CNN and the conversion of its output to an angle, as plain data that a model file can
+//! contain.
 
 use serde::{Deserialize, Serialize};
 
 use crate::angle_classes::AngleClasses;
 use crate::error::{Result, check_setting};
 
-/// The network and its reading.
+/// The network, and the conversion of its output to an angle.
 ///
 /// ```text
 /// [N, 3, S, S] ─ stage: conv k×k / 2, conv 3×3 … ─ stage ─ … ─ flat ─ hidden ─ [N, K] logits
@@ -20,7 +21,7 @@ pub struct OrientationConfig {
     pub stem_kernel: usize,
     /// Channels of each stage; every stage halves the map.
     pub stage_channels: Vec<usize>,
-    /// Convolutions of each stage, the halving one included; as many as there are stages.
+    /// Number of convolutions of each stage, including the one that halves the map; one number per stage.
     pub stage_convs: Vec<usize>,
     /// Groups of the group norms; divides every stage's channels.
     pub norm_groups: usize,
@@ -33,9 +34,9 @@ pub struct OrientationConfig {
 /// How the angle is read from the logits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Readout {
-    /// Classes on either side of the peak in the circular mean; 0 for the peak's own class, as in the paper.
+    /// Classes on either side of the peak that enter the circular mean; 0 for only the peak's class, as in the paper.
     pub window_classes: usize,
-    /// Whether the crop is evaluated at turns of 0°, 90°, 180° and 270° and the four results, turned back, are
+    /// Whether the crop is evaluated at rotations of 0°, 90°, 180° and 270° and the four results are rotated back and
     /// combined, for four times the work.
     pub quarter_turns: bool,
 }
@@ -55,11 +56,11 @@ impl OrientationConfig {
         }
     }
 
-    /// The paper's: 224 × 224 × 3 pixels in, 360 classes out, at most 8 MB in half precision (3.3 million parameters);
-    /// the class with the highest score is the angle.
+    /// The paper's configuration: 224 × 224 × 3 pixels in, 360 classes out, at most 8 MB in half precision (3.3
+    /// million parameters); the class with the highest score is the angle.
     ///
     /// # Source
-    /// Paper, sections IV-A and V; it does not describe the layers between, which are our choice.
+    /// Paper, sections IV-A and V. It does not describe the layers between input and output; they are our choice.
     pub fn paper() -> Self {
         Self {
             input_px: 224,
@@ -73,7 +74,7 @@ impl OrientationConfig {
         }
     }
 
-    /// The same for a part that looks the same after every n-th of a turn.
+    /// The configuration for a part that looks the same after a rotation by 360° / `symmetry`.
     pub fn with_symmetry(mut self, symmetry: usize) -> Self {
         self.classes.symmetry = symmetry;
         self
@@ -84,10 +85,10 @@ impl OrientationConfig {
         self.input_px as usize >> self.stage_channels.len()
     }
 
-    /// Checks that the network can be built and read.
+    /// Checks that the network can be built and its output converted.
     ///
     /// # Errors
-    /// [`OrientationError::Config`](crate::OrientationError::Config) names the first setting that is not usable.
+    /// [`OrientationError::Config`](crate::OrientationError::Config) names the first invalid setting.
     pub fn validate(&self) -> Result<()> {
         let num_stages = self.stage_channels.len();
         check_setting((1..=6).contains(&num_stages), "stage_channels", "1 to 6 stages", num_stages)?;

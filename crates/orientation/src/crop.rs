@@ -1,12 +1,12 @@
 //! The square around a detected box that is the network's input.
 //!
-//! **Square**, because a crop of the box's own shape, stretched to the network's square input, would shear the part:
-//! a bar at 30° in a wide box appears at another angle, with an error that depends on the angle itself.
+//! **Square**, because a crop of the box's own shape, stretched to the network's square input, would shear the part: a
+//! bar at 30° in a wide box would appear at another angle, with an error that depends on the angle itself.
 //!
-//! **Its side is the box's diagonal**, with a margin. A part turned in place changes its box; the longer side of a
-//! bar's box is the bar's length times cos θ, so a crop by the longer side would show the bar 1.4 times as large at 45°
-//! as at 0°. The diagonal of a bar's box is the bar's length at every angle, and the whole part is inside for any error
-//! of the box within the margin.
+//! **Its side is the box's diagonal**, with a margin. A part that is rotated in place changes its box; the longer side
+//! of a bar's box is the bar's length times cos θ, so a crop by the longer side would show the bar 1.4 times as large
+//! at 45° as at 0°. The diagonal of a bar's box is the bar's length at every angle, and the whole part is inside for
+//! any error of the box within the margin.
 
 use image::RgbImage;
 use nalgebra::{Point2, Vector2};
@@ -14,7 +14,7 @@ use sdg_geometry::{Angle, BoundingBox};
 
 use crate::error::{OrientationError, Result};
 
-/// Side of the crop over the diagonal of the box: room for a small error of the box.
+/// Ratio of the crop's side to the box's diagonal: room for a small error of the box.
 const SIDE_PER_DIAGONAL: f64 = 1.1;
 
 /// Colour of a crop beyond the image: the mean colour of photos, which is zero in the network's input.
@@ -23,7 +23,7 @@ pub const OUTSIDE: [u8; 3] = [124, 116, 104];
 /// Maximum number of samples averaged for one pixel of a crop, along each axis: a reduction of eight.
 const MAX_TAPS: usize = 8;
 
-/// A square of an image, possibly turned: the area of a crop.
+/// A square of an image, possibly rotated: the area of a crop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CropWindow {
     /// Centre, in pixels of the image.
@@ -49,20 +49,20 @@ impl CropWindow {
         Ok(Self { center: bbox.center(), side, turn: Angle::ZERO })
     }
 
-    /// The direction in the crop of a direction of the image.
+    /// The direction in the crop that corresponds to a direction in the image.
     pub fn crop_angle(&self, image_angle: Angle) -> Angle {
         image_angle - self.turn
     }
 
-    /// The position in the image of a position of a crop of `size_px` pixels per side, both in pixels.
+    /// The position in the image that corresponds to a position in a crop of `size_px` pixels per side, both in pixels.
     pub fn image_point(&self, in_crop: &Point2<f64>, size_px: u32) -> Point2<f64> {
         let half = f64::from(size_px) / 2.0;
         let scale = self.side / f64::from(size_px);
         self.center + self.x_axis() * (scale * (in_crop.x - half)) + self.y_axis() * (scale * (in_crop.y - half))
     }
 
-    /// Reads the window into `size_px` × `size_px` pixels. When reducing, it averages over each pixel's whole area, so
-    /// that a crop of a large image looks like one of a small image.
+    /// Resamples the window to `size_px` × `size_px` pixels. When reducing, it averages over each pixel's whole area,
+    /// so a crop of a large image looks like a crop of a small image.
     pub fn read(&self, image: &RgbImage, size_px: u32) -> RgbImage {
         let scale = self.side / f64::from(size_px);
         let taps = (scale.ceil() as usize).clamp(1, MAX_TAPS);
@@ -107,15 +107,15 @@ fn floor(value: f32) -> f32 {
     if whole > value { whole - 1.0 } else { whole }
 }
 
-/// `f32::round` of a colour, without a call.
+/// `f32::round` of a colour, without a function call.
 fn rounded(value: f32) -> u8 {
     let whole = value as u8;
     if value - f32::from(whole) >= 0.5 { whole.saturating_add(1) } else { whole }
 }
 
-/// The colour between four pixels, whose centres are at halves; [`OUTSIDE`] beyond the image.
+/// The colour between four pixels, whose centres are at half-integers; [`OUTSIDE`] beyond the image.
 ///
-/// The pretrained weights depend on this order of the sum: `sdg-shape`'s sampling rounds differently and ends at the
+/// The pretrained weights depend on this order of the sum: `sdg-shape`'s sampling rounds differently and stops at the
 /// border.
 fn bilinear(image: &RgbImage, x: f32, y: f32) -> [f32; 3] {
     let (width, height) = (image.width() as i32, image.height() as i32);
@@ -146,12 +146,12 @@ fn bilinear(image: &RgbImage, x: f32, y: f32) -> [f32; 3] {
     }))
 }
 
-/// The crop of a detected box, as [`OrientationCnn::predict`](crate::OrientationCnn::predict) reads it: `size_px` ×
+/// The crop of a detected box, as [`OrientationCnn::predict`](crate::OrientationCnn::predict) expects it: `size_px` ×
 /// `size_px` pixels of the square around the box's centre.
 ///
 /// # Units and frames
-/// `bbox` in pixels of `image`, x right, y down, the centre of the first pixel at (0.5, 0.5); it may reach beyond the
-/// image, where its colour is [`OUTSIDE`].
+/// `bbox` in pixels of `image`, x right, y down, the centre of the first pixel at (0.5, 0.5); it may extend beyond the
+/// image, where the colour is [`OUTSIDE`].
 ///
 /// # Errors
 /// An image without pixels, a box without area or not finite, a size of zero.
@@ -180,7 +180,7 @@ mod tests {
     fn the_square_has_the_boxs_centre_and_its_diagonal() {
         let window = CropWindow::around(&boxed(10.0, 20.0, 40.0, 60.0)).unwrap();
         assert_eq!(window.center, Point2::new(25.0, 40.0));
-        // A 3-4-5 triangle: 50 px, plus a tenth.
+        // A 3-4-5 triangle: 50 px, plus ten per cent.
         assert!((window.side - 55.0).abs() < 1e-9);
         let corner = window.image_point(&Point2::new(0.0, 0.0), 64);
         assert!((corner - Point2::new(-2.5, 12.5)).norm() < 1e-9, "{corner}");
@@ -199,7 +199,7 @@ mod tests {
 
     #[test]
     fn a_crop_shows_what_the_window_covers() {
-        // Right half of the image red; the box's centre lies on the border between the halves.
+        // The right half of the image is red; the box's centre is on the border between the halves.
         let image = RgbImage::from_fn(80, 60, |x, _| Rgb(if x < 40 { [0, 0, 0] } else { [200, 0, 0] }));
         let crop = crop_for(&image, &boxed(35.0, 25.0, 45.0, 35.0), 16).unwrap();
         assert_eq!(crop.dimensions(), (16, 16));
@@ -208,7 +208,7 @@ mod tests {
 
     #[test]
     fn a_turned_window_turns_what_it_shows_back() {
-        // Brighter along +y: with the x axis of the crop along the image's +y, brighter along the crop's +x.
+        // Brighter along +y: if the x axis of the crop points along the image's +y, the crop is brighter along its +x.
         let image = RgbImage::from_fn(60, 60, |_, y| Rgb([4 * y as u8; 3]));
         let window = CropWindow { center: Point2::new(30.0, 30.0), side: 20.0, turn: Angle::from_degrees(90.0) };
         let crop = window.read(&image, 10);

@@ -5,9 +5,9 @@ use thiserror::Error;
 /// An input with which the orientation CNN cannot work. Each message gives the expected and the found value.
 #[derive(Debug, Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "the messages say what the fields are")]
+#[allow(missing_docs, reason = "the messages explain the fields")]
 pub enum OrientationError {
-    /// A setting is outside its range, or two contradict each other.
+    /// A setting is outside its range, or two settings contradict each other.
     #[error("orientation CNN: {field} must be {expected}, found {found}")]
     Config { field: &'static str, expected: String, found: String },
     /// An image has no pixels.
@@ -16,7 +16,7 @@ pub enum OrientationError {
     /// A box that gives no crop.
     #[error("a box for cropping needs finite corners and a positive area, found ({x1}, {y1}) to ({x2}, {y2})")]
     BadBox { x1: f64, y1: f64, x2: f64, y2: f64 },
-    /// A crop of another size than the network's input.
+    /// A crop whose size differs from the network's input.
     #[error("the orientation CNN reads crops of {expected}x{expected} pixels, found {width}x{height}")]
     CropSize { expected: u32, width: u32, height: u32 },
 }
@@ -24,7 +24,7 @@ pub enum OrientationError {
 /// Result of the fallible functions of this crate.
 pub type Result<T> = std::result::Result<T, OrientationError>;
 
-/// Refuses a setting of the network, or of its teaching, that is out of range.
+/// Rejects a setting of the network, or of its training, that is out of range.
 ///
 /// # Errors
 /// [`OrientationError::Config`].

@@ -1,4 +1,4 @@
-//! The orientation CNN of grasp model A: from the crop of a detected box to the angle at which the part lies.
+//! The orientation CNN of grasp model A: estimates the angle of a part from the crop of its detected box.
 //!
 //! ```text
 //! RgbImage, BoundingBox ─ CropWindow: a square around the box's centre ─ crop, S×S
@@ -6,10 +6,10 @@
 //!   ─ AngleClasses: the peak, and the circular mean around it ─ AngleReading {angle, confidence}
 //! ```
 //!
-//! The angle is the direction of the marked grasp line, `atan2(dy, dx)` in pixels with y down, so that several
-//! demonstrations of one part agree on it for any turn of the part in each photo.
+//! The angle is the direction of the marked grasp line, `atan2(dy, dx)` in pixels with y down, so several
+//! demonstrations of one part agree on it, whatever the part's rotation in each photo.
 //!
-//! Elsewhere: finding the box (crate `detection`), teaching (crate `training`), files and clocks. Parts that look the
+//! Elsewhere: finding the box (crate `detection`), training (crate `training`), files and clocks. Parts that look the
 //! same at every angle are excluded, because there is nothing to learn.
 //!
 //! # Example

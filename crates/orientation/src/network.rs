@@ -1,4 +1,4 @@
-//! The network: a batch of crops in, logits of angle classes out, and the angles read from them.
+//! The network: computes logits of angle classes from a batch of crops, and angles from the logits.
 //!
 //! Shapes: N crops, C channels, S the input's side, M the last map's side, K angle classes.
 //!
@@ -16,7 +16,7 @@ use crate::config::OrientationConfig;
 use crate::crop::OUTSIDE;
 use crate::error::{OrientationError, Result};
 
-/// Grey values per unit of the network's input: about the deviation of photos.
+/// Grey values per unit of the network's input: about the standard deviation of photos.
 const GREY_VALUES_PER_UNIT: f32 = 58.0;
 
 /// Convolutions of stride 2 and two fully connected layers: logits of the angle classes.
@@ -33,7 +33,7 @@ pub struct OrientationCnn {
 }
 
 impl OrientationConfig {
-    /// Builds the network with parameters drawn from a seed.
+    /// Builds the network with random parameters from a seed.
     ///
     /// For training the device must carry autodiff (`device.autodiff()`; crate `training` has the feature).
     ///
@@ -43,7 +43,7 @@ impl OrientationConfig {
         self.build(Initializer::new(device, seed))
     }
 
-    /// Builds the network on `device` without initial values, for a caller that sets all parameters next.
+    /// Builds the network on `device` without initial values, for a caller that then sets all parameters.
     ///
     /// # Errors
     /// As for [`Self::init`].
@@ -77,17 +77,17 @@ impl OrientationConfig {
 }
 
 impl OrientationCnn {
-    /// The configuration that the network was built from.
+    /// The configuration of the network.
     pub fn config(&self) -> &OrientationConfig {
         &self.config
     }
 
-    /// The device that the parameters are on, autodiff included.
+    /// The device of the parameters, including autodiff.
     pub fn device(&self) -> Device {
         self.classes.weight.val().device()
     }
 
-    /// Gives the logits of a batch from [`crop_batch`].
+    /// Returns the logits of a batch from [`crop_batch`].
     ///
     /// # Shapes
     /// - `crops`: `[N, 3, S, S]`
@@ -103,29 +103,29 @@ impl OrientationCnn {
     pub fn features(&self, crops: Tensor<4>) -> Tensor<2> {
         let [n, channels, height, width] = crops.dims();
         let side = self.config.input_px as usize;
-        assert_eq!([channels, height, width], [3, side, side], "crops are [N, 3, S, S]");
+        assert_eq!([channels, height, width], [3, side, side], "expected crops of [N, 3, S, S]");
         let convs = self.stages.iter().flat_map(|stage| &stage.convs);
         let map = convs.fold(crops, |x, conv| conv.forward(x));
         let flat: Tensor<2> = map.reshape([n as i64, -1]);
         activation::relu(self.hidden.forward(flat))
     }
 
-    /// Reads the angle of the part on a crop.
+    /// Estimates the angle of the part on a crop.
     ///
     /// # Units and frames
     /// The direction of the marked grasp line in the crop, `atan2(dy, dx)` with y down; within the part's symmetry.
-    /// Crops of detected boxes are not turned, so that it is also the direction in the image.
+    /// Crops of detected boxes are not rotated, so it is also the direction in the image.
     ///
     /// # Errors
-    /// [`OrientationError::CropSize`] for a crop of another size than [`OrientationConfig::input_px`].
+    /// [`OrientationError::CropSize`] for a crop whose size is not [`OrientationConfig::input_px`].
     pub fn predict(&self, crop: &RgbImage) -> Result<AngleReading> {
         read_sync(self.predict_async(crop))
     }
 
-    /// [`Self::predict`], asynchronous; for browsers, which give access to results of a graphics card only in this way.
+    /// [`Self::predict`], asynchronous, for browsers, which give access to a graphics card's results only in this way.
     ///
     /// # Errors
-    /// As there.
+    /// The errors of [`Self::predict`].
     pub async fn predict_async(&self, crop: &RgbImage) -> Result<AngleReading> {
         let expected = self.config.input_px;
         if crop.dimensions() != (expected, expected) {
@@ -142,16 +142,16 @@ impl OrientationCnn {
         Ok(self.config.classes.read(&self.combined(&logits), readout.window_classes))
     }
 
-    /// Logarithms of the classes' probabilities on each crop.
+    /// Logarithms of the classes' probabilities for each crop.
     async fn log_probabilities(&self, crops: &[RgbImage]) -> Vec<Vec<f32>> {
         let logits = self.forward(crop_batch(crops, &self.device()));
         let read = activation::log_softmax(logits, 1).into_data_async().await;
-        let values: Vec<f32> = read.expect("what the device computes can be read").iter::<f32>().collect();
+        let values: Vec<f32> = read.expect("expected readable results of the device").iter::<f32>().collect();
         values.chunks_exact(self.config.classes.num_classes).map(<[f32]>::to_vec).collect()
     }
 
-    /// One distribution from those of a crop at equal turns (clockwise as seen, which adds to the angle): the
-    /// normalised geometric mean, in which a class that is improbable at one turn stays improbable.
+    /// Combines the distributions of a crop at equally spaced rotations (clockwise as seen, which adds to the angle) by
+    /// the normalised geometric mean: a class that is improbable at one rotation stays improbable.
     fn combined(&self, log_probabilities: &[Vec<f32>]) -> Vec<f64> {
         let (k, turns) = (self.config.classes.num_classes, log_probabilities.len());
         let mean_log: Vec<f64> = (0..k)
@@ -173,7 +173,7 @@ impl OrientationCnn {
         state_dict::export(self)
     }
 
-    /// Sets every parameter that `dict` has with the right shape, and reports the rest.
+    /// Sets every parameter for which `dict` has an entry of the correct shape, and reports the rest.
     pub fn with_state_dict(self, dict: &StateDict) -> (Self, ImportReport) {
         state_dict::import(self, dict)
     }
@@ -184,11 +184,11 @@ impl OrientationCnn {
 /// # Panics
 /// Without a crop, or with crops of several sizes.
 pub fn crop_batch(crops: &[RgbImage], device: &Device) -> Tensor<4> {
-    let (width, height) = crops.first().expect("a batch has at least one crop").dimensions();
+    let (width, height) = crops.first().expect("expected at least one crop").dimensions();
     let num_pixels = (width * height) as usize;
     let mut values = vec![0f32; crops.len() * 3 * num_pixels];
     for (crop, planes) in crops.iter().zip(values.chunks_exact_mut(3 * num_pixels)) {
-        assert_eq!(crop.dimensions(), (width, height), "crops of one batch have one size");
+        assert_eq!(crop.dimensions(), (width, height), "expected crops of one size");
         for (channel, plane) in planes.chunks_exact_mut(num_pixels).enumerate() {
             let mean = f32::from(OUTSIDE[channel]);
             for (value, rgb) in plane.iter_mut().zip(crop.as_raw().chunks_exact(3)) {
@@ -247,7 +247,7 @@ mod tests {
 
     #[test]
     fn four_quarter_turns_make_the_reading_turn_with_the_crop() {
-        // An untrained network gives arbitrary answers, but the answers to all four turns of a crop are the same four.
+        // An untrained network gives arbitrary angles, but all four rotations of a crop give the same four angles.
         let network = tiny(true);
         let straight = network.predict(&pattern()).unwrap().angle;
         let clockwise = network.predict(&rotate90(&pattern())).unwrap().angle;

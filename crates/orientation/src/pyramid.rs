@@ -1,4 +1,4 @@
-//! An image and its halves, for a caller that reads many windows of it.
+//! An image with its halved copies, for a caller that crops many windows of it.
 
 use std::sync::OnceLock;
 
@@ -7,10 +7,10 @@ use nalgebra::Point2;
 
 use crate::crop::CropWindow;
 
-/// Maximum number of halvings: more would leave nothing of a photo.
+/// Maximum number of halvings: more would leave almost nothing of a photo.
 const MAX_HALVINGS: usize = 6;
 
-/// An image with its halves, each made when it is first needed.
+/// An image with its halved copies, each computed on first use.
 #[derive(Debug)]
 pub struct Pyramid<'a> {
     image: &'a RgbImage,
@@ -18,7 +18,7 @@ pub struct Pyramid<'a> {
 }
 
 impl<'a> Pyramid<'a> {
-    /// Over an image; nothing is computed yet.
+    /// Makes a pyramid of an image; no copy is computed yet.
     pub fn new(image: &'a RgbImage) -> Self {
         Self { image, halves: Default::default() }
     }
@@ -30,10 +30,10 @@ impl<'a> Pyramid<'a> {
         }
     }
 
-    /// Reads a window of the image into `size_px` × `size_px` pixels, as [`CropWindow::read`] does, from the smallest
-    /// half with at least one pixel for each of the crop's. For a large window this takes a fraction of the time. The
-    /// colours differ by rounding and by the averaging of a pixel's area; the image's border is blurred by up to two of
-    /// the crop's pixels.
+    /// Resamples a window of the image to `size_px` × `size_px` pixels, like [`CropWindow::read`], but from the
+    /// smallest copy that has at least one pixel per pixel of the crop. For a large window this takes a fraction of the
+    /// time. The colours differ by rounding and by the averaging of a pixel's area; the image's border is blurred by up
+    /// to two of the crop's pixels.
     pub fn read(&self, window: &CropWindow, size_px: u32) -> RgbImage {
         let (mut halvings, mut scale) = (0, window.side / f64::from(size_px));
         while scale >= 2.0 && halvings < MAX_HALVINGS {
@@ -45,7 +45,7 @@ impl<'a> Pyramid<'a> {
     }
 }
 
-/// The mean of 2×2 pixels; an odd last row or column is left out, so that positions are exactly halved.
+/// Halves an image by the mean of 2×2 pixels; an odd last row or column is left out, so positions are exactly halved.
 pub fn halved(image: &RgbImage) -> RgbImage {
     let (width, height) = (image.width() / 2, image.height() / 2);
     let stride = 3 * image.width() as usize;
@@ -70,7 +70,7 @@ mod tests {
 
     #[test]
     fn a_large_window_shows_what_it_shows_read_from_the_image_itself() {
-        // Waves of several of the crop's pixels: finer ones are averaged differently.
+        // Waves of several pixels of the crop, because finer ones are averaged differently.
         let image = RgbImage::from_fn(901, 803, |x, y| {
             let wave = |t: f64| (127.0 + 120.0 * t.sin()) as u8;
             Rgb([wave(f64::from(x) / 20.0), wave(f64::from(x + 2 * y) / 60.0), wave(f64::from(y) / 25.0)])
@@ -83,7 +83,7 @@ mod tests {
             let mean = differences.sum::<f64>() / exact.as_raw().len() as f64;
             assert!(mean <= within, "{side}: {mean}");
         }
-        // Too small to be halved this often: outside it the colour is the mean colour.
+        // The image is too small to be halved this often; beyond it the colour is the mean colour.
         let tiny = RgbImage::new(3, 2);
         let window = CropWindow { center: Point2::new(1.0, 1.0), side: 900.0, turn: Angle::ZERO };
         assert_eq!(Pyramid::new(&tiny).read(&window, 2).dimensions(), (2, 2));

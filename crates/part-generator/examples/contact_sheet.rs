@@ -1,9 +1,10 @@
 //! Draws contact sheets for inspection: parts, scenes, look-alikes beside their part.
 //!
-//! `cargo run --release -p sdg-part-generator --example contact_sheet FOLDER [SEED [ZOOM]]`
+//! Usage: `cargo run --release -p sdg-part-generator --example contact_sheet FOLDER [SEED [ZOOM]]`
 //!
-//! Writes `parts_N.png` (100 parts, a photo each, marks and outline drawn in), `scenes_N.png` (100 scenes of as many parts) and
-//! `look_alikes.png` (a row is a part, its mirror image, two with a feature moved, four sizes) into FOLDER.
+//! Writes `parts_N.png` (100 parts, a photo of each with marks and outline), `scenes_N.png` (100 scenes of as many
+//! parts) and `look_alikes.png` (each row shows a part, its mirror image, two copies with a moved feature, and four
+//! sizes) into FOLDER.
 
 use std::path::{Path, PathBuf};
 
@@ -76,7 +77,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                     Some((kind, seed)) => part.look_alike(kind, seed),
                 };
                 if let Some(other) = other {
-                    // An equal fill for all would hide the size: each is drawn in proportion.
+                    // An equal fill for all would hide the size, so each part is drawn in proportion.
                     let fill = 0.6 * other.diagonal_mm() / part.diagonal_mm();
                     let config = PhotoConfig { fill: [fill, fill], ..photo };
                     let taken = DemonstrationPhoto::take(&other, &config, seed);

@@ -1,5 +1,5 @@
-//! Photos of generated parts with marks beside them, in the format for `sdg teach --demos`; the last two show the same
-//! part.
+//! Writes photos of generated parts with their marks, in the format for `sdg teach --demos`; the last two photos show
+//! the same part.
 //!
 //! ```sh
 //! cargo run --release -p sdg-part-generator --example demonstrations -- target/many-parts 100

@@ -1,4 +1,5 @@
-//! Photos of generated parts with their true outlines, in the format of crates/demonstration/tests/outlines.
+//! Writes photos of generated parts with their true outlines, in the format of
+//! crates/demonstration/tests/outlines.
 //!
 //! ```sh
 //! cargo run --release -p sdg-part-generator --example outline_pictures -- crates/demonstration/tests/outlines 15

@@ -1,10 +1,10 @@
 //! Measures the speed of drawing samples: pictures per second, and processor time per picture.
 //!
-//! `cargo run --release -p sdg-part-generator --example speed [SAMPLES [THREADS [NAME]]]`
+//! Usage: `cargo run --release -p sdg-part-generator --example speed [SAMPLES [THREADS [NAME]]]`
 //!
 //! Prints a line for the default scenes and one for each single condition, at 320x240, with ten parts; with a name
-//! (`default`, `tilt`, …) only that line. Processor time is that of the process, so it is meaningful on a busy machine
-//! too.
+//! (`default`, `tilt`, …) only that line. Processor time is that of the process, so it is also meaningful on a busy
+//! machine.
 
 use std::time::Instant;
 

@@ -1,18 +1,19 @@
 //! Writes generated pictures with LabelMe marks, in the format for `sdg evaluate --pictures`.
 //!
-//! `cargo run --release -p sdg-part-generator --example write_samples FOLDER [PART_SEED [COUNT [CONDITION [SEED]]]]`
+//! Usage: `cargo run --release -p sdg-part-generator --example write_samples FOLDER [PART_SEED [COUNT [CONDITION
+//! [SEED]]]]`
 //!
 //! CONDITION is `default` or the name of one condition (`tilt`, `cover`, `dark` …). FOLDER then contains `demo.png` and
 //! `demo.json`, and pictures `NNN.png` with `NNN.json` beside them: for each instance a rectangle and the points
-//! `grasp_start` and `grasp_end` with a common `group_id`. Instances with a visible share below [`MIN_VISIBLE_SHARE`]
-//! have the flag `optional`; pictures without the part have an empty list of shapes.
+//! `grasp_start` and `grasp_end` with a common `group_id`. Instances with a visible fraction below
+//! [`MIN_VISIBLE_SHARE`] have the flag `optional`; pictures without the part have an empty list of shapes.
 
 use std::path::{Path, PathBuf};
 
 use sdg_demonstration::{Annotation, AnnotationFormat, ImageFacts};
 use sdg_part_generator::{Condition, Part, Sample, SceneConfig, Scenes};
 
-/// Visible share below which an instance is optional.
+/// Visible fraction below which an instance is optional.
 const MIN_VISIBLE_SHARE: f64 = 0.5;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

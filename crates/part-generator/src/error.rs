@@ -1,9 +1,9 @@
-//! Errors of setting up scenes.
+//! Errors of the configuration of scenes.
 
-/// Why scenes could not be set up.
+/// The reason why scenes could not be set up.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "the messages say what the fields are")]
+#[allow(missing_docs, reason = "the messages explain the fields")]
 pub enum GeneratorError {
     /// No part was given.
     #[error("expected at least one part, found none")]

@@ -20,9 +20,9 @@ pub struct PartGrasp {
     pub start: [f32; 2],
     /// Second mark.
     pub end: [f32; 2],
-    /// Width of the part between the jaws.
+    /// Width of the part between the jaws, in millimetres.
     pub jaw_width_mm: f32,
-    /// Height of the marks above the table.
+    /// Height of the marks above the table, in millimetres.
     pub height_mm: f32,
 }
 
@@ -104,7 +104,7 @@ fn along(
         let mut b = 0.5 * (lower + upper);
         let off_center = a.hypot(b) / diagonal;
         if symmetry != RotationalSymmetry::None {
-            // Only the centre is invariant under a turn.
+            // Only the centre does not move under the part's rotations.
             if off_center > 0.02 {
                 continue;
             }

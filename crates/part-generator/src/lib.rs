@@ -14,8 +14,7 @@
 //! **Frames.** Part: millimetres, x right, y down as seen from above, z up from the table. Picture: pixels, the centre
 //! of the first pixel at (0.5, 0.5). Angles are in radians from x to y, so clockwise as seen.
 //!
-//! Deliberately absent: files, clocks, tensors (no burn), a simulator, and every part that the project ships: nothing
-//! here is modelled on one.
+//! Deliberately absent: files, clocks, tensors (no burn), a simulator, and models of the parts that the project ships.
 //!
 //! ```
 //! use sdg_part_generator::{Condition, LookAlike, Part, PhotoConfig, SceneConfig, Scenes, demonstration};

@@ -11,10 +11,10 @@ use crate::part_pair::PartPair;
 use crate::random::{Draw, Stream, generator};
 use crate::recipe::{Operation, Recipe, Shape};
 
-/// Range of a feature's displacement, as shares of the part's diagonal.
+/// Range of a feature's displacement, as fractions of the part's diagonal.
 const MOVE_SHARES: [f32; 2] = [0.05, 0.10];
 
-/// Minimum share of the cells that a moved feature must change.
+/// Minimum fraction of the cells that a moved feature must change.
 const MIN_CHANGED_SHARE: f32 = 0.006;
 
 /// Number of displacements tried before a part counts as having no movable feature.
@@ -28,15 +28,15 @@ pub enum LookAlike {
     Mirrored,
     /// One feature moved by 5 to 10 % of the part's diagonal.
     FeatureMoved,
-    /// Another size: the factor, usually 0.8 to 1.25.
+    /// A copy of another size: the factor, usually 0.8 to 1.25.
     Scaled(f64),
 }
 
 impl Part {
     /// A part that resembles this one but is different.
     ///
-    /// `None` if there is no such part: the mirror image equals the part in some turn, no feature can be moved visibly,
-    /// the factor is 1 or not positive and finite, or the look-alike cannot be grasped.
+    /// `None` if there is no such part: the mirror image equals the part at some angle, no feature can be moved
+    /// visibly, the factor is 1 or not positive and finite, or the look-alike cannot be grasped.
     pub fn look_alike(&self, kind: LookAlike, seed: u64) -> Option<Part> {
         match kind {
             LookAlike::Mirrored => self.mirrored(),
@@ -58,7 +58,7 @@ impl Part {
             let shift = diagonal * rng.uniform(MOVE_SHARES[0], MOVE_SHARES[1]);
             let recipe = moved(&self.recipe, shift, rng.angle(), rng.random_group(&self.recipe))?;
             let made = Part::from_recipe(self.kind, recipe)?;
-            // In place, a visible share must differ; in no other turn may it look the same.
+            // In the same position a visible fraction must differ, and at no angle may the two look the same.
             let in_place = PartPair::new(&self.relief, self.center, &made.relief, self.center);
             let turned = PartPair::new(&self.relief, self.center, &made.relief, made.center);
             let differs = in_place.difference(0.0, MIN_CHANGED_SHARE) > MIN_CHANGED_SHARE;
@@ -85,7 +85,7 @@ impl Part {
     }
 }
 
-/// Draws a group of features that may be moved.
+/// Selects a group of features that may be moved.
 trait DrawGroup {
     fn random_group(&mut self, recipe: &Recipe) -> u16;
 }
@@ -98,7 +98,8 @@ impl<R: Draw> DrawGroup for R {
     }
 }
 
-/// The recipe with one group moved by `shift` in a direction; of the body, a corner, bend or shoulder is moved.
+/// The recipe with one group moved by `shift` in a direction. If the group is the body, a corner, bend or shoulder is
+/// moved.
 fn moved(recipe: &Recipe, shift: f32, direction: f32, group: u16) -> Option<Recipe> {
     let mut made = recipe.clone();
     let (sin, cos) = direction.sin_cos();
@@ -121,7 +122,7 @@ fn moved(recipe: &Recipe, shift: f32, direction: f32, group: u16) -> Option<Reci
         }
         return any.then_some(made);
     }
-    // The direction also determines the moved point.
+    // The direction also selects the moved point.
     let choose = |count: usize| (direction * 1000.0) as usize % count;
     let body = made.features.iter_mut().find(|feature| feature.group == 0)?;
     match (&mut body.shape, &mut body.operation) {
@@ -153,7 +154,7 @@ fn moved(recipe: &Recipe, shift: f32, direction: f32, group: u16) -> Option<Reci
 mod tests {
     use super::*;
 
-    /// Number of compared turns in a full rotation: twice as many as in choosing look-alikes.
+    /// Number of compared angles in a full rotation: twice as many as in choosing look-alikes.
     const NUM_TURNS: usize = 720;
 
     fn is_same_at_some_turn(one: &Part, other: &Part) -> bool {
@@ -168,7 +169,7 @@ mod tests {
             let part = Part::generate(seed);
             if let Some(mirrored) = part.look_alike(LookAlike::Mirrored, 0) {
                 assert!(!is_same_at_some_turn(&part, &mirrored), "mirror image of part {seed}");
-                // The mirror image of the mirror image is the part, which shows that the comparison can find equality.
+                // The mirror image of the mirror image is the part; this tests that the comparison can find equality.
                 let twice = Part::from_recipe(part.kind, mirrored.recipe.mirrored()).unwrap();
                 assert!(is_same_at_some_turn(&part, &twice), "part {seed} mirrored twice");
                 compared[0] += 1;

@@ -83,7 +83,8 @@ impl Part {
         self.kind
     }
 
-    /// Turns about the vertical in which it looks the same, computed from its heights and colours.
+    /// The rotations about the vertical axis after which the part looks the same, computed from
+    /// its heights and colours.
     pub fn symmetry(&self) -> RotationalSymmetry {
         self.symmetry
     }
@@ -93,7 +94,7 @@ impl Part {
         self.grasp
     }
 
-    /// Its outer outline in the vertical view, in millimetres in its own frame.
+    /// The part's outer outline in the vertical view, in millimetres in its own frame.
     pub fn outline(&self) -> &Polygon {
         &self.outline
     }
@@ -104,7 +105,7 @@ impl Part {
         [bounds.width(), bounds.height(), f64::from(self.relief.top_mm)]
     }
 
-    /// The diagonal of its outline's bounding box, in millimetres.
+    /// The diagonal of the outline's bounding box, in millimetres.
     pub fn diagonal_mm(&self) -> f64 {
         let bounds = self.outline.bounds();
         bounds.width().hypot(bounds.height())

@@ -1,17 +1,17 @@
-//! Whether two parts look the same under a turn: the measure for symmetry and look-alikes.
+//! Compares two parts under rotations: the measure for symmetry and look-alikes.
 
 use sdg_geometry::RotationalSymmetry;
 
 use crate::recipe::Material;
 use crate::relief::{Level, Relief};
 
-/// Maximum share of differing cells between two parts that look the same, due to rounding to cells.
+/// Maximum fraction of differing cells between two parts that look the same, due to rounding to cells.
 const MAX_SAME_SHARE: f32 = 0.0015;
 
 /// Maximum order of rotational symmetry that is detected.
 const MAX_FOLD: u32 = 40;
 
-/// Minimum visible difference of heights, in millimetres, plus a share of the part's height.
+/// Minimum visible difference of heights, in millimetres, plus a fraction of the part's height.
 const HEIGHT_TOLERANCE_MM: f32 = 0.3;
 const HEIGHT_TOLERANCE_SHARE: f32 = 0.03;
 
@@ -34,7 +34,7 @@ pub(crate) fn centroid(relief: &Relief) -> [f32; 2] {
     sum.map(|s| (s / count.max(1) as f64) as f32)
 }
 
-/// Two parts, each with the fixed point of the turn.
+/// Two parts, each with the centre of the rotation.
 pub(crate) struct PartPair<'a> {
     a: (&'a Relief, [f32; 2]),
     b: (&'a Relief, [f32; 2]),
@@ -54,8 +54,8 @@ impl<'a> PartPair<'a> {
         Self { a: (a, center_a), b: (b, center_b), height_tolerance_mm, same_material }
     }
 
-    /// Share of the cells without a counterpart within one cell when `a` is turned by `turn` radians; counting stops
-    /// above `enough`.
+    /// Fraction of the cells without a counterpart within one cell when `a` is rotated by `turn` radians; counting
+    /// stops above `enough`.
     pub fn difference(&self, turn: f32, enough: f32) -> f32 {
         let covered = self.a.0.levels[1].texels.iter().filter(|texel| texel.top > 0).count().max(1);
         let limit = (enough * covered as f32).ceil() as usize + 4;
@@ -66,12 +66,12 @@ impl<'a> PartPair<'a> {
         (there + self.unmatched(true, -turn, limit)) as f32 / covered as f32
     }
 
-    /// Whether the two look the same when `a` is turned by `turn`.
+    /// Whether the two look the same when `a` is rotated by `turn`.
     pub fn is_same(&self, turn: f32) -> bool {
         self.difference(turn, MAX_SAME_SHARE) <= MAX_SAME_SHARE
     }
 
-    /// Whether some turn makes the two look the same.
+    /// Whether the two look the same at some angle.
     pub fn is_same_at_some_turn(&self) -> bool {
         (0..360).any(|degree| self.is_same((degree as f32).to_radians()))
     }
@@ -130,10 +130,10 @@ fn look_distance(one: &Material, other: &Material) -> f32 {
         .sum()
 }
 
-/// The turns about its centre in which a part looks the same.
+/// The rotations about its centre after which a part looks the same.
 pub(crate) fn symmetry(relief: &Relief, center: [f32; 2]) -> RotationalSymmetry {
     let comparison = PartPair::new(relief, center, relief, center);
-    // An angle that is not a multiple of any turn up to order 40.
+    // Angles that belong to no rotational symmetry of order 2 to 40.
     if [7.0f32, 17.0, 31.0, 53.0, 101.0, 149.0].iter().all(|degrees| comparison.is_same(degrees.to_radians())) {
         return RotationalSymmetry::Full;
     }
@@ -148,7 +148,7 @@ mod tests {
     use super::*;
     use crate::recipe::{Edge, Feature, Material, Operation, Recipe, Shape};
 
-    /// A disc of radius 20 with holes at angles in degrees, at 12 mm from its middle.
+    /// A disc of radius 20 mm with holes at angles in degrees, 12 mm from its centre.
     fn disc(holes: &[f32], metal: Material) -> Relief {
         let feature = |shape, center, operation| Feature { shape, center, turn: 0.0, operation, material: 0, group: 0 };
         let body = Operation::Add { bottom: 0.0, top: 5.0, edge: Edge::SHARP };

@@ -29,7 +29,7 @@ pub(crate) fn generator(seed: u64, stream: Stream, index: u64) -> Pcg64Mcg {
     generator_at(seed, stream as u64, index)
 }
 
-/// Draws used by this crate, in single precision.
+/// The distributions that this crate uses, in single precision.
 pub(crate) trait Draw: Rng {
     /// Uniform in `[low, high)`.
     fn uniform(&mut self, low: f32, high: f32) -> f32 {

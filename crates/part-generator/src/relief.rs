@@ -21,7 +21,7 @@ const STEPS_PER_MM: f32 = 200.0;
 /// Maximum slope of a normal.
 const MAX_SLOPE: f32 = 3.0;
 
-/// Height difference between neighbours, in cells, above which a step is a wall, and is ignored in normals.
+/// Height difference between neighbours, in cells, above which a step is a wall, which normals ignore.
 const MIN_WALL_CELLS: f32 = 7.0;
 
 /// The part above one cell.
@@ -73,8 +73,8 @@ impl Level {
         Self { width, height, cell, texels, block_tops, blocks_across: across }
     }
 
-    /// An upper bound of the height of all cells within [`BLOCK_CELLS`] of a position in cells, which must be on the
-    /// grid.
+    /// An upper bound of the height of all cells within [`BLOCK_CELLS`] of a position, which is given in cells and
+    /// must be on the grid.
     #[inline(always)]
     pub fn top_around(&self, x: f32, y: f32) -> u16 {
         let (u, v) = (floor(x).max(0) as usize / BLOCK_CELLS, floor(y).max(0) as usize / BLOCK_CELLS);
@@ -101,7 +101,7 @@ pub(crate) struct Relief {
     pub levels: Vec<Level>,
     /// Height of one step in millimetres.
     pub step: f32,
-    /// The highest point.
+    /// Height of the highest point, in millimetres.
     pub top_mm: f32,
     /// The materials that the cells refer to by index.
     pub materials: Vec<Material>,
@@ -193,7 +193,7 @@ impl Relief {
         made
     }
 
-    /// The coarsest grid whose cells are not wider than `cell_mm`, else the finest.
+    /// The coarsest grid whose cells are at most `cell_mm` wide, or the finest grid if all are wider.
     pub fn level_for(&self, cell_mm: f32) -> &Level {
         self.levels.iter().rev().find(|level| level.cell <= cell_mm).unwrap_or(&self.levels[0])
     }

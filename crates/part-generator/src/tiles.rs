@@ -1,4 +1,4 @@
-//! Tiles of noise shared by all pictures, drawn once from a fixed seed and read at any position, rotation and scale.
+//! Tiles of noise shared by all pictures, computed once from a fixed seed and read at any position, rotation and scale.
 
 use std::sync::OnceLock;
 
@@ -18,8 +18,8 @@ pub(crate) struct Tile {
     values: Box<[f32; SIDE * SIDE]>,
 }
 
-/// The largest integer not above `value`; for some integer values the one below. `value` must be within four million of
-/// 0. Without call and comparison, so that compilers vectorise it.
+/// The largest integer that is at most `value`; for some integer values the integer below. `value` must be within four
+/// million of 0. It has no call and no comparison, so compilers vectorise it.
 #[inline(always)]
 pub(crate) fn floor(value: f32) -> i32 {
     // 1.5 * 2^23: the low bits of a sum with it are the integer.
@@ -110,7 +110,7 @@ fn split(k: usize, count: usize) -> (usize, f32) {
 }
 
 impl Tiles {
-    /// The tiles, drawn at the first call.
+    /// The tiles, computed at the first call.
     pub fn get() -> &'static Self {
         static TILES: OnceLock<Tiles> = OnceLock::new();
         TILES.get_or_init(Self::draw)

@@ -1,4 +1,4 @@
-//! Samples depend only on seed and index, and their ground truth agrees with the picture.
+//! Tests that samples depend only on seed and index, and that their ground truth agrees with the picture.
 #![allow(clippy::unwrap_used)]
 
 use rayon::prelude::*;
@@ -27,7 +27,8 @@ fn random_access_on_many_threads_equals_one_after_the_other() {
     assert!(sequential[2].image != sequential[4].image);
 }
 
-/// A wrong position or turn deviates by tens of pixels; walls of the tested parts deviate by less than this.
+/// Maximum mean distance between outlines. A wrong position or angle gives tens of pixels; walls of the tested parts
+/// give less than this.
 const MAX_MEAN_DISTANCE_PX: f64 = 4.0;
 
 #[test]
@@ -76,7 +77,7 @@ fn visibility_is_the_share_of_the_silhouette_that_the_picture_shows() {
             covered += usize::from(instance.visible_share < 0.93);
         }
     }
-    // Covers are placed where the share fits; some parts are too thin for any cover.
+    // A cover is placed only where its covered fraction fits; some parts are too thin for any cover.
     assert!(covered >= 5, "{covered} of 10 covered");
 }
 

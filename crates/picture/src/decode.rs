@@ -1,4 +1,4 @@
-//! Formats, limits and pixel frames.
+//! Formats, limits and orientation of decoded pictures.
 
 use std::borrow::Cow;
 use std::io::Cursor;
@@ -18,24 +18,24 @@ pub struct ImageLimits {
 }
 
 impl Default for ImageLimits {
-    /// 210 megapixels: phones take photos of 50, 64, 108 and 200. 630 MB once decoded.
+    /// 210 megapixels (630 MB decoded): phones take photos of 50, 64, 108 and 200 megapixels.
     fn default() -> Self {
         Self { max_pixels: 210_000_000 }
     }
 }
 
-/// Orientation of the pixels.
+/// Orientation of the decoded pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum PixelFrame {
     /// As shown by a viewer: rotated by the Exif orientation.
     #[default]
     Upright,
-    /// As delivered by the sensor, which a calibration refers to; phones that look straight down set an arbitrary
+    /// As delivered by the sensor, to which a calibration refers; phones that look straight down set an arbitrary
     /// orientation.
     Sensor,
 }
 
-/// Extensions of picture files that [`decode_image`] may be able to read.
+/// File name extensions of pictures that [`decode_image`] may be able to read.
 pub const IMAGE_EXTENSIONS: [&str; 7] = ["png", "jpg", "jpeg", "webp", "bmp", "tif", "tiff"];
 
 /// The formats and their names; formats whose decoder is not compiled in are rejected by name.
@@ -47,7 +47,7 @@ const FORMATS: [(ImageFormat, &str); 5] = [
     (ImageFormat::Tiff, "TIFF"),
 ];
 
-/// The formats of this build, for messages.
+/// Names of the formats in this build, for messages.
 fn readable_formats() -> String {
     let names: Vec<&str> =
         FORMATS.iter().filter(|(format, _)| format.reading_enabled()).map(|(_, name)| *name).collect();
@@ -61,10 +61,10 @@ fn not_an_image(found: impl Into<String>) -> PictureError {
     PictureError::NotAnImage { expected: readable_formats(), found: found.into() }
 }
 
-/// Decodes a picture to upright 8-bit RGB, as [`decode_image_in`].
+/// Decodes a picture to upright 8-bit RGB, like [`decode_image_in`].
 ///
 /// # Errors
-/// Those of [`decode_image_in`].
+/// The errors of [`decode_image_in`].
 pub fn decode_image(bytes: &[u8], limits: &ImageLimits) -> Result<RgbImage> {
     decode_image_in(bytes, limits, PixelFrame::Upright)
 }
@@ -77,8 +77,9 @@ pub fn decode_image(bytes: &[u8], limits: &ImageLimits) -> Result<RgbImage> {
 /// Floats of 0 to 255 are read like integers. Of a TIFF, the full-size page is read.
 ///
 /// # Errors
-/// Another format (for HEIC photos with the phone's setting that avoids them), a truncated or damaged file, zero width
-/// or height, more than `limits.max_pixels`, a TIFF with several full-size pages, or inks with unknown storage.
+/// Another format (for a HEIC photo, the error names the phone's setting that avoids HEIC), a truncated or damaged
+/// file, zero width or height, more than `limits.max_pixels`, a TIFF with several full-size pages, or inks with unknown
+/// storage.
 pub fn decode_image_in(bytes: &[u8], limits: &ImageLimits, frame: PixelFrame) -> Result<RgbImage> {
     if bytes.starts_with(b"P6") {
         let damaged = |found| PictureError::DamagedImage { format: "PPM", reason: format!("found {found}") };
@@ -86,14 +87,14 @@ pub fn decode_image_in(bytes: &[u8], limits: &ImageLimits, frame: PixelFrame) ->
     }
     let (format, name) = format_of(bytes)?;
     let damaged = |error: image::ImageError| PictureError::DamagedImage { format: name, reason: error.to_string() };
-    // Before the decoder, whose error for an empty PNG says less.
+    // Checked before the decoder, whose error for an empty PNG is less specific.
     if let Some([width, height]) = png_header_size(bytes) {
         check_size(width, height, limits)?;
     }
     let mut palette = None;
     let bytes = match format {
         ImageFormat::Jpeg => {
-            // Before the checks, which decode it.
+            // Checked before the checks of the data, which decode the picture.
             let header = ImageReader::with_format(Cursor::new(bytes), format).into_dimensions();
             if let Ok((width, height)) = header {
                 check_size(width, height, limits)?;
@@ -113,7 +114,7 @@ pub fn decode_image_in(bytes: &[u8], limits: &ImageLimits, frame: PixelFrame) ->
     let (width, height) = decoder.dimensions();
     check_size(width, height, limits)?;
     let mut allocation = Limits::default();
-    // 16-bit RGBA has the largest pixels of all photos.
+    // 8 bytes per pixel, as for 16-bit RGBA.
     allocation.max_alloc = Some(limits.max_pixels.saturating_mul(8).saturating_add(1 << 20));
     decoder.set_limits(allocation).map_err(damaged)?;
     // A damaged Exif block is ignored.
@@ -176,7 +177,7 @@ fn iso_media(bytes: &[u8]) -> Option<&'static str> {
              phones switch HEIF pictures off) and take it again, or export it as JPEG",
         ),
         b"avif" | b"avis" => Some("an AVIF picture: export it as JPEG or PNG"),
-        _ => Some("a film or another ISO media file"),
+        _ => Some("a video or another ISO media file"),
     }
 }
 
@@ -299,7 +300,7 @@ mod tests {
         assert!(found.to_string().contains("60000×60000 = 3600 megapixels"), "{found}");
         let small = ImageLimits { max_pixels: 40 * 24 - 1 };
         assert!(decode_image(&encode(&gradient(), ImageFormat::Jpeg), &small).is_err());
-        // A truncated JPEG, of which the checks decode the available part.
+        // A truncated JPEG; the checks decode its available part.
         let mut jpeg = encode(&gradient(), ImageFormat::Jpeg);
         jpeg.truncate(jpeg.len() - 2);
         let frame = jpeg.windows(2).position(|marker| marker == [0xff, 0xc0]).unwrap();

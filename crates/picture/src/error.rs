@@ -2,10 +2,10 @@
 
 use thiserror::Error;
 
-/// Why a picture was rejected.
+/// The reason why a picture was rejected.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "the messages say what the fields are")]
+#[allow(missing_docs, reason = "the messages explain the fields")]
 pub enum PictureError {
     /// The format of the bytes is not supported.
     #[error("not a readable image: expected a {expected} file, found {found}")]
@@ -18,8 +18,8 @@ pub enum PictureError {
     /// The image is truncated, damaged, or of an unsupported kind.
     #[error("damaged {format} image: {reason}")]
     DamagedImage { format: &'static str, reason: String },
-    /// An unsupported variant of a format, and what to do.
-    #[error("{format} image of a kind that is not read: {found}: {remedy}")]
+    /// An unsupported variant of a format, and what the user can do.
+    #[error("unsupported kind of {format} image: {found}: {remedy}")]
     UnsupportedKind { format: &'static str, found: String, remedy: &'static str },
     /// Width or height is zero.
     #[error("empty image: expected at least 1×1 pixels, found {width}×{height}")]

@@ -17,20 +17,20 @@ pub enum JpegEnd {
     Broken(usize),
 }
 
-/// Scans the markers of a JPEG without decoding it. Scanning continues at the last position, so that a growing buffer
-/// is read once.
+/// Scans the markers of a JPEG without decoding it. Scanning continues at the last position, so a growing buffer is
+/// read once.
 #[derive(Debug, Clone, Default)]
 pub struct JpegScanner {
     position: usize,
-    /// In the entropy-coded data after a start of scan.
+    /// Whether the position is in the entropy-coded data after a start of scan.
     is_in_scan: bool,
     first_scan: Option<usize>,
     has_huffman_tables: bool,
     has_adobe_marker: bool,
-    /// From the frame header.
+    /// Number of components, from the frame header.
     num_components: Option<u8>,
     is_progressive: bool,
-    /// For progressive pictures: by component id, a bit for each coefficient (0 to 63) that was sent completely.
+    /// For progressive pictures: by component id, one bit for each coefficient (0 to 63) that was sent completely.
     sent: Vec<(u8, u64)>,
 }
 
@@ -39,7 +39,8 @@ const END: u8 = 0xd9;
 const START_OF_SCAN: u8 = 0xda;
 const HUFFMAN_TABLES: u8 = 0xc4;
 const ADOBE: u8 = 0xee;
-/// Frame markers: baseline and related, without the tables (0xc4), the reserved (0xc8) and the arithmetic ones (0xcc).
+/// Frame markers: baseline and related ones, without the markers of tables (0xc4), the reserved one (0xc8) and
+/// arithmetic coding (0xcc).
 const FRAMES: std::ops::RangeInclusive<u8> = 0xc0..=0xcf;
 const PROGRESSIVE: u8 = 0xc2;
 
@@ -76,7 +77,7 @@ impl JpegScanner {
             match marker {
                 0xff => self.position += 1,
                 END => return JpegEnd::At(self.position + 2),
-                // The next picture begins within this one, whose rest was lost.
+                // A start marker means that the next picture begins and the rest of this one was lost.
                 START => return JpegEnd::Broken(self.position),
                 0x01 | 0xd0..=0xd7 => self.position += 2,
                 _ => {
@@ -105,7 +106,7 @@ impl JpegScanner {
                         return JpegEnd::Broken(self.position + 2);
                     }
                     if bytes.len() < self.position + 2 + length {
-                        // Scanned again when there is more data: the flags above are set again.
+                        // The scan is read again when there is more data, which sets the flags above again.
                         self.is_in_scan = false;
                         return JpegEnd::NotYet;
                     }
@@ -142,7 +143,7 @@ impl JpegScanner {
     }
 }
 
-/// The JPEG at the beginning of the bytes, without following data, and with Huffman tables and an end marker.
+/// Returns the JPEG at the beginning of the bytes, without following data, and with Huffman tables and an end marker.
 ///
 /// Motion JPEG (AVI1, USB video class) may omit the tables of the JPEG standard's annex K, sections K.3.1 and K.3.2;
 /// they are then inserted before the first scan. Some cameras omit the end marker: it is added if the data before it
@@ -168,7 +169,7 @@ pub(crate) fn complete_jpeg(bytes: &[u8]) -> Result<Cow<'_, [u8]>, PictureError>
     if scanner.num_components == Some(4) && !scanner.has_adobe_marker {
         return Err(PictureError::UnsupportedKind {
             format: "JPEG",
-            found: "CMYK inks without Adobe's marker, which says whether they are inverted".to_owned(),
+            found: "CMYK inks without Adobe's marker, so it is unknown whether they are inverted".to_owned(),
             remedy: "export it as RGB",
         });
     }
@@ -193,7 +194,7 @@ fn without_fill_bytes(jpeg: &[u8]) -> &[u8] {
 }
 
 /// Whether the data before the end marker contain every block. The decoder fills missing blocks depending on the bytes
-/// that follow, so complete data must give the same picture whatever follows them.
+/// that follow, so only complete data give the same picture whatever follows them.
 fn is_complete(jpeg: &[u8]) -> bool {
     let decoded = |filler: &[u8]| {
         let (data, end) = jpeg.split_at(jpeg.len() - 2);
@@ -243,7 +244,7 @@ mod tests {
         bytes
     }
 
-    /// The bytes of each segment before the first scan, and what follows them.
+    /// The bytes of each segment before the first scan, and the bytes after these segments.
     fn segments(jpeg: &[u8]) -> (Vec<&[u8]>, &[u8]) {
         let (mut found, mut at) = (Vec::new(), 2);
         while jpeg[at + 1] != START_OF_SCAN {
@@ -254,7 +255,7 @@ mod tests {
         (found, &jpeg[at..])
     }
 
-    /// As sent by webcams.
+    /// A JPEG without tables, as webcams send it.
     fn without_tables(jpeg: &[u8]) -> Vec<u8> {
         let (segments, rest) = segments(jpeg);
         let kept: Vec<u8> = segments.into_iter().filter(|s| s[1] != HUFFMAN_TABLES).flatten().copied().collect();
@@ -300,7 +301,7 @@ mod tests {
         }
         let decode = |bytes: &[u8]| image::load_from_memory(bytes).unwrap().to_rgb8();
         let whole = decode(&original);
-        // Truncated data are either irrelevant or reported.
+        // Missing bytes must be either irrelevant or reported.
         for cut in 3..200 {
             if let Ok(read) = complete_jpeg(&original[..original.len() - cut]) {
                 assert!(decode(&read) == whole, "{cut} bytes");

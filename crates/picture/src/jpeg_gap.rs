@@ -1,7 +1,7 @@
-//! JPEG data with a run of zeros, as left by an interrupted copy or a damaged card.
+//! Detects a run of zeros in JPEG data, as left by an interrupted copy or a damaged card.
 //!
-//! Zeros are valid codes, so the decoder continues and gives another picture without an error. They decode to another
-//! number of blocks than the original data: at the next marker, data are missing or left over.
+//! Zeros are valid codes, so the decoder continues and gives a wrong picture without an error. They decode to a
+//! different number of blocks than the original data, so at the next marker data are missing or left over.
 
 use image::{DynamicImage, GenericImageView, ImageFormat};
 
@@ -14,14 +14,14 @@ const MIN_ZEROS: usize = 32;
 const ADDED_BYTES: usize = 64;
 /// Number of bytes replaced at the end of the data, for the same purpose.
 const EXCHANGED_BYTES: usize = 8;
-/// Two fill values: the original bytes may happen to give the same result as one of them.
+/// Two fill values, because the original bytes may happen to give the same result as one of them.
 const PROBES: [u8; 2] = [0x55, 0xaa];
 
 /// Entropy-coded data up to the next marker.
 struct Stretch {
     start: usize,
     end: usize,
-    /// The number of the restart marker after it, from 0 to 7.
+    /// Number of the restart marker after it, from 0 to 7.
     restart: Option<u8>,
 }
 
@@ -46,7 +46,7 @@ pub(crate) fn check_has_no_gap(jpeg: &[u8]) -> Result<(), PictureError> {
         if !is_in_order || !ends_with_its_blocks(jpeg, stretch) {
             let count = jpeg[at..].iter().take_while(|byte| **byte == 0).count();
             let reason = format!(
-                "{count} zeros in a row from byte {at} on, where a part of the picture was: copy it again from where it came"
+                "{count} zeros in a row from byte {at} in place of picture data: copy the file again from its source"
             );
             return Err(PictureError::DamagedImage { format: "JPEG", reason });
         }
@@ -59,7 +59,7 @@ fn ends_with_its_blocks(jpeg: &[u8], stretch: &Stretch) -> bool {
     let decoded =
         |bytes: &[u8]| -> Option<DynamicImage> { image::load_from_memory_with_format(bytes, ImageFormat::Jpeg).ok() };
     let Some(whole) = decoded(jpeg) else { return true };
-    // Such a picture may consist of zero codes only, and the decoder fills missing blocks with the same colour.
+    // Such a picture may consist only of zero codes, and the decoder fills missing blocks with the same colour.
     let first = whole.get_pixel(0, 0);
     if whole.pixels().all(|(.., pixel)| pixel == first) {
         return true;
@@ -124,7 +124,7 @@ mod tests {
             let (start, length) = ((data.start + data.end) / 2, (data.end - data.start) / part);
             let mut damaged = original.clone();
             damaged[start..start + length].fill(0);
-            assert!(image::load_from_memory(&damaged).is_ok(), "the decoder does not tell");
+            assert!(image::load_from_memory(&damaged).is_ok(), "expected the decoder to accept it");
             let told = check_has_no_gap(&damaged).unwrap_err().to_string();
             assert!(told.contains("zeros in a row from byte"), "{told}");
         }
@@ -132,8 +132,8 @@ mod tests {
 
     #[test]
     fn zeros_that_are_codes_are_read() {
-        // A block has the difference 0 and the end of block, one bit each; of 320 blocks the second and the last have
-        // the difference 1, which needs four bits. Together 80.5 bytes.
+        // A block has a difference of 0 and an end of block, one bit each; of 320 blocks the second and the last have
+        // a difference of 1, which needs four bits. Together they are 80.5 bytes.
         let table = |class: u8| [&[0xff, 0xc4, 0, 21, class, 1, 1][..], &[0; 14], &[0, 1]].concat();
         let quantization = [&[0xff, 0xdb, 0, 67, 0][..], &[8; 64]].concat();
         let frame = [0xff, 0xc0, 0, 11, 8, 0, 64, 1, 64, 1, 1, 0x11, 0];
@@ -146,7 +146,7 @@ mod tests {
         check_has_no_gap(&with_zeros(79)).unwrap();
         assert!(check_has_no_gap(&with_zeros(99)).is_err(), "20 bytes are left over");
         assert!(check_has_no_gap(&with_zeros(59)).is_err(), "20 bytes are missing");
-        // Zero codes only: a picture of one colour.
+        // Only zero codes: a picture of one colour.
         check_has_no_gap(&of_data(&[0; 80])).unwrap();
     }
 }

@@ -1,11 +1,11 @@
 //! Decodes pictures from bytes, for files and live pictures.
 //!
 //! ```text
-//! bytes ─ kind by content ─┬─ JPEG: tables put in, end looked for ─┐
-//!                          ├─ TIFF: the page in full size          ├─ image ─ samples to 8 bits ─ alpha over white ─ upright ─ RGB
-//!                          └─ PNG, WebP, BMP; PPM ─────────────────┘                                        [`PixelFrame`]
+//! bytes ─ kind by content ─┬─ JPEG: tables added, end searched ─┐
+//!                          ├─ TIFF: the full-size page          ├─ image ─ samples to 8 bits ─ alpha over white ─ upright ─ RGB
+//!                          └─ PNG, WebP, BMP; PPM ──────────────┘                                        [`PixelFrame`]
 //! ```
-//! The size is checked before memory is allocated. Absent: files, clocks, HEIC and AVIF, raw photos, animations.
+//! The size is checked before memory is allocated. Not included: files, clocks, HEIC and AVIF, raw photos, animations.
 #![forbid(unsafe_code)]
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 

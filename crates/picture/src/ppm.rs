@@ -14,7 +14,7 @@ pub struct PpmHead {
     pub width: u32,
     /// Height in pixels.
     pub height: u32,
-    /// Position of the pixels.
+    /// Index of the first byte of the pixels.
     pub start: usize,
 }
 
@@ -25,7 +25,7 @@ impl PpmHead {
     /// Reads a header; `None` while it is incomplete.
     ///
     /// # Errors
-    /// Text that describes the error.
+    /// A text that describes the error.
     pub fn read(bytes: &[u8]) -> Result<Option<Self>, String> {
         let mut numbers = [0_u32; 3];
         let mut at = 2;
@@ -34,7 +34,7 @@ impl PpmHead {
             let mut is_comment = false;
             loop {
                 match bytes.get(at) {
-                    None if at > Self::MAX_BYTES => return Err("a PPM without an end to its head".to_owned()),
+                    None if at > Self::MAX_BYTES => return Err("a PPM without the end of its header".to_owned()),
                     None => return Ok(None),
                     Some(b'\n') => is_comment = false,
                     Some(_) if is_comment => {}
@@ -49,14 +49,14 @@ impl PpmHead {
             match bytes.get(at) {
                 None if digits < 10 => return Ok(None),
                 Some(blank) if digits > 0 && blank.is_ascii_whitespace() => {}
-                _ => return Err("a PPM with something else than numbers in its head".to_owned()),
+                _ => return Err("a PPM header with text in place of a number".to_owned()),
             }
             let text = std::str::from_utf8(&bytes[at - digits..at]).unwrap_or_default();
-            *number = text.parse().map_err(|_| format!("a PPM with the number {text} in its head"))?;
+            *number = text.parse().map_err(|_| format!("a PPM with the number {text} in its header"))?;
         }
         let [width, height, maximum] = numbers;
         if maximum != 255 {
-            return Err(format!("a PPM with values up to {maximum}; those with 255 are read"));
+            return Err(format!("a PPM with values up to {maximum}; only values up to 255 are supported"));
         }
         let is_bounded = width <= MAX_SIDE && height <= MAX_SIDE && u64::from(width) * u64::from(height) <= MAX_PIXELS;
         if width == 0 || height == 0 || !is_bounded {
@@ -74,7 +74,7 @@ impl PpmHead {
 /// Decodes the picture at the beginning of the bytes.
 ///
 /// # Errors
-/// Text that describes the data found in place of a complete picture.
+/// A text that describes the data found in place of a complete picture.
 pub(crate) fn decode_ppm(bytes: &[u8]) -> Result<RgbImage, String> {
     let short = || format!("a PPM that ends after {} bytes", bytes.len());
     let head = PpmHead::read(bytes)?.ok_or_else(short)?;
@@ -96,7 +96,7 @@ mod tests {
             (b"P6 0 1 255\n", "0 × 1"),
             (b"P6 16384 16384 255\n", "16384 × 16384"),
             (b"P6 99999999999 1 255\n", "99999999999"),
-            (b"P6 -2 1 255\n", "something else"),
+            (b"P6 -2 1 255\n", "in place of a number"),
             (b"P6 2", "ends after 4 bytes"),
         ] {
             let error = decode_ppm(bytes).unwrap_err();

@@ -4,11 +4,11 @@ use image::{DynamicImage, ImageBuffer, Pixel, Rgb, RgbImage};
 
 /// Common bit depths of cameras, stored in 16 bits.
 const CAMERA_BITS: [u32; 3] = [8, 10, 12];
-/// By convention, floats are 1 at full brightness. Up to this maximum they are slightly overexposed; above it they are
-/// integers stored as floats.
+/// Maximum of overexposed floats. By convention, floats are 1 at full brightness; up to this maximum they are slightly
+/// overexposed, and above it they are integers stored as floats.
 const MAX_OVEREXPOSED: f32 = 2.0;
-/// Minimum alpha value that must occur. An alpha that never reaches it would give a white picture: it was a mask of 0
-/// and 1, or a fraction truncated to an integer.
+/// Minimum alpha value that must occur in a picture. If the alpha never reaches it, it was a mask of 0 and 1, or a
+/// fraction truncated to an integer, and would give a white picture.
 const MIN_SEEN_ALPHA: u8 = 8;
 
 /// Converts the samples, and composites transparent pixels over white.
@@ -17,8 +17,8 @@ pub(crate) fn to_rgb8(picture: DynamicImage) -> RgbImage {
     if picture.color().has_alpha() { over_white(&picture) } else { picture.into_rgb8() }
 }
 
-/// Industrial cameras store 10 and 12 bits in the lower bits of 16; read as 16 bits, the picture is black. A dark
-/// picture that really has 16 bits becomes brighter, which does not affect later steps.
+/// Scales samples to the full range. Industrial cameras store 10 and 12 bits in the lower bits of 16; read as 16 bits,
+/// the picture is black. A dark picture that really has 16 bits becomes brighter, which does not affect later steps.
 fn in_full_range(mut picture: DynamicImage) -> DynamicImage {
     match &mut picture {
         DynamicImage::ImageLuma16(samples) => stretch(samples, 1),
@@ -48,7 +48,7 @@ fn stretch<P: Pixel<Subpixel = u16>>(picture: &mut ImageBuffer<P, Vec<u16>>, num
     }
 }
 
-/// Divides floats that are integers of 8, 10, 12 or 16 bits by the maximum of that depth. Alpha was stored like the
+/// Divides floats that are integers of 8, 10, 12 or 16 bits by the maximum of that depth. Alpha is treated like the
 /// colours.
 fn to_shares<P: Pixel<Subpixel = f32>>(picture: &mut ImageBuffer<P, Vec<f32>>) {
     let largest = picture.iter().copied().filter(|sample| sample.is_finite()).fold(0.0, f32::max);

@@ -28,7 +28,7 @@ const PALETTE: u64 = 3;
 const COLOR_FILTER_ARRAY: u64 = 32803;
 const LINEAR_RAW: u64 = 34892;
 
-/// First private tag: the decoder reads none of them.
+/// First private tag; the decoder reads no private tags.
 const FIRST_PRIVATE_TAG: u16 = 32768;
 /// Maximum number of pages.
 const MAX_PAGES: usize = 256;
@@ -36,7 +36,7 @@ const MAX_PAGES: usize = 256;
 const MAX_ENTRIES: u64 = 4096;
 const MAX_VALUES: u64 = 3 << 16;
 
-/// A TIFF whose first page is the main one.
+/// A TIFF whose first page is the main page.
 pub(crate) struct FullPage<'a> {
     pub(crate) bytes: Cow<'a, [u8]>,
     /// Colours of the samples, if they are indices.
@@ -47,7 +47,7 @@ pub(crate) struct FullPage<'a> {
 pub(crate) struct Palette(Vec<[u8; 3]>);
 
 impl Palette {
-    /// The picture whose samples are colour indices.
+    /// Converts a picture whose samples are colour indices.
     pub(crate) fn applied(&self, numbers: &DynamicImage) -> RgbImage {
         let numbers = numbers.to_luma8();
         let color = |number: u8| self.0.get(usize::from(number)).copied().unwrap_or_default();
@@ -60,12 +60,12 @@ pub(crate) fn is_big_tiff(bytes: &[u8]) -> bool {
     bytes.starts_with(b"II\x2b\0\x08\0\0\0") || bytes.starts_with(b"MM\0\x2b\0\x08\0\0")
 }
 
-/// Finds the single full-size page.
+/// Finds the single full-size page and moves it to the front.
 ///
 /// # Errors
-/// There are several of them; the file is a raw photo; a palette does not have 8 bits; or a tag has more values than
-/// the file has bytes, for which the decoder would allocate memory before reading. Structures that cannot be parsed are
-/// left to the decoder.
+/// There are several full-size pages; the file is a raw photo; a palette does not have 8 bits; or a tag has more values
+/// than the file has bytes, for which the decoder would allocate memory before reading. Structures that cannot be
+/// parsed are left to the decoder.
 pub(crate) fn full_page(bytes: &[u8]) -> Result<FullPage<'_>, PictureError> {
     let whole = FullPage { bytes: Cow::Borrowed(bytes), palette: None };
     let Some(file) = File::new(bytes) else { return Ok(whole) };
@@ -78,11 +78,11 @@ pub(crate) fn full_page(bytes: &[u8]) -> Result<FullPage<'_>, PictureError> {
     let unsupported = |found: String, remedy| PictureError::UnsupportedKind { format: "TIFF", found, remedy };
     let mut full = pages.iter().filter(|page| page.is_full(&file));
     let (page, further) = (full.next(), full.count());
-    // Without a full-size page, the first one is used.
+    // Without a full-size page, the first page is used.
     let Some(page) = page.or(pages.first()) else { return Ok(whole) };
     if further > 0 {
-        let found = format!("{} pages in full size, of which nothing says which is the picture", further + 1);
-        return Err(unsupported(found, "save the page as a file of its own"));
+        let found = format!("{} full-size pages, none of which is marked as the picture", further + 1);
+        return Err(unsupported(found, "save the page in a separate file"));
     }
     let photometric = page.number(&file, PHOTOMETRIC);
     if let Some(COLOR_FILTER_ARRAY | LINEAR_RAW) = photometric {
@@ -112,7 +112,7 @@ struct File<'a> {
 }
 
 struct Page {
-    /// Position of its directory.
+    /// Position of the page's directory in the file.
     at: u64,
     entries: Vec<Entry>,
     next: u64,
@@ -201,7 +201,7 @@ impl<'a> File<'a> {
         Some(Page { at, entries, next: self.number(first + count * entry_bytes, offset_width)? })
     }
 
-    /// The same file with another first page.
+    /// The same file with a different first page.
     fn with_first_page(&self, at: u64) -> Vec<u8> {
         let mut bytes = self.bytes.to_vec();
         let (width, place) = self.offset_width();
@@ -276,7 +276,7 @@ mod tests {
         TestPage { size, is_gray: false, samples, tags: vec![(NEW_SUBFILE_TYPE, vec![subfile])] }
     }
 
-    /// Little endian, or BigTIFF in big endian.
+    /// Makes a little-endian file, or BigTIFF in big-endian order.
     fn file(pages: &[TestPage], is_big: bool) -> Vec<u8> {
         let number = |value: u64, width: usize| {
             if is_big { value.to_be_bytes()[8 - width..].to_vec() } else { value.to_le_bytes()[..width].to_vec() }
@@ -366,7 +366,7 @@ mod tests {
     fn several_full_pages_and_raw_photos_are_told() {
         let pages = [rgb([8, 6], [1, 2, 3], 0), rgb([8, 6], [4, 5, 6], 0)];
         let error = decoded(&file(&pages, false)).unwrap_err().to_string();
-        assert!(error.contains("2 pages in full size") && error.contains("save the page"), "{error}");
+        assert!(error.contains("2 full-size pages") && error.contains("save the page"), "{error}");
         let mut raw = rgb([8, 6], [1, 2, 3], 0);
         raw.tags.push((PHOTOMETRIC, vec![COLOR_FILTER_ARRAY as u16]));
         let error = decoded(&file(&[rgb([4, 3], [9, 9, 9], 1), raw], false)).unwrap_err().to_string();

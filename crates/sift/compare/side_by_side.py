@@ -1,16 +1,16 @@
-"""Our SIFT beside OpenCV's, on the same pictures: repeatability, matching score, time on two cores.
+"""Compares our SIFT with OpenCV's on the same pictures: repeatability, matching score, time on two cores.
 
     python -m venv VENV && VENV/bin/pip install -r crates/sift/compare/requirements.txt
     cargo build --release -p sdg-sift --examples
     VENV/bin/python crates/sift/compare/side_by_side.py [PICTURE ...] [--repeats 7] [--folder FOLDER]
 
-Without pictures, the demonstrations of this repository are taken. Each is turned, scaled, relit and blurred here, so the
-truth is known; both programs read the same PNG files, and both sets of features are matched and judged by this script.
+Without pictures, the demonstrations of this repository are used. The script rotates, scales, relights and blurs each, so
+the ground truth is known; both programs read the same PNG files, and this script matches and judges both sets of features.
 
-Words. Keypoints count where the truth puts them at least MARGIN pixels inside both pictures. `repeatability`: keypoints
-of one picture that have a keypoint of the other at the same place and size, over the smaller number of keypoints; one
-place counts once, however many directions it has. `matching score`: matches by Lowe's ratio test that are right, over the
-smaller number of keypoints. `precision`: matches that are right, over all matches.
+Terms. Keypoints count if they are at least MARGIN pixels inside both pictures. `repeatability`: number of keypoints of
+one picture that have a keypoint of the other at the same position and size, divided by the smaller number of keypoints;
+a position counts once, whatever its number of directions. `matching score`: number of correct matches by Lowe's ratio
+test, divided by the smaller number of keypoints. `precision`: number of correct matches, divided by all matches.
 """
 
 import argparse
@@ -34,8 +34,8 @@ RIGHT_MATCH = 3.0  # pixels
 
 
 def similarity(shape, degrees, scale):
-    """The 2 x 3 matrix that turns and scales about the centre, in coordinates where pixel centres are at + 0.5, and the
-    size of the picture that results."""
+    """The 2 x 3 matrix that rotates and scales about the centre, in coordinates where pixel centres are at + 0.5, and the
+    size of the resulting picture."""
     height, width = shape
     out_width, out_height = round(width * scale), round(height * scale)
     angle = math.radians(degrees)
@@ -46,14 +46,14 @@ def similarity(shape, degrees, scale):
 
 
 def warp(gray, matrix, size):
-    """Resamples without aliasing; beyond the border the picture is mirrored, so that no false edges arise."""
+    """Resamples without aliasing; beyond the border the picture is mirrored, to avoid false edges."""
     scale = math.hypot(matrix[0, 0], matrix[1, 0])
     source = gray.astype(np.float32)
     if scale < 1:
-        # The blur of 0.5 pixels that the camera gave the source is to be there again after shrinking.
+        # After shrinking, the picture has the camera's blur of 0.5 pixels again.
         source = cv2.GaussianBlur(source, (0, 0), 0.5 * math.sqrt(1 / scale**2 - 1))
     centred = matrix.copy()
-    centred[:, 2] += matrix[:, :2] @ [0.5, 0.5] - 0.5  # OpenCV puts pixel centres at whole numbers
+    centred[:, 2] += matrix[:, :2] @ [0.5, 0.5] - 0.5  # OpenCV has pixel centres at integers
     warped = cv2.warpAffine(source, centred, size, flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_REFLECT_101)
     return np.clip(np.rint(warped), 0, 255).astype(np.uint8)
 
@@ -89,7 +89,7 @@ def views(gray):
 
 
 class Found:
-    """Places (n x 2), scales (n) and descriptors (n x 128)."""
+    """Positions (n x 2), scales (n) and descriptors (n x 128)."""
 
     def __init__(self, places, scales, descriptors):
         self.places, self.scales, self.descriptors = places, scales, descriptors
@@ -108,7 +108,7 @@ def read_ours(path):
 
 
 def detect_opencv(sift, gray, center):
-    """`center`: the place of the first pixel's centre as OpenCV reports it, in our frame, where it is at 0.5."""
+    """`center`: position of the first pixel's centre in OpenCV's results, in our frame, where it is at 0.5."""
     keypoints, descriptors = sift.detectAndCompute(gray, None)
     places = np.array([k.pt for k in keypoints], float).reshape(-1, 2) + center
     scales = np.array([k.size / 2 for k in keypoints], float)
@@ -120,7 +120,7 @@ def inside(places, size):
 
 
 def judge(first, second, matrix, first_size, second_size):
-    """Keypoints (the smaller number), repeatability, right matches, matches."""
+    """Numbers of keypoints (the smaller one), repeated keypoints, correct matches, and matches."""
     scale = math.hypot(matrix[0, 0], matrix[1, 0])
     back = np.linalg.inv(np.vstack([matrix, [0, 0, 1]]))[:2]
     move = lambda m, p: p @ m[:, :2].T + m[:, 2]
@@ -133,7 +133,7 @@ def judge(first, second, matrix, first_size, second_size):
         distance = np.linalg.norm(move(matrix, a.places)[:, None] - b.places[None], axis=2)
         size = np.abs(np.log(a.scales * scale)[:, None] - np.log(b.scales)[None])
         distance[(distance > SAME_PLACE * max(1.0, scale)) | (size > math.log(SAME_SIZE))] = np.inf
-        # Nearest to each other, so that no keypoint counts twice.
+        # Only mutually nearest keypoints, so that no keypoint counts twice.
         rows = np.arange(len(a.places))
         nearest = distance.argmin(1)
         repeated = int(np.sum((distance.argmin(0)[nearest] == rows) & np.isfinite(distance[rows, nearest])))
@@ -158,7 +158,7 @@ def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("pictures", nargs="*", type=pathlib.Path)
     parser.add_argument("--repeats", type=int, default=7)
-    parser.add_argument("--folder", type=pathlib.Path, help="keeps the views here")
+    parser.add_argument("--folder", type=pathlib.Path, help="folder that keeps the views")
     parser.add_argument("--program", default=os.environ.get("CARGO_TARGET_DIR", str(ROOT / "target")) + "/release/examples/describe")
     arguments = parser.parse_args()
     pictures = arguments.pictures or sorted(ROOT.glob("datasets/demonstrations/*/image.png"))
@@ -183,8 +183,8 @@ def main():
         command = [arguments.program, str(folder), "--repeats", str(arguments.repeats), *flags]
         seconds[label] = json.loads(subprocess.run(command, env=environment, check=True, capture_output=True).stdout)
         results[label] = {name: read_ours(folder / f"{name}.sift") for name in names}
-    # By default, OpenCV doubles the picture about its pixels' corners but halves the places as if about their centres,
-    # so its places are 0.25 too large.
+    # By default, OpenCV doubles the picture about its pixels' corners but halves the positions as if about their centres,
+    # so its positions are 0.25 too large.
     for label, precise, center in (("OpenCV", False, 0.25), ("OpenCV, precise upscale", True, 0.5)):
         sift = cv2.SIFT_create(enable_precise_upscale=precise)
         results[label], seconds[label] = {}, {}

@@ -1,11 +1,11 @@
-//! Detects and describes the PNG pictures of a folder and writes the features beside them, for comparison with
-//! other implementations (`compare/side_by_side.py` reads it).
+//! Detects and describes the PNG pictures of a folder and writes the features beside them, for comparison with other
+//! implementations (`compare/side_by_side.py` reads the files).
 //!
-//! `cargo run --release -p sdg-sift --example describe -- FOLDER [--repeats N] [--clipped]`
+//! Usage: `cargo run --release -p sdg-sift --example describe -- FOLDER [--repeats N] [--clipped]`
 //!
-//! For `NAME.png`, `NAME.sift` holds rows of 5 + 128 little-endian 32-bit floats: x, y (first pixel's centre at 0.5), σ,
-//! angle in degrees, contrast, descriptor. Prints one JSON object: the best and the median time in seconds for each
-//! picture, conversion from 8-bit grey included, reading and writing not.
+//! For `NAME.png`, `NAME.sift` holds rows of 5 + 128 little-endian 32-bit floats: x, y (first pixel's centre at 0.5),
+//! σ, angle in degrees, contrast, descriptor. Prints one JSON object: the best and the median time in seconds for each
+//! picture, including the conversion from 8-bit grey but without reading and writing.
 
 use std::collections::BTreeMap;
 use std::io::Write;

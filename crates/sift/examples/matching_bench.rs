@@ -1,7 +1,7 @@
 //! Compares brute force with a kd-tree on SIFT descriptors: the time, and how often the tree finds the same nearest
-//! one.
+//! descriptor.
 //!
-//! `cargo run --release -p sdg-sift --example matching_bench -- QUERY.png TRAIN.png`
+//! Usage: `cargo run --release -p sdg-sift --example matching_bench -- QUERY.png TRAIN.png`
 
 use std::num::NonZero;
 use std::time::Instant;

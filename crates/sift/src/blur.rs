@@ -1,25 +1,25 @@
-//! Gaussian blur and resizing by two, the operations of a scale space.
+//! Gaussian blur, and resizing by a factor of two: the operations of a scale space.
 //!
-//! Rows are processed in bands, so that the cores share the work and a band's rows stay in the cache. A row is blurred
-//! down its columns into a padded buffer, and from there along itself, by the same symmetric fold. Products and sums
-//! are never fused, so that every machine gives the same bits.
+//! Rows are processed in bands, so that the cores divide the work and a band's rows stay in the cache. A row is
+//! blurred down its columns into a padded buffer, and from there along the row, by the same symmetric fold. Products
+//! and sums are never fused, so every machine gives the same bits.
 
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 use crate::Plane;
 
-/// Rows that one core takes at a time.
+/// Number of rows that a core processes at a time.
 const BAND: usize = 24;
 
-/// The right half of a sampled Gaussian, centre first; the whole of it sums to one.
+/// The right half of a sampled Gaussian, centre first; the sum of the whole Gaussian is one.
 #[derive(Debug, Clone)]
 pub(crate) struct GaussianKernel {
     half: Vec<f32>,
 }
 
 impl GaussianKernel {
-    /// Cut off at four σ, where the Gaussian has 3e-4 of its height.
+    /// Truncated at four σ, where the Gaussian has 3e-4 of its height.
     pub(crate) fn new(sigma: f64) -> Self {
         let radius = (4.0 * sigma).round() as usize;
         let weight = |i: usize| if i == 0 { 1.0 } else { (-0.5 * (i as f64 / sigma).powi(2)).exp() };
@@ -28,9 +28,14 @@ impl GaussianKernel {
     }
 }
 
-/// Blurs `source` into `target` of the same size; beyond the border the image is mirrored about its outermost pixels.
+/// Blurs `source` into `target`, which has the same size; beyond the border the image is mirrored about its outermost
+/// pixels.
 pub(crate) fn blur(source: &Plane, target: &mut Plane, kernel: &GaussianKernel) {
-    assert_eq!((source.width(), source.height()), (target.width(), target.height()), "planes of one size");
+    assert_eq!(
+        (source.width(), source.height()),
+        (target.width(), target.height()),
+        "expected planes of the same size"
+    );
     let width = source.width();
     if width == 0 {
         return;
@@ -41,17 +46,17 @@ pub(crate) fn blur(source: &Plane, target: &mut Plane, kernel: &GaussianKernel) 
     });
 }
 
-/// The image at twice its size, by linear interpolation between pixel centres.
+/// Enlarges the image to twice its size, by linear interpolation between pixel centres.
 ///
-/// Pixel `j` of the result has its centre at (j + 0.5) / 2 of the image.
+/// The centre of pixel `j` of the result is at (j + 0.5) / 2 in the image.
 pub(crate) fn double(source: &Plane, target: &mut Plane) {
     let (width, height) = (source.width(), source.height());
-    assert_eq!((2 * width, 2 * height), (target.width(), target.height()), "a target of twice the size");
+    assert_eq!((2 * width, 2 * height), (target.width(), target.height()), "expected a target of twice the size");
     if width == 0 || height == 0 {
         return;
     }
     target.data_mut().par_chunks_mut(2 * width).enumerate().for_each(|(y, row)| {
-        // The nearer source row weighs 3/4, the row on the other side 1/4.
+        // The nearer source row has the weight 3/4, the row on the other side 1/4.
         let near = source.row(y / 2);
         let far = source.row(if y % 2 == 0 { (y / 2).saturating_sub(1) } else { (y / 2 + 1).min(height - 1) });
         let mixed = |x: usize| 0.75 * near[x] + 0.25 * far[x];
@@ -65,13 +70,13 @@ pub(crate) fn double(source: &Plane, target: &mut Plane) {
     });
 }
 
-/// Every second pixel of every second row, from the first on; `target` has half the size, rounded up.
+/// Keeps every second pixel of every second row, beginning with the first; `target` has half the size, rounded up.
 pub(crate) fn halve(source: &Plane, target: &mut Plane) {
     let width = target.width();
     assert_eq!(
         (source.width().div_ceil(2), source.height().div_ceil(2)),
         (width, target.height()),
-        "a target of half the size"
+        "expected a target of half the size"
     );
     for y in 0..target.height() {
         let from = source.row(2 * y).iter().step_by(2);
@@ -81,7 +86,7 @@ pub(crate) fn halve(source: &Plane, target: &mut Plane) {
     }
 }
 
-/// Some rows of the blurred image, from row `first` on.
+/// Some rows of the blurred image, beginning with row `first`.
 struct BlurRows<'a> {
     source: &'a Plane,
     rows: &'a mut [f32],
@@ -122,7 +127,8 @@ fn fold<'a>(out: &mut [f32], center: &[f32], half: &[f32], neighbours: impl Fn(u
     fold_blocks::<1>(out, center, half, &neighbours, done);
 }
 
-/// `N` elements at a time, so that their sums stay in registers over all taps. Returns where it ended.
+/// Computes `N` elements at a time, so that their sums stay in registers over all taps. Returns the index of the next
+/// element.
 #[inline(always)]
 fn fold_blocks<'a, const N: usize>(
     out: &mut [f32],
@@ -164,7 +170,7 @@ fn mirrored(i: isize, n: usize) -> usize {
 mod tests {
     use super::*;
 
-    /// Rounding of some fifty sums of values up to one.
+    /// Rounding error of about fifty sums of values up to one.
     const ROUNDING: f32 = 1e-5;
 
     fn wavy(width: u32, height: u32) -> Plane {
@@ -212,7 +218,7 @@ mod tests {
         let source = wavy(80, 60);
         let (twice, once) = (blurred(&blurred(&source, 1.5), 2.0), blurred(&source, 2.5));
         let worst = twice.data().iter().zip(once.data()).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
-        // The kernels are cut off at four sigma and sampled: an error of a few parts in ten thousand remains.
+        // The kernels are truncated at four sigma and sampled: an error of a few parts in ten thousand remains.
         assert!(worst < 1e-3, "{worst}");
     }
 

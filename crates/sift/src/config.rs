@@ -2,7 +2,10 @@
 
 use crate::SiftError;
 
-/// Settings of [`Sift`](crate::Sift). The defaults are Lowe's, if he gives one.
+/// Settings of [`Sift`](crate::Sift).
+///
+/// The defaults are Lowe's, with two exceptions: `contrast_threshold` has the value and the scale of OpenCV, and
+/// descriptors are normalised as in RootSIFT.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct SiftConfig {
@@ -15,11 +18,13 @@ pub struct SiftConfig {
     pub base_sigma: f64,
     /// Blur assumed to be present in the camera's image, σ in pixels of the image.
     pub input_sigma: f64,
-    /// Minimum contrast |D| of an extremum times `intervals`, as a fraction of the range from black to white.
+    /// Minimum contrast of an extremum, |D| times `intervals` (OpenCV's convention), as a fraction of the range
+    /// from black to white.
     pub contrast_threshold: f64,
-    /// Largest ratio of the principal curvatures; above it, an extremum is an edge.
+    /// Maximum ratio of the principal curvatures; an extremum with a larger ratio is an edge.
     pub edge_ratio: f64,
-    /// Keep the points of strongest contrast only; `None` keeps all. A point with two orientations counts twice.
+    /// Maximum number of features, strongest contrast first; `None` keeps all. A point with two orientations counts
+    /// twice.
     pub max_features: Option<usize>,
     /// How descriptors are normalised.
     pub normalization: DescriptorNormalization,
@@ -33,8 +38,8 @@ pub enum DescriptorNormalization {
     /// # Source
     /// Lowe 2004, section 6.1.
     Clipped,
-    /// As `Clipped`, then the square root of each share in the sum, so that the Euclidean distance is the Hellinger
-    /// distance of the histograms.
+    /// As `Clipped`, then divided by the sum of its numbers, and the square root of each: the Euclidean distance is
+    /// then the Hellinger distance of the histograms.
     ///
     /// # Source
     /// Arandjelović and Zisserman 2012 (RootSIFT).
@@ -79,7 +84,7 @@ impl SiftConfig {
         Ok(())
     }
 
-    /// σ of a level of the scale space, in pixels of its octave; `level` may lie between two levels.
+    /// σ of a level of the scale space, in pixels of its octave; `level` may be between two levels.
     pub(crate) fn sigma_of_level(&self, level: f64) -> f64 {
         self.base_sigma * (level / self.intervals as f64).exp2()
     }

@@ -1,7 +1,7 @@
-//! The descriptor of a keypoint: gradient directions on a 4 × 4 grid that rotates and scales with it.
+//! The descriptor of a keypoint: gradient directions on a 4 × 4 grid that rotates and scales with the keypoint.
 //!
 //! ```text
-//! pixel ─► gradient, turned by the keypoint's direction ─► shared among 2 rows × 2 columns × 2 directions of the
+//! pixel ─► gradient, rotated by the keypoint's direction ─► distributed over 2 rows × 2 columns × 2 directions of the
 //! 4 × 4 × 8 histogram, weighted by a Gaussian ─► unit length, clipped, unit length
 //! ```
 
@@ -16,20 +16,21 @@ use crate::scale_space::Octave;
 
 /// Cells along a side of the grid.
 const GRID: usize = 4;
-/// Directions of a cell's histogram.
+/// Number of directions of a cell's histogram.
 const NUM_DIRECTIONS: usize = 8;
-/// Numbers in a descriptor.
+/// Number of values in a descriptor.
 pub const DESCRIPTOR_LENGTH: usize = GRID * GRID * NUM_DIRECTIONS;
 /// Side of a cell, in units of the keypoint's σ.
 const CELL_SIZE: f64 = 3.0;
-/// Upper bound of a number before the last normalisation, so that one strong edge does not dominate.
+/// Maximum value before the last normalisation, so that one strong edge does not dominate.
 const CLIP: f32 = 0.2;
-/// A sample further than this from the centre, in cells, reaches no cell of the grid; slightly inside, for rounding.
+/// Maximum distance from the centre, in cells, at which a sample reaches a cell of the grid; slightly reduced, for
+/// rounding.
 const REACH: f64 = 0.5 * (GRID as f64 + 1.0) - 1e-4;
-/// Cells along a side of the grid including the rim that collects samples outside.
+/// Cells along a side of the grid with its rim, which collects samples outside the grid.
 const RIMMED: usize = GRID + 2;
 
-/// Buffers for describing keypoints besides the octave; reused from keypoint to keypoint.
+/// Buffers for describing keypoints, in addition to the octave; reused from keypoint to keypoint.
 #[derive(Default)]
 pub(crate) struct Scratch {
     pub gradients: GradientRow,
@@ -51,7 +52,7 @@ struct Samples {
 /// Describes one keypoint of direction `angle`, in radians. `None` if the area is flat.
 ///
 /// # Source
-/// Lowe 2004, section 6. The grid's centre is the keypoint itself, not the pixel nearest to it.
+/// Lowe 2004, section 6. The grid is centred on the keypoint itself, not on the nearest pixel.
 pub(crate) struct Describe<'a> {
     pub octave: &'a Octave,
     pub place: Place,
@@ -86,7 +87,7 @@ impl WithSimd for Describe<'_> {
         let mut histogram = Histogram::new();
         for y in top..=bottom {
             let dy = y as f64 - place.y;
-            // Where dx·cos + dy·sin and dy·cos - dx·sin are both within reach.
+            // The interval in which dx·cos + dy·sin and dy·cos - dx·sin are both within reach.
             let (a, b) = (span(cos, dy * sin, REACH * cell), span(-sin, dy * cos, REACH * cell));
             let first = (place.x + a.0.max(b.0)).ceil().max(left as f64);
             let last = (place.x + a.1.min(b.1)).floor().min(right as f64);
@@ -119,7 +120,7 @@ fn span(slope: f64, start: f64, reach: f64) -> (f64, f64) {
     (a.min(b), a.max(b))
 }
 
-/// A row of the image where it crosses the grid, in cells from the grid's centre.
+/// The part of an image row that crosses the grid, in cells from the grid's centre.
 struct RowInGrid {
     column_start: f64,
     column_step: f64,
@@ -240,7 +241,8 @@ mod tests {
     #[test]
     fn a_sample_is_shared_among_eight() {
         let mut histogram = Histogram::new();
-        // A quarter past row 2, half past column 3, three quarters past direction 7: direction 8 is 0.
+        // The sample is a quarter of a cell past row 2, half past column 3, and three quarters past direction 7;
+        // direction 8 is 0.
         histogram.add(&one_sample(2.25, 3.5, 7.75, 16.0), 1);
         let at = |row: usize, column: usize| histogram.0[row * RIMMED + column];
         assert_eq!((at(2, 3)[7], at(2, 3)[0]), (1.5, 4.5));
@@ -264,7 +266,8 @@ mod tests {
             let descriptor = normalized(&histogram, normalization).unwrap();
             let length: f32 = descriptor.iter().map(|v| v * v).sum();
             assert!((length - 1.0).abs() < 1e-5);
-            // 100 in a vector of length about 101 is clipped to 0.2: it no longer exceeds the rest fifty times.
+            // 100 in a vector of length about 101 is clipped to 0.2, so it no longer exceeds the rest by a factor of
+            // fifty.
             let ratio = descriptor[5] / descriptor[2];
             assert!(ratio < 15.0, "{ratio}");
         }

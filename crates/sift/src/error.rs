@@ -1,19 +1,19 @@
 //! Errors of the input of SIFT.
 
-/// Why features could not be computed or a rotation not be estimated.
+/// The reason why features could not be computed or a rotation could not be estimated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "the messages say what the fields are")]
+#[allow(missing_docs, reason = "the messages explain the fields")]
 pub enum SiftError {
     /// A setting outside its range.
     #[error("expected {name} {expected}, found {found}")]
     BadSetting {
         name: &'static str,
-        /// The range in which it must lie.
+        /// The accepted range.
         expected: &'static str,
         found: f64,
     },
-    /// Pixel data of another length than width × height.
+    /// A number of intensities other than width × height.
     #[error("expected {expected} intensities for {width} × {height} pixels, found {found}")]
     WrongLength {
         width: u32,
@@ -25,9 +25,9 @@ pub enum SiftError {
     /// An intensity that is NaN or infinite.
     #[error("expected finite intensities, found {value} at pixel ({x}, {y})")]
     NotFinite { x: u32, y: u32, value: f32 },
-    /// A mask of another size than its image.
+    /// A mask whose size differs from its image's.
     #[error(
-        "expected a mask of {image_width} × {image_height} pixels, as its image, found {mask_width} × {mask_height}"
+        "expected a mask of {image_width} × {image_height} pixels, the size of its image, found {mask_width} × {mask_height}"
     )]
     MaskSize {
         /// Width of the image, in pixels.

@@ -12,11 +12,12 @@ use rayon::prelude::*;
 use crate::SiftConfig;
 use crate::scale_space::{BORDER, Octave};
 
-/// Rows that one core takes at a time.
+/// Number of rows that a core processes at a time.
 const BAND: usize = 32;
-/// Steps to a neighbouring sample before the fit is abandoned.
+/// Maximum number of steps to neighbouring samples in a fit.
 const MAX_STEPS: usize = 5;
-/// Samples weaker than this part of the contrast threshold are not fitted: the fit seldom doubles the contrast.
+/// Minimum contrast of a fitted sample, as a fraction of the contrast threshold: the fit seldom doubles the
+/// contrast.
 const CANDIDATE_CONTRAST: f64 = 0.5;
 
 /// An extremum of one octave.
@@ -24,9 +25,9 @@ const CANDIDATE_CONTRAST: f64 = 0.5;
 pub(crate) struct Extremum {
     /// Column in pixels of the octave; whole numbers are pixel centres.
     pub x: f64,
-    /// Row, likewise.
+    /// Row in pixels of the octave; whole numbers are pixel centres.
     pub y: f64,
-    /// Level, with a fraction.
+    /// Level, with a fractional part.
     pub level: f64,
     /// |D| at the extremum, times the number of intervals.
     pub contrast: f64,
@@ -135,7 +136,8 @@ impl WithSimd for ScanBand<'_> {
     }
 }
 
-/// Each element with its two neighbours; the outermost elements are not used later and stay unchanged.
+/// Combines each element with its two neighbours by `pick`; the outermost elements are not used later and stay
+/// unchanged.
 #[inline(always)]
 fn spread(from: &[f32], to: &mut [f32], pick: impl Fn(f32, f32) -> f32) {
     let inner = from.len() - 2;
@@ -145,7 +147,7 @@ fn spread(from: &[f32], to: &mut [f32], pick: impl Fn(f32, f32) -> f32) {
     }
 }
 
-/// As `f32::max` for numbers, in one instruction, because NaN does not occur.
+/// `f32::max` for numbers, in one instruction, because NaN does not occur.
 #[inline(always)]
 fn larger(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
@@ -156,7 +158,8 @@ fn smaller(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
-/// Steps to the neighbouring sample as long as the fitted extremum lies nearer to it. `None` if it diverges.
+/// Moves to the neighbouring sample as long as the fitted extremum is nearer to it. `None` if this does not
+/// converge.
 fn refine_extremum(octave: &Octave, mut at: Sample, intervals: usize) -> Option<Sample> {
     for _ in 0..MAX_STEPS {
         let offset = Derivatives::at(octave, at).offset()?;
@@ -164,7 +167,7 @@ fn refine_extremum(octave: &Octave, mut at: Sample, intervals: usize) -> Option<
             return Some(at);
         }
         let step = |index: usize, offset: f64, low: usize, high: usize| {
-            // An offset of many pixels means a saddle or a flat area, and no extremum.
+            // An offset of many pixels means a saddle or a flat area, not an extremum.
             let moved = index as f64 + offset.round();
             (moved >= low as f64 && moved < high as f64).then_some(moved as usize)
         };
@@ -177,7 +180,7 @@ fn refine_extremum(octave: &Octave, mut at: Sample, intervals: usize) -> Option<
     None
 }
 
-/// The extremum near a sample; `None` when it is too weak or an edge.
+/// The extremum near a sample; `None` if it is too weak or an edge.
 ///
 /// # Source
 /// Lowe 2004, sections 4 and 4.1.
@@ -222,7 +225,7 @@ impl Derivatives {
         }
     }
 
-    /// From the sample to the extremum of the quadratic.
+    /// The offset from the sample to the extremum of the quadratic.
     fn offset(&self) -> Option<Vector3<f64>> {
         let offset = -(self.hessian.try_inverse()? * self.gradient);
         offset.iter().all(|v| v.is_finite()).then_some(offset)
@@ -268,7 +271,7 @@ mod tests {
 
     #[test]
     fn blobs_are_found_where_they_are_at_their_size() {
-        // Away from the border and from each other, bright and dark, on fractions of pixels.
+        // Away from the border and from each other, bright and dark, at fractional positions.
         let truth = [(40.3, 30.7, 4.0, 0.4), (110.8, 80.2, 7.0, -0.4), (45.5, 88.1, 2.5, -0.3)];
         for double_first_octave in [true, false] {
             let config = SiftConfig { double_first_octave, ..SiftConfig::default() };
@@ -281,7 +284,7 @@ mod tests {
                     .min_by(|a, b| (a.0 - x).hypot(a.1 - y).total_cmp(&(b.0 - x).hypot(b.1 - y)))
                     .unwrap();
                 // Levels at σ and kσ differ most on a blob of variance t where k (t + σ²) = t + k²σ², so σ² = t / k;
-                // the camera's assumed blur of 0.5 is taken off the blob's, k is 2^(1/3).
+                // the camera's assumed blur of 0.5 is subtracted from the blob's, and k is 2^(1/3).
                 let level_sigma = (sigma * sigma - 0.25).sqrt() / 2f64.powf(1.0 / 6.0);
                 assert!((fx - x).hypot(fy - y) < 0.03, "({fx}, {fy}) for ({x}, {y})");
                 assert!((fs / level_sigma - 1.0).abs() < 0.05, "{fs} for {level_sigma}");

@@ -12,19 +12,21 @@ pub struct SiftKeypoint {
     pub position: Point2<f64>,
     /// Scale: σ of the Gaussian with the strongest response to the blob, in pixels of the image.
     pub sigma: f64,
-    /// Direction of the strongest gradients around it; positive is clockwise as seen, because y points down.
+    /// Direction of the strongest gradients around the blob; positive is clockwise as seen, because y points
+    /// down.
     pub angle: Angle,
-    /// Contrast of the blob, as a fraction of the range from black to white, times the intervals of an octave.
+    /// Contrast of the blob, as a fraction of the range from black to white, times the number of intervals of
+    /// an octave.
     pub contrast: f64,
 }
 
-/// A unit vector of 4 × 4 cells, row by row, of 8 directions each.
+/// A unit vector: 4 × 4 cells, row by row, with 8 directions each.
 pub type Descriptor = [f32; DESCRIPTOR_LENGTH];
 
 /// The features of an image: keypoint `i` has descriptor `i`.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Features {
-    /// The position, size and orientation of each.
+    /// Position, size and orientation of each feature.
     pub keypoints: Vec<SiftKeypoint>,
     /// Descriptor of each keypoint.
     pub descriptors: Vec<Descriptor>,
@@ -36,7 +38,7 @@ impl Features {
         self.keypoints.len()
     }
 
-    /// Whether there are none.
+    /// Whether there are no features.
     pub fn is_empty(&self) -> bool {
         self.keypoints.is_empty()
     }

@@ -10,8 +10,8 @@ pub(crate) struct GradientRow {
 }
 
 impl GradientRow {
-    /// Reads pixels `first..=last` of the row `at`; `above` and `below` are its neighbours. The pixel before `first`
-    /// and the one after `last` must exist.
+    /// Reads pixels `first..=last` of the row `at`; `above` and `below` are the rows next to it. The pixel before
+    /// `first` and the one after `last` must exist.
     #[inline(always)]
     pub(crate) fn read(&mut self, above: &[f32], at: &[f32], below: &[f32], first: usize, last: usize) {
         let n = last + 1 - first;
@@ -30,7 +30,7 @@ impl GradientRow {
     }
 }
 
-/// The direction of (dx, dy) in `[0, 2π]`, within 2e-5; zero for no direction. Without a branch, so that many are
+/// The direction of (dx, dy) in `[0, 2π]`, within 2e-5; zero for a zero vector. It has no branch, so many are
 /// computed at a time.
 ///
 /// # Source

@@ -1,7 +1,7 @@
-//! Further matches near the places predicted by a known pose.
+//! Further matches near the positions predicted by a known pose.
 //!
-//! The ratio test rejects right matches of repeated texture. With a known pose, a keypoint of the template is
-//! searched only at its predicted place, by a kd-tree over the image's keypoints.
+//! The ratio test rejects correct matches of repeated texture. With a known pose, a keypoint of the template is
+//! searched only at its predicted position, by a kd-tree over the image's keypoints.
 
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use nalgebra::Point2;
@@ -10,12 +10,12 @@ use sdg_geometry::PlanarSimilarity;
 use crate::matching::distance;
 use crate::{Features, RansacConfig};
 
-/// Largest distance of descriptors of one place: those of right matches are seldom farther apart, and unrelated
-/// ones are seldom closer.
+/// Maximum distance of the descriptors of a match: descriptors of correct matches are seldom farther apart, and
+/// unrelated ones are seldom closer.
 const MAX_DESCRIPTOR_DISTANCE: f32 = 0.7;
 
-/// Pairs of indices, in the template and in the image, of features that coincide at the pose, agree in turn and
-/// scale, and look alike.
+/// Pairs of indices, in the template and in the image, of features that coincide at the pose, agree in
+/// direction and scale, and look alike.
 pub(crate) fn matches_at_pose(
     template: &Features,
     image: &Features,

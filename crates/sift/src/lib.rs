@@ -1,4 +1,4 @@
-//! SIFT: keypoints invariant to rotation, scale and light, their descriptors, matching, and the turn of a part
+//! SIFT: keypoints invariant to rotation, scale and light, their descriptors, matching, and the rotation of a part
 //! relative to its demonstration.
 //!
 //! ```text
@@ -6,18 +6,18 @@
 //!                                                                     │
 //! template's Features ── match_features (ratio test) ◄────────────────┘
 //!                             │
-//!              fit_similarity (RANSAC, chance ruled out) ─► matches at the pose (kd-tree) ─► RotationEstimate
-//! masks ─► outlines laid on each other, where keypoints are too few ────────────────────────────────┘
+//!              fit_similarity (RANSAC, more than chance) ─► matches at the pose (kd-tree) ─► RotationEstimate
+//! masks ─► outlines aligned, if there are too few keypoints ────────────────────────────────┘
 //! ```
 //!
-//! **Frames.** As in `sdg_geometry`: the centre of the first pixel is at (0.5, 0.5), y points down, a positive angle
-//! turns clockwise as seen. Intensities run from 0 to 1.
+//! **Frames.** As in `sdg_geometry`: the centre of the first pixel is at (0.5, 0.5), y points down, a positive angle is
+//! clockwise as seen. Intensities are from 0 to 1.
 //!
-//! **Speed and determinism.** Rows and keypoints are shared among rayon's threads, and plain loops run in the widest
-//! registers that the processor has. Products and sums are never fused and never reordered, so results do not depend
-//! on threads or processor. The crate's README compares it with OpenCV.
+//! **Speed and determinism.** Rows and keypoints are distributed over rayon's threads, and plain loops use the widest
+//! registers of the processor. Products and sums are never fused and never reordered, so results do not depend on
+//! threads or processor. The crate's README compares it with OpenCV.
 //!
-//! This crate has no colour, affine shape or databases of many images, and knows no grasp and no camera.
+//! Not included: colour, affine shape, databases of many images, grasps and cameras.
 //!
 //! # Source
 //! D. Lowe, *Distinctive image features from scale-invariant keypoints*, IJCV 2004.

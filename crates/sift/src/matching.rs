@@ -1,7 +1,7 @@
-//! Pairs of similar features, found by comparing each with each.
+//! Pairs of similar features, found by comparing all with all.
 //!
 //! A kd-tree does not help in 128 dimensions: a query visits nearly every leaf. The crate's README compares both;
-//! `examples/matching_bench.rs` makes the figures.
+//! `examples/matching_bench.rs` measures the figures.
 
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
@@ -9,8 +9,7 @@ use rayon::prelude::*;
 use crate::features::Descriptor;
 use crate::{DESCRIPTOR_LENGTH, Features};
 
-/// Queries compared at a time, and candidates that each is compared with at a time: their products fill half of the
-/// registers that AVX2 has.
+/// Numbers of queries and candidates that are compared at a time: their products fill half of the AVX2 registers.
 const TILE: usize = 4;
 const LANES: usize = 16;
 
@@ -23,14 +22,15 @@ pub struct FeatureMatch {
     pub train_idx: usize,
     /// Euclidean distance of the two descriptors, from 0 to √2.
     pub distance: f32,
-    /// `distance` over the distance to the second nearest descriptor; 0 if the two agree exactly.
+    /// `distance` divided by the distance to the second nearest descriptor; 0 for identical descriptors.
     pub ratio: f32,
 }
 
-/// For each feature of `query` the nearest of `train`, if it is nearer than `ratio` times the second nearest.
+/// Matches each feature of `query` with the nearest feature of `train`, if it is nearer than `ratio` times the
+/// second nearest.
 ///
-/// In the order of `query`. Several queries may share a feature of `train`. If `train` has fewer than two features,
-/// nothing can be compared and nothing is matched.
+/// Matches are in the order of `query`. Several queries may match the same feature of `train`. If `train` has fewer
+/// than two features, there is no ratio, so there are no matches.
 ///
 /// # Source
 /// Lowe 2004, section 7.1, with a ratio of 0.8.
@@ -55,7 +55,8 @@ pub fn match_features(query: &Features, train: &Features, ratio: f32) -> Vec<Fea
                         query_idx: tile * TILE + i,
                         train_idx: first,
                         distance: near,
-                        // Two descriptors equal to the query's own are ambiguous: that ratio is one.
+                        // If both nearest descriptors equal the query's, the match is ambiguous, so its ratio is
+                        // one.
                         ratio: if far > 0.0 { near / far } else { 1.0 },
                     }
                 })
@@ -66,12 +67,12 @@ pub fn match_features(query: &Features, train: &Features, ratio: f32) -> Vec<Fea
     tiles.into_iter().flatten().collect()
 }
 
-/// Euclidean distance.
+/// Euclidean distance of two descriptors.
 pub(crate) fn distance(a: &Descriptor, b: &Descriptor) -> f32 {
     a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f32>().sqrt()
 }
 
-/// Sixteen descriptors side by side: number by number, so that no product is summed across a register.
+/// Sixteen descriptors, transposed, so that no product is summed across a register.
 type Panel = [[f32; LANES]; DESCRIPTOR_LENGTH];
 
 /// All descriptors in panels; the last panel is filled up with zeros.
@@ -89,7 +90,7 @@ fn panels(descriptors: &[Descriptor]) -> Vec<Panel> {
 }
 
 /// The indices of the two descriptors nearest to each query, nearest first. All are unit vectors, so the largest dot
-/// product is the least distance.
+/// product has the smallest distance.
 struct NearestTwo<'a> {
     queries: &'a [Descriptor],
     panels: &'a [Panel],
@@ -159,7 +160,7 @@ mod tests {
 
     #[test]
     fn the_ratio_test_refuses_the_undecided() {
-        // 0.1 from one and 0.9 from another; then half way between the two.
+        // Distances 0.1 from one and 0.9 from the other; then halfway between the two.
         let found = match_features(&features(&[0.1, 0.5]), &features(&[0.0, 1.0]), 0.8);
         assert_eq!(found.len(), 1);
         assert_eq!((found[0].query_idx, found[0].train_idx), (0, 0));
@@ -189,7 +190,7 @@ mod tests {
         assert_eq!(match_features(&none, &two, 0.8), []);
         assert_eq!(match_features(&two, &none, 0.8), []);
         assert_eq!(match_features(&two, &one, 0.8), []);
-        // A twin makes a match undecidable.
+        // With two identical descriptors a match is ambiguous.
         assert_eq!(match_features(&one, &features(&[0.3, 0.3]), 0.8), []);
     }
 }

@@ -12,7 +12,7 @@ const NUM_BINS: usize = 36;
 const WINDOW_SIGMA: f64 = 1.5;
 /// Radius of the window, in units of its σ.
 const WINDOW_RADIUS: f64 = 3.0;
-/// A peak of at least this share of the highest gives a direction of its own.
+/// Minimum height of a peak with a direction of its own, as a fraction of the highest peak.
 const PEAK_RATIO: f32 = 0.8;
 
 /// A keypoint in its octave: position and σ in pixels of the octave, and the level nearest to its scale.
@@ -55,7 +55,7 @@ impl WithSimd for FindOrientations<'_> {
         }
         let column_weights: Vec<f32> = columns.clone().map(|x| weight(x as f64 - place.x)).collect();
 
-        // Two bins more than a turn has: 2π itself falls into bin 36, and its neighbour is 37.
+        // Two bins more than a full rotation: 2π itself falls into bin 36, and the bin after it is 37.
         let mut open = [0.0f32; NUM_BINS + 2];
         for y in rows {
             gradients.read(image.row(y - 1), image.row(y), image.row(y + 1), *columns.start(), *columns.end());

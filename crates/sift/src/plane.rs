@@ -1,4 +1,4 @@
-//! One channel of an image, as floating point.
+//! One channel of an image in floating point.
 
 use image::{GrayImage, RgbImage};
 use sdg_geometry::Mask;
@@ -16,10 +16,11 @@ pub struct Plane {
 }
 
 impl Plane {
-    /// A plane of the given intensities, row by row.
+    /// Makes a plane from intensities, row by row.
     ///
     /// # Errors
-    /// Another number of intensities than `width` × `height`, or one that is not finite.
+    /// A number of intensities other than `width` × `height`, or an intensity that is not
+    /// finite.
     pub fn new(width: u32, height: u32, data: Vec<f32>) -> Result<Self, SiftError> {
         let (expected, found) = (u64::from(width) * u64::from(height), data.len() as u64);
         if expected != found {
@@ -32,23 +33,23 @@ impl Plane {
         Ok(Self { width: width as usize, height: height as usize, data })
     }
 
-    /// A plane whose pixel (x, y) is `intensity(x, y)`, which must be finite.
+    /// Makes a plane whose pixel (x, y) is `intensity(x, y)`, which must be finite.
     pub fn from_fn(width: u32, height: u32, mut intensity: impl FnMut(u32, u32) -> f32) -> Self {
         let mut data = Vec::with_capacity(width as usize * height as usize);
         for y in 0..height {
             data.extend((0..width).map(|x| intensity(x, y)));
         }
-        assert!(data.iter().all(|value| value.is_finite()), "intensities are finite");
+        assert!(data.iter().all(|value| value.is_finite()), "expected finite intensities");
         Self { width: width as usize, height: height as usize, data }
     }
 
-    /// Grey levels divided by 255.
+    /// Converts grey levels, divided by 255.
     pub fn from_gray(image: &GrayImage) -> Self {
         let data = image.as_raw().iter().map(|&level| f32::from(level) / 255.0).collect();
         Self { width: image.width() as usize, height: image.height() as usize, data }
     }
 
-    /// The luma of a colour image, rounded to 8 bits, as in most libraries.
+    /// Converts a colour image to its luma, rounded to 8 bits, as in most libraries.
     ///
     /// # Source
     /// ITU-R BT.601: 0.299 R + 0.587 G + 0.114 B.
@@ -59,7 +60,7 @@ impl Plane {
         Self { width: image.width() as usize, height: image.height() as usize, data }
     }
 
-    /// A mask as a binary image: white inside, black outside.
+    /// Converts a mask to a binary image: white inside, black outside.
     pub fn from_mask(mask: &Mask) -> Self {
         Self::from_fn(mask.width(), mask.height(), |x, y| f32::from(u8::from(mask.get(x, y))))
     }
@@ -79,18 +80,19 @@ impl Plane {
         &self.data
     }
 
-    /// One row. Panics below the image.
+    /// Row `y`. Panics below the image.
     pub fn row(&self, y: usize) -> &[f32] {
         &self.data[y * self.width..(y + 1) * self.width]
     }
 
-    /// One pixel. Panics outside the image.
+    /// The pixel (x, y). Panics outside the image.
     #[inline(always)]
     pub(crate) fn at(&self, x: usize, y: usize) -> f32 {
         self.data[y * self.width + x]
     }
 
-    /// Black, in memory of earlier planes, because new pages take as much time as a blur.
+    /// A black plane in the memory of an earlier one, because new pages take as much time
+    /// as a blur.
     pub(crate) fn recycled(width: usize, height: usize, mut data: Vec<f32>) -> Self {
         data.resize(width * height, 0.0);
         Self { width, height, data }

@@ -1,8 +1,8 @@
 //! The similarity with the most inliers among matches.
 //!
-//! Every match already gives the part's turn and scale, so that a pair of matches is tried only if both agree with
-//! the line between them, and a match counts only if it agrees in place, turn and scale. The number of false alarms
-//! decides whether the agreement exceeds chance, not a fixed count.
+//! Every match already gives the part's rotation and scale. A pair of matches is tried only if both agree with the
+//! line between them, and a match counts only if it agrees in position, rotation and scale. The expected number of
+//! false alarms, not a fixed count, decides whether the agreement exceeds chance.
 
 use nalgebra::Point2;
 use rand_pcg::Pcg64Mcg;
@@ -15,19 +15,19 @@ use crate::{SiftError, SiftKeypoint};
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct RansacConfig {
-    /// Seed of the draws.
+    /// Seed of the random pairs.
     pub seed: u64,
-    /// Maximum number of drawn pairs of matches; with fewer possible pairs all are tried.
+    /// Maximum number of random pairs of matches; if fewer pairs are possible, all are tried.
     pub max_draws: usize,
-    /// Tolerance between a keypoint and its match, in pixels; a keypoint's own σ if that is larger.
+    /// Maximum distance between a keypoint and its match, in pixels, or the keypoint's own σ if that is larger.
     pub tolerance_px: f64,
-    /// Tolerance between a match's own turn and the similarity's, in radians.
+    /// Maximum difference between a match's rotation and the similarity's, in radians.
     pub max_turn_difference: f64,
-    /// Largest factor between a match's own scale and the similarity's.
+    /// Maximum factor between a match's scale and the similarity's.
     pub max_scale_factor: f64,
-    /// Smallest and largest scale of the part relative to its template.
+    /// Minimum and maximum scale of the part relative to its template.
     pub scale_range: (f64, f64),
-    /// Largest expected number of equally good agreements by chance.
+    /// Maximum expected number of equally good agreements by chance.
     pub max_false_alarms: f64,
 }
 
@@ -87,16 +87,16 @@ pub struct SimilarityFit {
     pub log10_false_alarms: f64,
 }
 
-/// Similar keypoints: in the template, in the image.
+/// Similar keypoints: one in the template, one in the image.
 pub type KeypointPair = (SiftKeypoint, SiftKeypoint);
 
-/// Finds the similarity, or `None` if no more matches agree than by chance.
+/// Finds the similarity; `None` if no more matches agree than by chance.
 ///
 /// `search_area` is the area that contains the image's keypoints, in square pixels.
 ///
 /// # Source
-/// Fischler and Bolles 1981 for the draws, Chum, Matas and Kittler 2003 for refining each best one, Moisan and Stival
-/// 2004 for the number of false alarms.
+/// Fischler and Bolles 1981 for the random pairs, Chum, Matas and Kittler 2003 for refining the best ones, Moisan and
+/// Stival 2004 for the number of false alarms.
 pub fn fit_similarity(pairs: &[KeypointPair], search_area: f64, config: &RansacConfig) -> Option<SimilarityFit> {
     let search = Search { pairs, config };
     let mut best: Option<Hypothesis> = None;
@@ -104,8 +104,7 @@ pub fn fit_similarity(pairs: &[KeypointPair], search_area: f64, config: &RansacC
         let Some(drawn) = search.hypothesis(i, j) else { return };
         let mut candidate = search.evaluate(drawn);
         if best.as_ref().is_none_or(|best| candidate.cost < best.cost) {
-            // Two matches that are close together determine a similarity poorly; all that agree with it determine it
-            // well.
+            // Two close matches determine a similarity poorly; all matches that agree with it determine it well.
             for _ in 0..4 {
                 let Some(refined) = search.least_squares(&candidate.inliers) else { break };
                 let refined = search.evaluate(refined);
@@ -143,7 +142,8 @@ pub fn fit_similarity(pairs: &[KeypointPair], search_area: f64, config: &RansacC
     Some(SimilarityFit { image_from_template, inliers: best.inliers, residual_px, log10_false_alarms })
 }
 
-/// A similarity with the matches that agree and the sum of their squared distances, in tolerances and clipped at one.
+/// A similarity with the matches that agree, and the sum of their squared distances, in tolerances and clipped at
+/// one.
 struct Hypothesis {
     inliers: Vec<usize>,
     cost: f64,
@@ -187,7 +187,7 @@ impl Search<'_> {
         (least..=most).contains(&fitted.scale).then_some(fitted)
     }
 
-    /// Whether a match's own turn and scale agree with the pose.
+    /// Whether a match's own rotation and scale agree with the pose.
     fn poses_agree(&self, pose: &PlanarSimilarity, k: usize) -> bool {
         let (from, to) = &self.pairs[k];
         let factor = to.sigma / (from.sigma * pose.scale);
@@ -204,7 +204,8 @@ impl Search<'_> {
         self.config.tolerance_px.max(self.pairs[k].1.sigma)
     }
 
-    /// Number of subsets of this size times the probability that all of one agree.
+    /// Decimal logarithm of the number of subsets of this size times the probability that all matches of a subset
+    /// agree by chance.
     fn log10_false_alarms(&self, inliers: &[usize], search_area: f64) -> f64 {
         // Matches of one keypoint with several directions, or of one blob at two scales, count once.
         let mut distinct: Vec<usize> = Vec::new();
@@ -229,7 +230,7 @@ impl Search<'_> {
             (area / search_area.max(area) * turn * scale).log10()
         };
         let log10_choose = |n: usize, k: usize| (0..k).map(|i| ((n - i) as f64 / (i + 1) as f64).log10()).sum::<f64>();
-        // Two of the matches determined the pose, so that their agreement in place carries no information.
+        // Two of the matches determined the pose, so their agreement in position carries no information.
         let surprising: f64 = distinct[2..].iter().map(|&i| chance(i)).sum();
         (n as f64 - 2.0).log10() + log10_choose(n, k) + log10_choose(k, 2) + surprising
     }
@@ -245,7 +246,8 @@ mod tests {
         SiftKeypoint { position: Point2::new(x, y), sigma, angle: Angle::from_degrees(degrees), contrast: 0.1 }
     }
 
-    /// `right` matches under `pose`, each with an error of up to half a pixel, and `wrong` ones anywhere.
+    /// `right` correct matches under `pose`, each with an error of up to half a pixel, and `wrong` ones at random
+    /// positions.
     fn pairs(pose: &PlanarSimilarity, right: usize, wrong: usize, seed: u64) -> Vec<KeypointPair> {
         let mut rng = Pcg64Mcg::seed_from_u64(seed);
         let mut uniform = |low: f64, high: f64| low + (high - low) * (rng.next_u64() as f64 / u64::MAX as f64);

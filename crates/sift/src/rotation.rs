@@ -1,4 +1,5 @@
-//! The turn of a part relative to its template: from its texture, or from its outline if texture is poor.
+//! The rotation of a part relative to its template, from its texture, or from its outline if there is too little
+//! texture.
 
 use nalgebra::Point2;
 use sdg_geometry::{Angle, Mask, PlanarSimilarity};
@@ -13,13 +14,13 @@ use crate::{Features, Plane, Sift, SiftError, match_features};
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct RotationConfig {
-    /// Largest ratio of a match; see [`match_features`].
+    /// Maximum ratio of a match; see [`match_features`].
     pub ratio: f32,
-    /// Settings of the matches' agreement.
+    /// Settings of the search for a similarity.
     pub ransac: RansacConfig,
     /// Pixels by which a mask is widened for keypoints: keypoints of a part's corners are just outside its outline.
     pub mask_margin_px: u32,
-    /// Minimum overlap of the outlines, from 0 to 1, for reading a turn from them.
+    /// Minimum overlap of the outlines, from 0 to 1, for a rotation from the outlines.
     pub min_overlap: f64,
 }
 
@@ -29,7 +30,7 @@ impl Default for RotationConfig {
     }
 }
 
-/// Estimates the turn, scale and shift of a part relative to a template of it.
+/// Estimates the rotation, scale and shift of a part relative to its template.
 #[derive(Default)]
 pub struct RotationEstimator {
     sift: Sift,
@@ -52,17 +53,17 @@ impl RotationTemplate {
 /// The pose of a part relative to its template, and the source of that pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RotationEstimate {
-    /// The turn from the template to the image; positive is clockwise as seen.
+    /// The rotation from the template to the image; positive is clockwise as seen.
     pub angle: Angle,
     /// The whole pose, in pixels.
     pub image_from_template: PlanarSimilarity,
-    /// The source of the turn.
+    /// The source of the rotation.
     pub method: RotationMethod,
     /// Intersection over union of the two masks at this pose, if both were given.
     pub overlap: Option<f64>,
 }
 
-/// The source of a turn, and its reliability.
+/// The source of a rotation, and figures of its reliability.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum RotationMethod {
@@ -72,23 +73,24 @@ pub enum RotationMethod {
         matches: usize,
         /// Matches that agree with the pose.
         inliers: usize,
-        /// Keypoints of the template found at the pose, including repeated texture; they determined the pose.
+        /// Keypoints of the template found at the pose, including repeated texture; the final pose is computed from
+        /// them.
         guided_matches: usize,
-        /// Root mean square distance of the matches that determined the pose, in pixels.
+        /// Root mean square distance of the matches from which the final pose is computed, in pixels.
         residual_px: f64,
         /// Decimal logarithm of the expected number of equally good agreements by chance.
         log10_false_alarms: f64,
     },
-    /// The outlines of the two masks: too few keypoints agreed.
+    /// The outlines of the two masks, because too few keypoints agreed.
     Silhouette {
-        /// Intersection over union at the second best turn. If it is close to the estimate's overlap, the outline is
-        /// similar at both turns and the turn is unreliable.
+        /// Intersection over union at the second best rotation. If it is close to the estimate's overlap, the
+        /// outline is similar at both rotations, and the estimate is unreliable.
         runner_up_overlap: f64,
     },
 }
 
 impl RotationEstimate {
-    /// Whether another turn explains the outlines equally well within 0.03; never true for matched keypoints.
+    /// Whether another rotation explains the outlines equally well within 0.03; never true for matched keypoints.
     pub fn is_ambiguous(&self) -> bool {
         match self.method {
             RotationMethod::Features { .. } => false,
@@ -114,11 +116,11 @@ impl RotationEstimator {
         Ok(Self { sift, config })
     }
 
-    /// Reads a template: an image of the part, and the part's mask if there is one. Without a mask, the whole
-    /// image is mistaken for the part.
+    /// Makes a template from an image of the part and, if there is one, the part's mask. Without a mask, the whole
+    /// image is taken for the part.
     ///
     /// # Errors
-    /// A mask of another size than the image; a template with neither keypoints nor a mask.
+    /// A mask whose size differs from the image's; a template with neither keypoints nor a mask.
     pub fn template(&self, image: &Plane, mask: Option<&Mask>) -> Result<RotationTemplate, SiftError> {
         let features = self.features(image, mask)?;
         let silhouette = mask.and_then(Silhouette::new);
@@ -128,14 +130,14 @@ impl RotationEstimator {
         Ok(RotationTemplate { features, silhouette })
     }
 
-    /// Finds the part in an image, looking inside the mask if there is one. `None` if neither texture nor outline
-    /// determines a turn.
+    /// Finds the part in an image, inside the mask if there is one. `None` if neither texture nor outline determines
+    /// a rotation.
     ///
-    /// Keypoints decide if more of them agree than by chance; otherwise the outlines, if both masks were given.
-    /// Deterministic.
+    /// The keypoints are used if more of them agree than by chance; otherwise the outlines, if both masks were
+    /// given. The result is deterministic.
     ///
     /// # Errors
-    /// A mask of another size than the image.
+    /// A mask whose size differs from the image's.
     pub fn estimate(
         &self,
         template: &RotationTemplate,
@@ -180,7 +182,7 @@ impl RotationEstimator {
         let guided = matches_at_pose(template, image, &fit.image_from_template, &self.config.ransac);
         let from: Vec<Point2<f64>> = guided.iter().map(|&(i, _)| template.keypoints[i].position).collect();
         let to: Vec<Point2<f64>> = guided.iter().map(|&(_, j)| image.keypoints[j].position).collect();
-        // Fewer matches than agreed before cannot improve the pose.
+        // The new pose is used only if it has at least as many matches as before.
         let refined = PlanarSimilarity::fit(&from, &to).filter(|_| guided.len() >= fit.inliers.len());
         let (pose, residual_px) = match refined {
             Some(pose) => {

@@ -5,7 +5,7 @@
 //!                                            └─ every second pixel ─► level 0 of octave o + 1
 //! ```
 //!
-//! Differences of neighbouring levels are computed where they are read: storing them would take more time than
+//! Differences of neighbouring levels are computed when they are read: storing them would take more time than
 //! computing them twice.
 
 use crate::blur::{GaussianKernel, blur, double, halve};
@@ -16,7 +16,7 @@ pub(crate) const BORDER: usize = 5;
 
 /// The levels of one octave.
 pub(crate) struct Octave {
-    /// S + 3 planes of one size, blurrier from one to the next.
+    /// S + 3 planes of one size, with increasing blur.
     pub levels: Vec<Plane>,
     /// Pixels of the image per pixel of the octave.
     pub pixel_size: f64,
@@ -25,7 +25,7 @@ pub(crate) struct Octave {
 }
 
 impl Octave {
-    /// The position in the image of a point of the octave, given as a pixel index that may have a fraction.
+    /// The position in the image of a point of the octave, given as a pixel index with a fraction.
     pub(crate) fn to_image(&self, index: f64) -> f64 {
         index * self.pixel_size + self.center
     }
@@ -51,7 +51,7 @@ pub(crate) struct PlanePool(Vec<Vec<f32>>);
 
 impl PlanePool {
     fn plane(&mut self, width: usize, height: usize) -> Plane {
-        // Planes are returned in the order in which they were made, so that the matching one is usually at this end.
+        // Planes are returned in the order in which they were made, so the last one is usually of the wanted size.
         Plane::recycled(width, height, self.0.pop().unwrap_or_default())
     }
 
@@ -64,7 +64,7 @@ impl PlanePool {
     }
 }
 
-/// All octaves of an image, as long as extrema fit in them.
+/// Builds all octaves of an image that are large enough for extrema.
 pub(crate) fn build(image: &Plane, config: &SiftConfig, pool: &mut PlanePool) -> Vec<Octave> {
     let num_levels = config.intervals + 3;
     // One kernel per level, the same in each octave: the blur from the previous level to this one.
@@ -102,7 +102,7 @@ pub(crate) fn build(image: &Plane, config: &SiftConfig, pool: &mut PlanePool) ->
     }
 }
 
-/// The image, doubled if so configured, blurred from the camera's blur to `base_sigma`.
+/// The image, doubled if so configured, with its blur increased from the camera's blur to `base_sigma`.
 fn first_level(image: &Plane, config: &SiftConfig, pool: &mut PlanePool) -> Plane {
     let factor = if config.double_first_octave { 2 } else { 1 };
     let (width, height) = (factor * image.width(), factor * image.height());

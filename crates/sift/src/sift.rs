@@ -1,4 +1,4 @@
-//! From an image to its features.
+//! Computes the features of an image.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -15,7 +15,7 @@ use crate::{Features, Plane, SiftConfig, SiftError, SiftKeypoint};
 
 /// Finds keypoints and describes them.
 ///
-/// Keeps the memory of the last scale space for the next image; several threads may share one.
+/// Keeps the memory of the last scale space for the next image; several threads may use one `Sift`.
 #[derive(Default)]
 pub struct Sift {
     config: SiftConfig,
@@ -35,13 +35,14 @@ impl Sift {
         &self.config
     }
 
-    /// The features of an image, or of the part of it inside the mask, from the finest octave to the coarsest and
-    /// from the top down. Descriptors look beyond the mask.
+    /// The features of an image, or of its part inside the mask, from the finest octave to the coarsest and from the
+    /// top down. Descriptors also use pixels outside the mask.
     ///
-    /// Does not depend on the number of threads, nor on the processor.
+    /// The result does not depend on the number of threads or on the processor.
     ///
     /// # Errors
-    /// A mask of another size than the image. An image too small for any keypoint has no features, without an error.
+    /// A mask whose size differs from the image's. An image too small for any keypoint has no features, without an
+    /// error.
     pub fn detect_and_describe(&self, image: &Plane, mask: Option<&Mask>) -> Result<Features, SiftError> {
         check_mask(image, mask)?;
         let mut pool = std::mem::take(&mut *self.pool.lock().unwrap_or_else(PoisonError::into_inner));
@@ -99,7 +100,7 @@ impl Sift {
 }
 
 /// # Errors
-/// A mask of another size than the image.
+/// A mask whose size differs from the image's.
 pub(crate) fn check_mask(image: &Plane, mask: Option<&Mask>) -> Result<(), SiftError> {
     let (image_width, image_height) = (image.width() as u32, image.height() as u32);
     match mask.map(|mask| (mask.width(), mask.height())) {
@@ -111,6 +112,6 @@ pub(crate) fn check_mask(image: &Plane, mask: Option<&Mask>) -> Result<(), SiftE
 }
 
 fn is_inside(mask: Option<&Mask>, x: f64, y: f64) -> bool {
-    // An extremum lies at least `BORDER` samples from the border, so inside the image.
+    // An extremum is at least `BORDER` samples from the border, so it is inside the image.
     mask.is_none_or(|mask| mask.get((x as u32).min(mask.width() - 1), (y as u32).min(mask.height() - 1)))
 }

@@ -1,12 +1,12 @@
-//! The turn of a part from its outline alone.
+//! The rotation of a part from its outline alone.
 //!
 //! ```text
-//! mask ─► area around the centre by direction ─► turns at which two such profiles correlate
-//!                                                    └─► outlines laid on each other from each of these ─► best overlap
+//! mask ─► area around the centre by direction ─► rotations at which two such profiles correlate
+//!                                                    └─► outlines aligned from each of these ─► best overlap
 //! ```
 //!
-//! An outline that is similar at several turns does not distinguish them; the overlap at the second best turn shows
-//! this.
+//! If an outline is similar at several rotations, it does not distinguish them; the overlap at the second best rotation
+//! shows this.
 
 use std::f64::consts::TAU;
 
@@ -14,7 +14,7 @@ use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use nalgebra::{Matrix4, Point2, Vector2, Vector4};
 use sdg_geometry::{Angle, Mask, PlanarSimilarity};
 
-/// Directions of a profile.
+/// Number of directions of a profile.
 const NUM_DIRECTIONS: usize = 180;
 /// Minimum number of pixels of a mask with a usable outline.
 const MIN_AREA: usize = 25;
@@ -25,12 +25,12 @@ const NUM_AREA_POINTS: usize = 4000;
 /// Number of correlation peaks from which outlines are aligned.
 const NUM_STARTS: usize = 4;
 const MAX_ITERATIONS: usize = 12;
-/// Radius in pixels around an outline point in which the balance of the mask gives its normal: large enough to smooth
+/// Radius in pixels around an outline point within which the mask's pixels determine its normal: large enough to smooth
 /// the pixel steps.
 const NORMAL_WINDOW: i64 = 4;
-/// Share of the nearest points that is used; the rest may belong to specks, shadows or objects that cover the part.
+/// Fraction of the nearest points that is used; the rest may belong to specks, shadows or objects that cover the part.
 const TRIM: f64 = 0.85;
-/// Turns closer than this are one.
+/// Minimum difference between rotations that count as distinct, in radians.
 const DISTINCT_TURN: f64 = 20.0 * TAU / 360.0;
 
 /// A part's outline, prepared for alignment with another.
@@ -38,7 +38,7 @@ pub(crate) struct Silhouette {
     mask: Mask,
     area: f64,
     centroid: Point2<f64>,
-    /// Centres of the mask's pixels, or of an evenly distributed sample.
+    /// Centres of the mask's pixels, or of an evenly distributed subset.
     area_points: Vec<Point2<f64>>,
     /// Centres of the edges between a pixel inside and one outside.
     outline: Vec<OutlinePoint>,
@@ -49,7 +49,7 @@ pub(crate) struct Silhouette {
 #[derive(Debug, Clone, Copy)]
 struct OutlinePoint {
     at: Point2<f64>,
-    /// Unit vector out of the part.
+    /// Unit vector that points out of the part.
     normal: Vector2<f64>,
 }
 
@@ -59,12 +59,12 @@ pub(crate) struct SilhouetteFit {
     pub image_from_template: PlanarSimilarity,
     /// Intersection over union of the two areas.
     pub overlap: f64,
-    /// The same at the best distinct other turn.
+    /// Intersection over union at the best distinct other rotation.
     pub runner_up_overlap: f64,
 }
 
 impl Silhouette {
-    /// `None` for a mask that is empty or a speck.
+    /// Prepares the outline of a mask; `None` for a mask that is empty or a speck.
     pub(crate) fn new(mask: &Mask) -> Option<Self> {
         let (width, height) = (mask.width(), mask.height());
         let mut pixels = Vec::new();
@@ -101,7 +101,7 @@ impl Silhouette {
         Some(Self { mask: mask.clone(), area, centroid, area_points, outline, tree, profile })
     }
 
-    /// Intersection over union of the two areas when the template lies at `image_from_template`.
+    /// Intersection over union of the two areas with the template at `image_from_template`.
     pub(crate) fn overlap(&self, image: &Self, image_from_template: &PlanarSimilarity) -> f64 {
         let inside = |p: &&Point2<f64>| {
             let p = image_from_template.apply(p);
@@ -115,7 +115,7 @@ impl Silhouette {
         (intersection / (template_area + image.area - intersection)).clamp(0.0, 1.0)
     }
 
-    /// Aligns this outline, the template's, with the image's.
+    /// Aligns this outline, the template's, with the image's outline.
     ///
     /// # Source
     /// Chen and Medioni 1991 (iterated closest points, distances along the normal), in both directions and trimmed
@@ -149,7 +149,7 @@ impl Silhouette {
             pairs.truncate((TRIM * pairs.len() as f64).ceil() as usize);
             let Some(step) = normal_step(&pairs, &pose.apply(&self.centroid)) else { return pose };
             let next = step.compose(&pose);
-            // The effect of one more step at the outline's far end, about one radius from the centre.
+            // The movement of the outline's far end, about one radius from the centre, in one more step.
             let radius = self.area.sqrt() * next.scale;
             let moved = next.apply(&self.centroid) - pose.apply(&self.centroid);
             let converged = moved.norm() < 0.01 && next.angle.distance(pose.angle) * radius < 0.01;
@@ -173,14 +173,14 @@ fn normal_step(pairs: &[(Point2<f64>, OutlinePoint)], center: &Point2<f64>) -> O
     let (mut normal_matrix, mut right) = (Matrix4::zeros(), Vector4::zeros());
     let radius = pairs.iter().map(|(from, _)| (from - center).norm()).fold(1.0, f64::max);
     for (from, to) in pairs {
-        // Turn and scale in units of their effect at the far end, so that all four unknowns are in pixels.
+        // Rotation and scale in units of their effect at the far end, so that all four unknowns are in pixels.
         let arm = (from - center) / radius;
         let n = to.normal;
         let row = Vector4::new(arm.perp(&n), arm.dot(&n), n.x, n.y);
         normal_matrix += row * row.transpose();
         right += row * n.dot(&(to.at - from));
     }
-    // A slight damping: an outline that is similar at any turn stays at its start.
+    // A slight damping: an outline that is similar at any rotation stays at its start.
     normal_matrix += Matrix4::identity() * (1e-4 * pairs.len() as f64);
     let found = normal_matrix.cholesky()?.solve(&right);
     let (turn, growth) = (found.x / radius, found.y / radius);
@@ -199,17 +199,17 @@ fn normal(mask: &Mask, x: u32, y: u32) -> Vector2<f64> {
         for dx in -NORMAL_WINDOW..=NORMAL_WINDOW {
             let (col, row) = (i64::from(x) + dx, i64::from(y) + dy);
             let within = (0..i64::from(mask.width())).contains(&col) && (0..i64::from(mask.height())).contains(&row);
-            // A round window: a square one would favour its diagonals.
+            // A round window; a square one would favour its diagonals.
             if within && dx * dx + dy * dy <= NORMAL_WINDOW * NORMAL_WINDOW && mask.get(col as u32, row as u32) {
                 balance -= Vector2::new(dx as f64, dy as f64);
             }
         }
     }
-    // A thin line is balanced on both sides; its normals then carry no information.
+    // A thin line has the same pixels on both sides, so its normals carry no information.
     balance.try_normalize(1e-9).unwrap_or_else(Vector2::zeros)
 }
 
-/// About `count` of the points, evenly distributed over their order.
+/// About `count` of the points, at regular steps.
 fn thinned<T: Copy>(points: &[T], count: usize) -> Vec<T> {
     points.iter().step_by(points.len().div_ceil(count)).copied().collect()
 }
@@ -231,8 +231,8 @@ fn profile(pixels: &[Point2<f64>], centroid: &Point2<f64>) -> Vec<f64> {
     profile
 }
 
-/// The turns of the highest profile correlation, and the best one turned by a quarter and by a half, which detects
-/// an outline that fits these equally well.
+/// The rotations of the highest profile correlations, and the best one rotated by 90°, 180° and 270°, to detect an
+/// outline that fits these equally well.
 fn starts(template: &[f64], image: &[f64]) -> Vec<Angle> {
     let correlation = |shift: usize| -> f64 {
         template.iter().enumerate().map(|(i, v)| v * image[(i + shift) % NUM_DIRECTIONS]).sum()
@@ -259,7 +259,7 @@ mod tests {
         Polygon { vertices }.rasterize(320, 240)
     }
 
-    /// An L, 60 long and 40 wide, about the origin.
+    /// An L, 60 px long and 40 px wide, about the origin.
     const HOOK: [(f64, f64); 6] =
         [(-20.0, -30.0), (0.0, -30.0), (0.0, 15.0), (20.0, 15.0), (20.0, 30.0), (-20.0, 30.0)];
 
@@ -276,7 +276,7 @@ mod tests {
                 let truth = at(f64::from(degrees), scale);
                 let fit = template.lay_on(&Silhouette::new(&mask(&HOOK, &truth)).unwrap()).unwrap();
                 let expected = truth.compose(&at(0.0, 1.0).inverse());
-                // Its far ends are 36 from the centre.
+                // The far ends are 36 px from the centre.
                 let error = fit.image_from_template.angle.distance(expected.angle);
                 worst_px = worst_px.max(error * 36.0 * scale);
                 assert!((fit.image_from_template.scale / scale - 1.0).abs() < 0.03, "{fit:?}");
@@ -321,7 +321,7 @@ mod tests {
         assert!(Silhouette::new(&Mask::empty(0, 0)).is_none());
         assert!(Silhouette::new(&Mask::empty(40, 40)).is_none());
         assert!(Silhouette::new(&Mask::from_fn(40, 40, |x, y| x < 2 && y < 2)).is_none());
-        // The whole image is a rectangle like any other, with many outline points that share a coordinate.
+        // The whole image is a rectangle with many outline points that have the same coordinate.
         assert!(Silhouette::new(&Mask::from_fn(500, 300, |_, _| true)).is_some());
     }
 }

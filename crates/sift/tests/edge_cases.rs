@@ -1,4 +1,4 @@
-//! Empty pictures, settings out of range, and repeatable results.
+//! Tests empty pictures, settings out of range, and repeatable results.
 
 use crate::support;
 use sdg_geometry::Mask;
@@ -9,7 +9,7 @@ fn describe(image: &Plane) -> Features {
     Sift::default().detect_and_describe(image, None).unwrap()
 }
 
-/// Speckle as sharp as can be.
+/// Noise without any blur.
 fn noise(width: u32, height: u32) -> Plane {
     Plane::from_fn(width, height, |x, y| {
         let mixed = (u64::from(x) << 32 | u64::from(y)).wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
@@ -29,7 +29,7 @@ fn empty_tiny_and_flat_pictures_have_no_features() {
 
 #[test]
 fn every_number_is_finite_and_every_descriptor_has_unit_length() {
-    // The thinnest pictures that have room for extrema, and one of many octaves; speckle, and values out of range.
+    // The thinnest pictures that have room for extrema, and one of many octaves; noise, and values out of range.
     let wild = |width, height| {
         let plain = noise(width, height);
         Plane::from_fn(width, height, |x, y| 1e3 * (plain.row(y as usize)[x as usize] - 0.5))
@@ -85,7 +85,7 @@ fn a_mask_keeps_what_lies_inside() {
     assert_eq!(inside.keypoints.iter().collect::<Vec<_>>(), expected);
     assert!(inside.len() > 10 && inside.len() < all.len());
     let wrong = Sift::default().detect_and_describe(&image, Some(&Mask::empty(90, 120))).unwrap_err();
-    assert_eq!(wrong.to_string(), "expected a mask of 120 × 90 pixels, as its image, found 90 × 120");
+    assert_eq!(wrong.to_string(), "expected a mask of 120 × 90 pixels, the size of its image, found 90 × 120");
 }
 
 #[test]

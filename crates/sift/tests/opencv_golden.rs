@@ -1,9 +1,10 @@
-//! The same keypoints as OpenCV 5.0.0 finds, and nearly the same descriptors (`compare/write_golden.py`).
+//! Compares with OpenCV 5.0.0: the keypoints are the same, and the descriptors nearly the same
+//! (`compare/write_golden.py`).
 
 use crate::support;
 use sdg_sift::{DescriptorNormalization, Plane, Sift, SiftConfig};
 
-/// The default with a change.
+/// The default settings with a change.
 fn with(change: impl FnOnce(&mut SiftConfig)) -> SiftConfig {
     let mut config = SiftConfig::default();
     change(&mut config);
@@ -32,7 +33,7 @@ fn golden() -> Vec<Golden> {
     bytes.chunks_exact(144).map(record).collect()
 }
 
-/// OpenCV's y points up for directions, so that its eight directions have the opposite order.
+/// OpenCV's directions have y pointing up, so its eight directions have the opposite order.
 fn cosine_with_opencv(ours: &[f32], theirs: &[f32]) -> f32 {
     let mirrored = |i: usize| i - i % 8 + (8 - i % 8) % 8;
     let dot: f32 = (0..ours.len()).map(|i| ours[i] * theirs[mirrored(i)]).sum();
@@ -59,7 +60,7 @@ fn keypoints_and_descriptors_are_those_of_opencv() {
             apart < 0.01 && (k.sigma / f64::from(expected.sigma) - 1.0).abs() < 0.005
         });
         same_place += usize::from(at_place.clone().next().is_some());
-        // OpenCV votes for the nearest of 36 bins, this crate for the two nearest: directions differ by part of a bin.
+        // OpenCV uses the nearest of 36 bins, this crate the two nearest: directions differ by a fraction of a bin.
         let turned = |k: &sdg_sift::SiftKeypoint| {
             k.angle.distance(sdg_geometry::Angle::from_degrees(f64::from(expected.degrees))).to_degrees()
         };
@@ -72,7 +73,7 @@ fn keypoints_and_descriptors_are_those_of_opencv() {
         golden.len(),
         cosines.len()
     );
-    // One may be so close to a threshold that rounding decides.
+    // One keypoint may be so close to a threshold that rounding decides.
     assert!(same_place + 1 >= golden.len(), "{same_place} of {} places", golden.len());
     assert!(cosines.len() * 10 >= golden.len() * 9, "{} of {} directions", cosines.len(), golden.len());
     // OpenCV centres its grid on the nearest pixel, this crate on the keypoint.

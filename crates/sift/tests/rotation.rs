@@ -1,4 +1,4 @@
-//! The turn of the repository's parts relative to their demonstrations.
+//! Tests the rotation of the repository's parts relative to their demonstrations.
 
 use crate::support;
 use nalgebra::Point2;
@@ -14,7 +14,7 @@ fn pose(outline: &Polygon, degrees: f64, scale: f64, x: f64, y: f64) -> PlanarSi
     PlanarSimilarity::about(outline.centroid(), Point2::new(x, y), Angle::from_degrees(degrees), scale)
 }
 
-/// Noise as strong as the table's own, so that the view is not only the resampled template.
+/// Adds noise as strong as the table's, so that the view is not only the resampled template.
 fn grainy(image: &Plane) -> Plane {
     Plane::from_fn(image.width() as u32, image.height() as u32, |x, y| {
         let mixed = (u64::from(x) << 20 | u64::from(y)).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40;
@@ -82,7 +82,8 @@ fn outlines_tell_the_turn_where_texture_is_missing() {
             assert!(matches!(found.method, RotationMethod::Silhouette { .. }), "{found:?}");
             let error = found.angle.distance(truth.angle).to_degrees();
             println!("{part} {degrees}: {error:.2} degrees off, {found:?}");
-            // The rod end looks nearly the same after half a turn; an unreliable estimate must say so.
+            // The rod end looks nearly the same after a rotation by 180°; an unreliable estimate must be
+            // marked as ambiguous.
             assert!(error < 1.0 || found.is_ambiguous(), "{part} at {degrees}: {error} degrees off, {found:?}");
             assert!(found.overlap.unwrap() > 0.9);
         }

@@ -49,7 +49,8 @@ impl AdamW {
 pub struct AdamWState {
     /// Steps done.
     pub step: i32,
-    /// `[2, number of values]` for each parameter that had a gradient: the running means of it and of its square.
+    /// `[2, number of values]` for each parameter that had a gradient: the running means of the gradient and of its
+    /// square.
     pub moments: StateDict,
 }
 
@@ -67,8 +68,8 @@ impl AdamW {
         AdamWState { step: self.step, moments }
     }
 
-    /// The same optimiser as for `module` when [`Self::state`] was called. Moments of parameters that the module
-    /// lacks, or has in another size, are left out.
+    /// Restores the optimiser of `module` at the time of [`Self::state`]. Moments of parameters that the module lacks,
+    /// or has in a different size, are left out.
     pub fn with_state<M: Module>(mut self, module: &M, state: &AdamWState) -> Self {
         self.step = state.step;
         self.moments.clear();
@@ -173,7 +174,7 @@ mod tests {
         let mut restored = AdamW::new(0.1, 0.5).with_state(&net, &state);
         let (one, other) = (step(&mut adamw, net.clone()), step(&mut restored, net.clone()));
         assert_eq!(state_dict::export(&one), state_dict::export(&other));
-        // Without its state the step differs.
+        // A step without the state differs.
         let forgetful = step(&mut AdamW::new(0.1, 0.5), net);
         assert_ne!(state_dict::export(&one), state_dict::export(&forgetful));
     }

@@ -3,7 +3,7 @@
 /// The reason why a run ended without a network.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "the messages say what the fields are")]
+#[allow(missing_docs, reason = "the messages explain the fields")]
 pub enum TrainingError {
     /// An invalid setting of a run.
     #[error("{setting}: expected {expected}, found {found}")]
@@ -11,7 +11,7 @@ pub enum TrainingError {
     /// A loss that is NaN or infinite.
     #[error("the {name} became {loss} at step {step}; a lower learning rate than {learning_rate:e} may help")]
     Diverged {
-        /// Which loss, such as "orientation loss".
+        /// Name of the loss, such as "orientation loss".
         name: &'static str,
         step: usize,
         loss: f64,
@@ -21,22 +21,22 @@ pub enum TrainingError {
     /// The observer requested a stop before there was a network to keep.
     #[error("stopped at step {step}, before the first validation: there is no model to keep")]
     StoppedTooEarly { step: usize },
-    /// The held-back samples could not be examined.
+    /// The held-out samples could not be examined.
     #[error("the held-back samples cannot be examined: {0}")]
     Examination(Box<dyn std::error::Error + Send + Sync>),
     /// A demonstration that cannot be taught.
     #[error(transparent)]
     Demonstration(#[from] sdg_demonstration::Error),
     /// Initial parameters of the orientation CNN that belong to another network.
-    #[error("weights to start the orientation CNN from: expected those of this network, found another {name}")]
+    #[error("initial weights of the orientation CNN: expected those of this network, found a difference in {name}")]
     Start {
         /// The first parameter that does not fit.
         name: String,
     },
-    /// A setting of the orientation CNN or of its teaching, or a crop that it refused.
+    /// An invalid setting of the orientation CNN or of its training, or a crop that it rejected.
     #[error(transparent)]
     Orientation(#[from] sdg_orientation::OrientationError),
-    /// The network refused a batch.
+    /// The network rejected a batch.
     #[error(transparent)]
     Detection(#[from] sdg_detection::DetectionError),
 }

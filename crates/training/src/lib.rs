@@ -3,10 +3,10 @@
 //! ```text
 //! Augmenter ─ sample i ─ ImageTransform ─ batch (prepared on another thread) ─ losses ─ gradients ─ AdamW
 //!                                                                                 │
-//! held-back samples ─────────────────────── validation in pixels and degrees ─────┘ best checkpoint, early stop
+//! held-out samples ─────────────────────── validation in pixels and degrees ─────┘ best checkpoint, early stop
 //! ```
 //!
-//! Both are trained by one loop (run.rs); their differences are in a `Task`: batches, loss, validation.
+//! One loop (run.rs) trains both; their differences are in a `Task`: batches, loss, validation.
 //!
 //! A run is a function of its seed: the samples, their order, and every random choice of the losses. It depends
 //! on the machine only if a time budget shortens it.

@@ -12,11 +12,12 @@ use crate::adamw::AdamW;
 /// The update rule of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Optimizer {
-    /// Steps of constant length for steady gradients: learns from random values in a few hundred of them.
+    /// AdamW: steps of nearly constant length for steady gradients; it learns from random values in a few hundred
+    /// steps.
     AdamW,
     /// Stochastic gradient descent with momentum, as Detectron2 fine-tunes.
     Sgd {
-        /// Share of the last step that is added to the next.
+        /// Fraction of the last step that is added to the next.
         momentum: f64,
     },
 }
@@ -45,8 +46,8 @@ impl Stepper {
         }
     }
 
-    /// burn's AdamW, which trains the orientation CNN: ours differs from it in the last bits, and the models of a seed
-    /// must not change.
+    /// burn's AdamW, which trains the orientation CNN: our AdamW differs from it in the last bits, and the models of a
+    /// seed must not change.
     pub(crate) fn composed_adamw(weight_decay: f64, max_gradient_norm: f32) -> Self {
         let adamw = AdamWConfig::new()
             .with_weight_decay(weight_decay as f32)

@@ -20,7 +20,8 @@ pub enum Ending {
 pub(crate) struct Pace {
     steps: usize,
     budget_secs: Option<f64>,
-    /// Step and progress at which a validation was good enough, and the remaining steps from there.
+    /// Step and progress at which a validation was good enough, and the number of steps from there
+    /// to the end.
     cool_down: Option<(usize, f64, usize)>,
 }
 

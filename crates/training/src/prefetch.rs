@@ -1,4 +1,4 @@
-//! Batches, prepared on another thread while the network processes the one before.
+//! Prepares batches on another thread while the network processes the batch before.
 
 use std::collections::VecDeque;
 use std::sync::mpsc;
@@ -14,7 +14,7 @@ pub(crate) struct BatchRequest<K> {
     pub(crate) kind: K,
 }
 
-/// Number of requested batches: one in use, one ready, one in preparation.
+/// Number of batches requested ahead: one ready, one in preparation.
 const AHEAD: usize = 2;
 
 /// Batches in the order of their steps, prepared ahead on another thread.
@@ -25,8 +25,8 @@ pub(crate) struct Batches<K, B> {
 }
 
 impl<K: Copy + PartialEq, B> Batches<K, B> {
-    /// The requested batch. The following ones are requested as if nothing changed; if something did, they are
-    /// discarded, so that the training depends on the requests alone and not on the threads' speed.
+    /// The requested batch. The following batches are requested on the assumption that nothing changes; if something
+    /// did, they are discarded, so the training depends only on the requests and not on the threads' speed.
     pub(crate) fn next(&mut self, wanted: BatchRequest<K>) -> Result<B, TrainingError> {
         if self.pending.front().is_some_and(|first| *first != wanted) {
             while self.pending.pop_front().is_some() {

@@ -26,13 +26,13 @@ pub(crate) trait Task {
     /// The batch of a step at `progress` of the run, in [0, 1].
     ///
     /// # Errors
-    /// A sample that the network refuses.
+    /// A sample that the network rejects.
     fn batch(&mut self, step: usize, progress: f64) -> Result<Self::Batch, TrainingError>;
 
     /// The loss to minimise, a scalar `[1]`, and its figures.
     ///
     /// # Errors
-    /// A batch that the network refuses.
+    /// A batch that the network rejects.
     fn losses(
         &self,
         network: &Self::Network,
@@ -46,7 +46,7 @@ pub(crate) trait Task {
     /// Measures the network, without gradients, after some steps.
     ///
     /// # Errors
-    /// Held-back samples that cannot be examined.
+    /// Held-out samples that cannot be examined.
     fn validate(
         &mut self,
         network: Self::Network,
@@ -66,7 +66,7 @@ pub(crate) trait LossFigures: Copy {
 
 /// A step that was made.
 pub(crate) struct Step<'a, T: Task + ?Sized> {
-    /// From zero.
+    /// Index of the step, from zero.
     pub(crate) step: usize,
     pub(crate) batch: &'a T::Batch,
     pub(crate) learning_rate: f64,
@@ -74,7 +74,7 @@ pub(crate) struct Step<'a, T: Task + ?Sized> {
     pub(crate) losses: T::Losses,
     /// Number of steps of the run, as known now.
     pub(crate) planned_steps: usize,
-    /// Since the start of the run.
+    /// Seconds since the start of the run.
     pub(crate) elapsed_secs: f64,
 }
 
@@ -116,9 +116,9 @@ impl ValidationSteps {
 
 /// Result of a run.
 pub(crate) struct Ended<N> {
-    /// After the last step, without gradients.
+    /// The network after the last step, without autodiff.
     pub(crate) network: N,
-    /// Steps made.
+    /// Number of steps done.
     pub(crate) steps: usize,
     pub(crate) ending: Ending,
 }
@@ -126,7 +126,7 @@ pub(crate) struct Ended<N> {
 /// Trains a network. A run that is not interrupted ends with a validation.
 ///
 /// # Errors
-/// A loss that is not finite, and the task's own.
+/// A loss that is not finite, and the errors of the task.
 pub(crate) fn run<T: Task>(
     task: &mut T,
     mut network: T::Network,

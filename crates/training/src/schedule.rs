@@ -2,22 +2,22 @@
 
 use serde::{Deserialize, Serialize};
 
-/// One cycle: a cosine up to `peak` during warm-up, a cosine down to nearly nothing for the rest.
+/// One cycle: a cosine up to `peak` during warm-up, then a cosine down to nearly zero.
 ///
 /// # Source
 /// Smith and Topin 2018, with PyTorch's `OneCycleLR` factors. With Detectron2's default warm-up of 1000 iterations
 /// the learning rate of the paper's 1000-iteration runs only increases; this schedule avoids that.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct OneCycle {
-    /// Highest learning rate.
+    /// Maximum learning rate.
     pub peak: f64,
-    /// Share of the run that warms up, in (0, 1).
+    /// Fraction of the run that warms up, in (0, 1).
     pub warm_up: f64,
 }
 
-/// Peak over first learning rate.
+/// Ratio of the peak to the first learning rate.
 const START_DIVISOR: f64 = 25.0;
-/// Peak over last learning rate.
+/// Ratio of the peak to the last learning rate.
 const END_DIVISOR: f64 = 1e4;
 
 impl OneCycle {

@@ -1,4 +1,5 @@
-//! The orientation CNN learns, repeatably, and every parameter contributes.
+//! Tests that the orientation CNN learns, that the result is repeatable, and that every
+//! parameter contributes.
 #![allow(clippy::unwrap_used)]
 
 use std::ops::ControlFlow;

@@ -1,4 +1,4 @@
-// The camera: frames as fast as the model searches them, one at a time.
+// The camera: the next frame is taken when the model has searched the last one.
 
 export class Camera {
   #stream = null;

@@ -7,7 +7,7 @@ export class Detector {
   #waiting = new Map();
   #nextId = 1;
 
-  /** On the processor, or on the graphics card provided by the browser. */
+  /** Starts a worker on the processor, or on the graphics card through WebGPU. */
   constructor(device = "processor") {
     this.#device = device;
     this.#start();

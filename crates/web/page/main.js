@@ -16,7 +16,7 @@ let detector = null;
 let modelFile = null; // The file that is open.
 let modelOpen = false;
 let current = null; // A picture of the list, or the camera's last frame.
-let generation = 0; // Rises when model or settings change: what was asked for before is of no use.
+let generation = 0; // Increases when model or settings change, which makes earlier requests invalid.
 
 const missing = missingSupport();
 if (missing) {
@@ -39,7 +39,7 @@ function wire() {
   element("refused").onchange = showCurrent;
   element("download").onclick = download;
   element("webgpu").onchange = changeDevice;
-  element("webgpu-choice").hidden = !navigator.gpu; // Only for pages served by https or from this machine.
+  element("webgpu-choice").hidden = !navigator.gpu; // Browsers offer WebGPU only to pages served by https or from this machine.
   watchWidth(element("stage"), showCurrent);
 
   // Dropped anywhere: models and pictures are distinguished by name.
@@ -294,7 +294,7 @@ function showCurrent() {
     return;
   }
   const record = result?.record ?? { width: bitmap.width, detections: [] };
-  // Shown smaller than its size: positions are in pixels of the original image.
+  // The picture is shown reduced, but positions are in pixels of the original image.
   const shrink = bitmap.width / record.width;
   show(canvas, bitmap, shrink === 1 ? record.detections : record.detections.map(shrunk(shrink)), {
     refused: element("refused").checked,

@@ -49,12 +49,12 @@ function drawDetection(brush, detection) {
     dot(brush, [x, y], 1.1 * unit, COLORS.keypoint);
   }
   if (accepted) {
-    drawJaws(brush, detection.grasp); // The robot will not go where the demonstration disagrees.
+    drawJaws(brush, detection.grasp); // The robot does not grasp refused detections.
   }
   drawLabel(brush, detection, color);
 }
 
-/** Two jaws, as long as a gripper's are wide, which close on the part across the taught line. */
+/** Draws the two jaws at the grasp's width; they close across the taught line. */
 function drawJaws(brush, { x, y, angle_deg: degrees, width_px: width }) {
   const angle = (degrees * Math.PI) / 180;
   const along = [Math.cos(angle), Math.sin(angle)];

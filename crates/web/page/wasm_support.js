@@ -4,7 +4,7 @@
 const VECTOR_MODULE = new Uint8Array([
   0, 0x61, 0x73, 0x6d, 1, 0, 0, 0, // magic, version
   1, 4, 1, 0x60, 0, 0, // type: [] → []
-  3, 2, 1, 0, // one function of it
+  3, 2, 1, 0, // one function of this type
   10, 11, 1, 9, 0, // code: one body, no locals
   0x41, 0, // i32.const 0
   0xfd, 0x0f, // i8x16.splat

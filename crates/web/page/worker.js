@@ -1,12 +1,12 @@
-// The thread of the model, which keeps the page fluid. One request at a time, answered in order.
+// The thread of the model, which keeps the page responsive. One request at a time, answered in order.
 //
 //   {id, open: ArrayBuffer}                    a model file      → {id, summary}
 //   {id, look: Blob, verify}                   an image file     → {id, record, milliseconds, decoded}
 //   {id, look: ImageBitmap, verify}            a camera's frame  → {id, record, milliseconds, decoded}
 //   any error                                                    → {id, error}
 //
-// `milliseconds` is the duration of the search; `decoded` that of decoding. After a panic the module's memory is not
-// valid: the answer has `stopped`, and the page starts another worker.
+// `milliseconds` is the duration of the search; `decoded` the duration of decoding. After a panic the module's memory is not
+// valid: the answer contains `stopped`, and the page starts another worker.
 //
 // The address selects the device: `worker.js?device=webgpu` uses the graphics card, with another module.
 

@@ -27,7 +27,8 @@ impl Model {
     /// Opens a model from its file's bytes.
     ///
     /// # Errors
-    /// Not a grasp model, another version, or damaged; a browser that does not provide a graphics card.
+    /// A file that is not a grasp model, has another version, or is damaged; a browser that provides no graphics
+    /// card.
     pub async fn open(bytes: Vec<u8>) -> Result<Model, JsError> {
         Ok(Self(Detector::open(&bytes, &device().await?)?))
     }
@@ -40,7 +41,7 @@ impl Model {
     /// Detects in a PNG or JPEG file; see [`Detector::detect_in_file`].
     ///
     /// # Errors
-    /// Not an image, damaged, or too large.
+    /// A file that is not an image, is damaged, or is too large.
     #[wasm_bindgen(js_name = detectInFile)]
     pub async fn detect_in_file(&self, bytes: &[u8], verify: bool) -> Result<String, JsError> {
         Ok(self.0.detect_in_file(bytes, verification(verify)).await?)

@@ -1,4 +1,4 @@
-//! A model that detects in images: bytes in, JSON out.
+//! A model that detects in images; its inputs are bytes, its outputs JSON.
 
 use image::RgbImage;
 use sdg_grasp::{
@@ -8,8 +8,8 @@ use serde::Serialize;
 
 use crate::error::WebError;
 
-/// WebAssembly's memory is limited to 4 GiB; searching a photo of 200 megapixels takes 5.8 GB, one of 64 a third of
-/// that.
+/// Maximum size of an image. WebAssembly's memory is limited to 4 GiB; searching a photo of 200 megapixels takes
+/// 5.8 GB, one of 64 megapixels a third of that.
 const LIMITS: ImageLimits = ImageLimits { max_pixels: 64_000_000 };
 
 /// An opened grasp model.
@@ -24,7 +24,7 @@ pub struct Detector {
 struct ImageRecord {
     width: u32,
     height: u32,
-    /// Best first, refused ones (score below 0.5) included.
+    /// Best score first, including refused detections (score below 0.5).
     detections: Vec<DetectionRecord>,
 }
 
@@ -32,7 +32,7 @@ impl Detector {
     /// Opens a model from its file's bytes, on a device.
     ///
     /// # Errors
-    /// Not a grasp model, another version, or damaged.
+    /// A file that is not a grasp model, has another version, or is damaged.
     pub fn open(bytes: &[u8], device: &Device) -> Result<Self, WebError> {
         let summary = summarize(bytes)?;
         Ok(Self { model: GraspModel::from_bytes(bytes, device)?, summary })
@@ -43,7 +43,7 @@ impl Detector {
         to_json(&self.summary)
     }
 
-    /// Detects in a PNG or JPEG file: `{"width", "height", "detections"}` as JSON, refused detections included.
+    /// Detects in a PNG or JPEG file: `{"width", "height", "detections"}` as JSON, including refused detections.
     ///
     /// # Errors
     /// The file is not an image, is damaged, or has more than 64 megapixels.

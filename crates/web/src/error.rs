@@ -1,9 +1,9 @@
 //! Errors of inputs from the page.
 
-/// Why a model could not be opened or an image could not be searched.
+/// The reason why a model could not be opened or an image could not be searched.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "the messages say what the fields are")]
+#[allow(missing_docs, reason = "the messages explain the fields")]
 pub enum WebError {
     /// An error of the model file, or of the search.
     #[error(transparent)]

@@ -7,7 +7,7 @@
 //!
 //! The inputs are the bytes of a model file and of an image; the outputs are [`sdg_grasp::DetectionRecord`]s as JSON,
 //! with the field names of `sdg detect --json`. Image files are decoded by the same decoder as on the command line, so
-//! that both see the same pixels; camera frames are passed as RGBA.
+//! both get the same pixels; camera frames are passed as RGBA.
 //!
 //! The module is built twice: for the processor, and (feature `webgpu`, several times as large, and loaded only on
 //! request) for the graphics card provided by the browser. Browsers return results of the graphics card only to

@@ -155,7 +155,7 @@ impl Browser {
         Ok(Element { browser: self, id: text(&found[ELEMENT], "/element")? })
     }
 
-    /// Performs input as in the specification's `actions`: sequences of pointer, key and wheel.
+    /// Performs input as in the specification's `actions`: sequences of pointer, key and wheel input.
     ///
     /// # Errors
     /// The sequence is invalid.
@@ -163,8 +163,8 @@ impl Browser {
         self.post("/actions", &json!({"actions": sequences})).map(drop)
     }
 
-    /// Presses a mouse button at the first position of the viewport, moves through the others and releases it at the
-    /// last.
+    /// Presses a mouse button at the first position of the viewport, moves through the other positions and releases
+    /// it at the last.
     ///
     /// # Errors
     /// A position is outside the viewport.
@@ -178,8 +178,8 @@ impl Browser {
         self.perform(&json!([mouse]))
     }
 
-    /// Presses keys in order, all held until the last: `["\u{e009}", "z"]` is Control and z. Keys without a character
-    /// have code points of WebDriver: U+E007 Enter, U+E00C Escape, U+E009 Control, U+E008 Shift.
+    /// Presses keys in order and holds all until the last one is pressed: `["\u{e009}", "z"]` is Control and z. Keys
+    /// without a character have code points of WebDriver: U+E007 Enter, U+E00C Escape, U+E009 Control, U+E008 Shift.
     ///
     /// # Errors
     /// A key is invalid.
@@ -193,7 +193,7 @@ impl Browser {
     /// Sets the window's size, in CSS pixels.
     ///
     /// # Errors
-    /// The browser refuses.
+    /// The browser rejects the size.
     pub fn resize(&self, width: u32, height: u32) -> Result<()> {
         self.post("/window/rect", &json!({"width": width, "height": height})).map(drop)
     }
@@ -201,7 +201,7 @@ impl Browser {
     /// Shows the page as on a screen of this size, however small, in the dark or the light scheme.
     ///
     /// # Errors
-    /// The browser refuses.
+    /// The browser rejects the settings.
     pub fn emulate(&self, width: u32, height: u32, dark: bool) -> Result<()> {
         let size = json!({"width": width, "height": height, "deviceScaleFactor": 1, "mobile": false});
         self.devtools("Emulation.setDeviceMetricsOverride", &size)?;
@@ -233,7 +233,7 @@ impl Browser {
     /// New warnings and errors of the console, including network errors.
     ///
     /// # Errors
-    /// The browser keeps no log.
+    /// The browser has no log.
     pub fn console_errors(&self) -> Result<Vec<String>> {
         let entries = self.post("/se/log", &json!({"type": "browser"}))?;
         let entries = entries.as_array().cloned().unwrap_or_default();
@@ -277,18 +277,18 @@ impl Drop for Browser {
 }
 
 impl Element<'_> {
-    /// Clicks in its middle.
+    /// Clicks in the middle of the element.
     ///
     /// # Errors
-    /// It is not visible, or covered.
+    /// The element is not visible, or is covered.
     pub fn click(&self) -> Result<()> {
         self.post("click", &json!({})).map(drop)
     }
 
-    /// Types text into it; for a file input, one path per line.
+    /// Types text into the element; for a file input, one path per line.
     ///
     /// # Errors
-    /// It accepts no keys, or a file does not exist.
+    /// The element accepts no keys, or a file does not exist.
     pub fn type_text(&self, text: &str) -> Result<()> {
         self.post("value", &json!({"text": text})).map(drop)
     }
@@ -298,7 +298,7 @@ impl Element<'_> {
     }
 }
 
-/// A port that was free just now.
+/// An address with a port that was free a moment ago.
 fn free_address() -> io::Result<SocketAddr> {
     TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?.local_addr()
 }

@@ -4,7 +4,7 @@ use std::io::{self, BufRead, BufReader, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::time::Duration;
 
-/// Response timeout: a command may teach a model in the page, the slowest operation.
+/// Timeout for a response: the slowest command may teach a model in the page.
 const LONGEST_ANSWER: Duration = Duration::from_secs(600);
 
 /// Sends a request and returns status and body.
@@ -22,7 +22,8 @@ pub(crate) fn request(driver: SocketAddr, method: &str, path: &str, body: Option
     read_answer(&mut BufReader::new(stream))
 }
 
-/// Reads the number of bytes announced in the head: the driver may keep the connection open.
+/// Reads only the number of bytes announced in the head, because the driver may keep the
+/// connection open.
 fn read_answer(stream: &mut impl BufRead) -> io::Result<(u16, String)> {
     let invalid = || io::Error::new(io::ErrorKind::InvalidData, "expected an HTTP answer");
     let mut line = String::new();

@@ -1,4 +1,4 @@
-//! A folder served like a static host, on a port of this machine.
+//! Serves a folder like a static host, on a port of this machine.
 
 use std::io::{BufRead, BufReader, Write};
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
@@ -67,7 +67,8 @@ fn media_type(name: &str) -> &'static str {
         Some("css") => "text/css",
         Some("js" | "mjs") => "text/javascript",
         Some("wasm") => "application/wasm",
-        // Without it a browser shows no drawing; of other pictures it knows the kind by their bytes.
+        // Browsers show an SVG drawing only with its type; they recognise other pictures by their
+        // bytes.
         Some("svg") => "image/svg+xml",
         _ => "application/octet-stream",
     }

@@ -1,7 +1,8 @@
-//! `hardening [--executions N] [--seconds S] [--out DIR] [TARGET…]`: many executions of the targets, resumed where they ended, in S seconds for
-//! all of them together at most; `hardening --input FILE TARGET` is one execution, whose panic is told whole.
+//! `hardening [--executions N] [--seconds S] [--out DIR] [TARGET…]` executes the targets many times and resumes an
+//! earlier run; `--seconds` limits the time of all targets together. `hardening --input FILE TARGET` executes a target
+//! once and prints its panic in full.
 //!
-//! A target's figures stand in DIR/TARGET.json, and each input that broke a promise in DIR/TARGET-NUMBER.bin.
+//! A target's figures are in DIR/TARGET.json, and each input that broke a promise is in DIR/TARGET-NUMBER.bin.
 
 use std::error::Error;
 use std::fs;
@@ -16,16 +17,16 @@ use serde_json::{Value, json};
 #[global_allocator]
 static ALLOCATOR: PeakAlloc = PeakAlloc;
 
-/// Executions after which the time is looked at.
+/// Number of executions between checks of the time.
 const BATCH: u64 = 50;
-/// The figures are written so often.
+/// Time between writes of the figures.
 const KEEP_EVERY: Duration = Duration::from_secs(5);
 const USAGE: &str =
     "usage: hardening [--executions N] [--seconds S] [--out DIR] [TARGET…], or hardening --input FILE TARGET";
 
 struct Asked {
     executions: u64,
-    /// For all targets together.
+    /// Time limit of all targets together.
     time: Option<Duration>,
     out: PathBuf,
     input: Option<PathBuf>,
@@ -56,7 +57,7 @@ fn asked() -> Result<Asked, Box<dyn Error>> {
     Ok(asked)
 }
 
-/// What an earlier run reached, in `file`.
+/// The figures that an earlier run wrote to `file`.
 fn reached(file: &Path) -> Value {
     let text = fs::read_to_string(file).ok();
     text.and_then(|text| serde_json::from_str(&text).ok()).unwrap_or_else(|| json!({}))
@@ -71,7 +72,7 @@ fn attack(target: &Target, executions: u64, until: Option<Instant>, out: &Path) 
     let mut slowest_secs = earlier["slowest_secs"].as_f64().unwrap_or(0.0);
     let mut seconds = earlier["seconds"].as_f64().unwrap_or(0.0);
     let seeds = (target.seeds)();
-    // What a target keeps for all its executions is not the first one's.
+    // Memory that a target keeps for all its executions must not count for the first one.
     let _ = execute(target, &seeds[0], &ALLOCATOR);
     let is_in_time = || until.is_none_or(|until| Instant::now() < until);
     while total < executions && is_in_time() {
@@ -117,12 +118,12 @@ fn main() -> Result<ExitCode, Box<dyn Error>> {
         return Ok(ExitCode::SUCCESS);
     }
     fs::create_dir_all(&asked.out)?;
-    // Each panic is a line of the figures; its message is not printed twice.
+    // Each panic becomes a line of the report; the default hook would print it a second time.
     std::panic::set_hook(Box::new(|_| {}));
     let mut failures = 0;
     let begin = Instant::now();
     for (place, target) in (1..).zip(&asked.targets) {
-        // What one target leaves of its time is the others'.
+        // Time that one target does not use is left for the next ones.
         let until = asked.time.map(|time| begin + time * place / asked.targets.len() as u32);
         failures += attack(target, asked.executions, until, &asked.out)?;
     }

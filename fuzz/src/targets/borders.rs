@@ -1,4 +1,5 @@
-//! What other languages hand over: WebAssembly's entry, and the values that Python and C have checked by `bindings`.
+//! Input from other languages: the entry points of WebAssembly, and the values from Python and C that `bindings`
+//! checks.
 
 use std::pin::pin;
 use std::sync::LazyLock;
@@ -12,7 +13,8 @@ use super::file;
 use super::numbers::Numbers;
 use crate::target::Target;
 
-/// Pixels of a picture that is searched: a search of more takes too long for a million of them.
+/// Maximum number of pixels of a picture that is searched: a million searches of larger pictures would take too
+/// long.
 const MAX_SEARCHED: usize = 64 * 64;
 
 /// A search holds pyramids of the picture and of the demonstration.
@@ -23,7 +25,7 @@ fn searched_picture() -> image::RgbImage {
     image::RgbImage::from_fn(64, 48, |x, y| image::Rgb([(x * 4) as u8, (y * 5) as u8, (x * y) as u8]))
 }
 
-/// WebAssembly's functions, on this computer's processor: a model's file, a picture's file, a canvas's pixels.
+/// The functions of WebAssembly, compiled for this computer: a model file, a picture file, a canvas's pixels.
 pub(super) const WEB: Target = Target {
     name: "web",
     max_extra_bytes: MAX_EXTRA_BYTES,
@@ -59,7 +61,7 @@ pub(super) const WEB: Target = Target {
     },
 };
 
-/// Drives what never waits on the processor.
+/// Polls a future in a loop; only for work that the processor does at once.
 fn now<T>(work: impl Future<Output = T>) -> T {
     let mut work = pin!(work);
     loop {
@@ -69,7 +71,7 @@ fn now<T>(work: impl Future<Output = T>) -> T {
     }
 }
 
-/// The values of Python's arguments: shapes, regions, threads, times of frames, a camera's text.
+/// The values of Python's arguments: shapes, regions, threads, times of frames, the text of a camera file.
 pub(super) const BINDINGS: Target = Target {
     name: "bindings",
     max_extra_bytes: MAX_EXTRA_BYTES,

@@ -1,4 +1,5 @@
-//! Functions of the C library, within the header's contract: pointers point to what is told, whatever it holds.
+//! Functions of the C library, called within the header's contract: pointers are valid for the stated sizes,
+//! with any content.
 #![allow(unsafe_code, reason = "they are called as C calls them")]
 
 use std::ffi::{CString, c_char};
@@ -52,7 +53,8 @@ pub(super) const C_BORDER: Target = Target {
     },
 };
 
-/// The last error's text in a buffer of some size: all of it, or cut, always ended.
+/// Checks that the last error's text in a buffer of size `room` is complete or truncated, and always
+/// terminated.
 fn check_last_error(room: usize) {
     let mut buffer = vec![c_char::MAX; room + 1];
     // SAFETY: `room` bytes may be written.
@@ -95,7 +97,7 @@ fn detect(input: &mut Numbers<'_>) -> bool {
     };
     let [idx, room, max_points] = [input.u8(), input.u8(), input.u8()].map(usize::from);
     let pixels = vec![input.u8(); MAX_PIXEL_BYTES];
-    // The contract: so many bytes may be read.
+    // The contract: `num_bytes` may be read.
     picture.num_bytes = picture.num_bytes.min(pixels.len());
     picture.pixels = if idx == 255 { null() } else { pixels.as_ptr() };
     let mut found = 0;
@@ -109,7 +111,7 @@ fn detect(input: &mut Numbers<'_>) -> bool {
     let mut count = 0;
     let mut json = vec![c_char::MAX; room + 1];
     let mut numbers = vec![f64::MAX; 3 * max_points + 1];
-    // SAFETY: every buffer has the room that is told.
+    // SAFETY: every buffer has the size that is passed.
     unsafe {
         let mut detection = std::mem::zeroed();
         assert_eq!(sdg_detections_count(found, &mut count), SDG_OK);
@@ -126,14 +128,14 @@ fn detect(input: &mut Numbers<'_>) -> bool {
     true
 }
 
-/// A text of the input up to its zero byte, as a path in a folder of our own, so that nothing else is written.
+/// A text of the input up to its zero byte, as a path inside `folder`, so that nothing else is written.
 fn path_in(folder: &std::path::Path, input: &mut Numbers<'_>) -> CString {
     let end = input.0.iter().position(|byte| *byte == 0).unwrap_or(input.0.len());
     let mut name = input.bytes(end);
     _ = input.bytes(1);
     name.retain(|byte| *byte != b'/');
     let path = [folder.as_os_str().as_bytes(), b"/", &name].concat();
-    // Zero bytes were the text's end.
+    // The text ended at its first zero byte, so there is none inside.
     CString::new(path).unwrap_or_default()
 }
 
@@ -151,7 +153,7 @@ fn load_and_save(input: &mut Numbers<'_>) -> bool {
     is_loaded && is_saved
 }
 
-/// Refused before anything is taught: there is no photo of that name.
+/// Passes arguments of teaching; fails before anything is taught, because the photo does not exist.
 fn teach(input: &mut Numbers<'_>) -> bool {
     let Ok(folder) = tempfile::tempdir() else { return false };
     let mut from = sdg_teaching {
@@ -178,6 +180,6 @@ fn teach(input: &mut Numbers<'_>) -> bool {
     let status = unsafe { sdg_teach(&from, &mut model) };
     check_last_error(usize::from(input.u8()));
     assert_ne!(status, SDG_OK, "expected no photo, found one");
-    // Refused for the missing photo, which is read last: all numbers were accepted.
+    // The photo is read last, so a missing photo means that all numbers were accepted.
     status == sdg_capi::SDG_ERROR_FILE
 }

@@ -1,4 +1,4 @@
-//! HTTP between cameras and us: what a camera's server may answer, and what a browser may ask of the live page.
+//! HTTP between cameras and this program: answers of a camera's server, and requests of a browser to the live page.
 
 use std::io::{Read, Write};
 use std::net::{Ipv4Addr, Shutdown, TcpListener, TcpStream};
@@ -12,12 +12,12 @@ use super::pictures::{encoded, picture};
 use super::{SEED_PORT, contains, replaced, split_at_marks};
 use crate::target::Target;
 
-/// Between the answers of one input, each of which goes to a connection of its own.
+/// Separates the answers of one input; each goes to a connection of its own.
 const NEXT_ANSWER: &[u8] = b"\x1enext\x1e";
-/// Far above what this computer needs for an answer, and far below [`MAX_SECONDS`](crate::MAX_SECONDS).
+/// Far above the time that this computer needs for an answer, and far below [`MAX_SECONDS`](crate::MAX_SECONDS).
 const TIMEOUT: Duration = Duration::from_secs(2);
 
-/// The client of cameras: motion JPEG and single pictures, redirects and challenges, over TCP.
+/// The client for cameras: motion JPEG and single pictures, redirects and authentication challenges, over TCP.
 pub(super) const HTTP_CAMERA: Target = Target {
     name: "http_camera",
     // The program's own limit: eight bytes for each of 210 megapixels, and a picture's 32 MiB.
@@ -42,7 +42,7 @@ pub(super) const HTTP_CAMERA: Target = Target {
     ],
     seeds: camera_answers,
     run: |bytes| {
-        // The client would connect to any host that a redirect names: none but this computer is asked here.
+        // The client would connect to any host that a redirect names; the test may connect to this computer only.
         if contains(&bytes.to_ascii_lowercase(), b"location") && contains(bytes, b"//") {
             return false;
         }
@@ -55,10 +55,10 @@ pub(super) const HTTP_CAMERA: Target = Target {
     },
 };
 
-/// A server that gives each connection the next answer, then hangs up.
+/// A server that sends each connection the next answer and closes it.
 struct Answering {
     port: u16,
-    /// The last one is given first.
+    /// In reverse order: the last one is sent first.
     answers: Arc<Mutex<Vec<Vec<u8>>>>,
 }
 
@@ -70,7 +70,7 @@ static ANSWERING: LazyLock<Answering> = LazyLock::new(|| {
     thread::spawn(move || {
         for stream in listener.incoming().flatten() {
             let answer = waiting.lock().unwrap_or_else(PoisonError::into_inner).pop();
-            // A client that hangs up first is no error here.
+            // A client that closes the connection first is no error.
             let _ = give(stream, &answer.unwrap_or_default());
         }
     });
@@ -90,7 +90,7 @@ fn give(mut stream: TcpStream, answer: &[u8]) -> std::io::Result<()> {
     }
     stream.write_all(answer)?;
     stream.shutdown(Shutdown::Write)?;
-    // Closed on bytes that were not read, a connection is reset, and the answer is lost.
+    // The kernel resets a connection that is closed with unread bytes, and the answer is lost.
     let _ = stream.read(&mut [0; 16]);
     Ok(())
 }
@@ -155,7 +155,7 @@ pub(super) const LIVE_PAGE: Target = Target {
         let request = replaced(bytes, SEED_PORT, port.as_bytes());
         let answer = exchange(port.parse().unwrap_or_default(), &request, true);
         if contains(&answer, b"multipart/x-mixed-replace") {
-            // Its connection would wait for the next picture, and there is room for few.
+            // The open stream would wait for the next picture, and the server allows few connections.
             *kept = None;
         }
         let names_us = [b"localhost:".as_slice(), b"127.0.0.1:"]
@@ -167,7 +167,8 @@ pub(super) const LIVE_PAGE: Target = Target {
     },
 };
 
-/// Sends bytes; what comes back until the other side closes or shows a whole live picture. With `then_close` that direction is closed.
+/// Sends bytes; returns the answer until the other side closes or has sent a whole live picture. `then_close` closes
+/// the sending direction.
 pub(super) fn exchange(port: u16, request: &[u8], then_close: bool) -> Vec<u8> {
     let mut answer = Vec::new();
     let mut talk = || -> std::io::Result<()> {
@@ -189,7 +190,8 @@ pub(super) fn exchange(port: u16, request: &[u8], then_close: bool) -> Vec<u8> {
             }
         }
     };
-    // Reset where the server has refused without reading all; what has come counts.
+    // The server resets the connection where it rejects a request without reading all of it; the received bytes still
+    // count.
     let _ = talk();
     answer
 }

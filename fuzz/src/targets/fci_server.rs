@@ -1,4 +1,4 @@
-//! The simulated robot's side of Franka's protocol: sessions of messages, one after the other, into its control loop.
+//! The simulated robot's side of Franka's protocol: sessions of successive messages to its control loop.
 
 use nalgebra::{Isometry3, SMatrix};
 use sdg_fci::Limits;
@@ -11,13 +11,14 @@ use crate::target::Target;
 
 /// The version that the server speaks.
 const VERSION: Version = Version::V5;
-/// Cycles of one session: a motion that loses its client ends well before.
+/// Maximum number of cycles of one session: a motion whose client is gone ends well before.
 const MAX_CYCLES: u32 = 400;
-/// Where the arm stands, rad: Franka's ready posture.
+/// Start position of the joints, in rad: Franka's ready pose.
 const READY: [f64; 7] = [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785];
 
-/// A session is a row of records: a kind, a length, bytes. Kinds: 0 a robot's request, 1 a hand's, 2 a command by UDP whose number counts
-/// from the present state's, 3 cycles without one, 4 the client's end.
+/// A session is a sequence of records: a kind, a length, bytes. Kinds: 0 a request to the robot, 1 a request to the
+/// hand, 2 a command by UDP whose number is relative to the current state's number, 3 cycles without a command, 4 the
+/// end of the client.
 pub(super) const FCI_SERVER: Target = Target {
     name: "fci_server",
     max_extra_bytes: 8 << 20,
@@ -68,7 +69,7 @@ pub(super) const FCI_SERVER: Target = Target {
                             num_understood += 1;
                             robot.request(&plant, 7, &request);
                         }
-                        // As the server's loop does with a client that speaks another protocol.
+                        // The server's loop does the same with a client that uses another protocol.
                         _ => robot.disconnect(),
                     }
                 }
@@ -84,7 +85,7 @@ pub(super) const FCI_SERVER: Target = Target {
                     }
                 }
                 2 => {
-                    // The server takes the answer to its present state alone.
+                    // The server accepts only the answer to its current state.
                     answer = RobotCommand::decode(&body, VERSION).ok().filter(|command| command.message_id == 0);
                     num_understood += u32::from(answer.is_some());
                 }
@@ -112,7 +113,7 @@ fn record(kind: u8, bytes: &[u8]) -> Vec<u8> {
     [&[kind], (bytes.len() as u16).to_le_bytes().as_slice(), bytes].concat()
 }
 
-/// A millisecond, and the states that would be sent.
+/// Runs a cycle of one millisecond and encodes the states that would be sent.
 fn cycle(robot: &mut RobotCore, hand: &mut HandCore, plant: &mut FreeArm, command: Option<&RobotCommand>) {
     let outcome = robot.cycle(plant, command);
     assert!(outcome.is_ok(), "expected a cycle, found {outcome:?}");
@@ -127,7 +128,7 @@ fn cycle(robot: &mut RobotCore, hand: &mut HandCore, plant: &mut FreeArm, comman
     assert!(!state.encode(VERSION).is_empty() && !hand.state(plant).encode().is_empty());
 }
 
-/// Joints of inertia 1 without gravity, on a straight flange; it refuses torques that a motor cannot be given.
+/// Joints of inertia 1 without gravity, with a fixed flange; it panics on torques beyond a motor's limits.
 #[derive(Debug)]
 struct FreeArm {
     q: JointVector,

@@ -1,4 +1,4 @@
-//! Marks on photos.
+//! Files with marks on photos.
 
 use sdg_demonstration::{Annotation, ImageFacts, LabelFile};
 
@@ -6,16 +6,16 @@ use super::file;
 use crate::target::Target;
 
 const FORMATS: &str = "crates/demonstration/tests/formats";
-/// What a file of marks may take: it is small, and so is what it says.
+/// Memory limit of a file of marks; the file and its content are small.
 const MAX_EXTRA_BYTES: usize = 16 << 20;
 
-/// The picture that the seeds were made on.
+/// The picture of the seeds.
 const PICTURE: ImageFacts<'static> = ImageFacts { width: 640, height: 480, file_name: None };
 
 fn read(bytes: &[u8], beside: Option<&[u8]>, image: &ImageFacts<'_>) -> bool {
     let Ok(annotations) = Annotation::read_with(bytes, beside, image) else { return false };
     for annotation in &annotations {
-        // What is kept of it, by whoever teaches.
+        // Teaching uses the outline in this way.
         if let Some(outline) = &annotation.outline {
             let _ = outline.rasterize(image.width, image.height);
         }
@@ -23,7 +23,7 @@ fn read(bytes: &[u8], beside: Option<&[u8]>, image: &ImageFacts<'_>) -> bool {
     true
 }
 
-/// COCO, as supervision writes it.
+/// COCO, in the form that supervision writes.
 pub(super) const COCO: Target = Target {
     name: "coco",
     max_extra_bytes: MAX_EXTRA_BYTES,
@@ -101,7 +101,7 @@ pub(super) const DATA_YAML: Target = Target {
     run: |bytes| read(b"0 0.5 0.5 0.25 0.125 0.4 0.5 2 0.6 0.5 2\n", Some(bytes), &PICTURE),
 };
 
-/// Either of OpenDR's two arrays, beside the other as it was made.
+/// One of OpenDR's two arrays; the other one is unchanged.
 pub(super) const OPENDR: Target = Target {
     name: "opendr",
     max_extra_bytes: MAX_EXTRA_BYTES,
@@ -110,7 +110,7 @@ pub(super) const OPENDR: Target = Target {
     seeds: || vec![file(&format!("{FORMATS}/boxes_train.npy")), file(&format!("{FORMATS}/kps_train.npy"))],
     run: |bytes| {
         let [boxes, keypoints] = ["boxes_train.npy", "kps_train.npy"].map(|name| file(&format!("{FORMATS}/{name}")));
-        // A row is a picture by its number.
+        // A row belongs to the picture with its number.
         let picture = ImageFacts { file_name: Some("3.jpg"), ..PICTURE };
         read(bytes, Some(&keypoints), &picture) | read(&boxes, Some(bytes), &picture)
     },

@@ -1,4 +1,4 @@
-//! The readers, by what they read.
+//! All targets, grouped by the kind of input.
 
 mod borders;
 mod c_border;
@@ -19,7 +19,7 @@ pub use models::costliest_pickles;
 
 use crate::target::Target;
 
-/// All readers.
+/// All targets.
 pub const TARGETS: &[Target] = &[
     models::CHECKPOINT,
     models::MODEL,
@@ -49,10 +49,10 @@ pub const TARGETS: &[Target] = &[
     c_border::C_BORDER,
 ];
 
-/// The port that seeds name, in place of that which a server gets.
+/// The port in the seeds; the server's real port replaces it.
 const SEED_PORT: &[u8] = b"4000";
 
-/// A file of the repository.
+/// Reads a file of the repository.
 fn file(path: &str) -> Vec<u8> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path);
     std::fs::read(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
@@ -62,7 +62,7 @@ fn contains(bytes: &[u8], wanted: &[u8]) -> bool {
     bytes.windows(wanted.len()).any(|window| window == wanted)
 }
 
-/// The bytes with every `from` made `to`.
+/// The bytes with every `from` replaced by `to`.
 fn replaced(bytes: &[u8], from: &[u8], to: &[u8]) -> Vec<u8> {
     let mut out = Vec::with_capacity(bytes.len());
     let mut rest = bytes;
@@ -81,7 +81,7 @@ fn replaced(bytes: &[u8], from: &[u8], to: &[u8]) -> Vec<u8> {
     out
 }
 
-/// The pieces between marks.
+/// Splits the bytes at each `mark`.
 fn split_at_marks(bytes: &[u8], mark: &[u8]) -> Vec<Vec<u8>> {
     let mut pieces = Vec::new();
     let mut rest = bytes;

@@ -15,12 +15,12 @@ fn safetensors() -> Vec<u8> {
     [&(header.len() as u64).to_le_bytes(), header.as_slice(), &[1; 16]].concat()
 }
 
-/// An input that begins so is the pickle of torch's zip, which is made around it: checksums stay right.
+/// Prefix of inputs that are the pickle of torch's zip; the zip is built around it with correct checksums.
 const IN_ZIP: &[u8] = b"in a zip:";
-/// How the pickle's name in the zip ends.
+/// End of the pickle's name in the zip.
 const PICKLE: &str = "data.pkl";
 
-/// Names and bytes of torch's zip, whose entries are stored.
+/// Names and bytes of the entries of torch's zip, which are not compressed.
 fn entries_of_zip() -> Vec<(String, Vec<u8>)> {
     let whole = file(&format!("{FIXTURES}/tensors_zip.pth"));
     let number = |at: usize, size: usize| (0..size).fold(0, |sum, k| sum | usize::from(whole[at + k]) << (8 * k));
@@ -33,7 +33,7 @@ fn entries_of_zip() -> Vec<(String, Vec<u8>)> {
     entries.collect()
 }
 
-/// Torch's zip with another pickle in it; checksums are right.
+/// Torch's zip with a different pickle and correct checksums.
 fn zip_of(pickle: &[u8]) -> Vec<u8> {
     let mut entries = entries_of_zip();
     for (name, content) in &mut entries {
@@ -57,7 +57,7 @@ fn zip_of(pickle: &[u8]) -> Vec<u8> {
     [zip.as_slice(), &directory, b"PK\x05\x06\0\0\0\0", &count, &count, &place, &[0; 2]].concat()
 }
 
-/// Pickles of one operation again and again, a megabyte each: an operation adds as much as it can.
+/// Pickles of one megabyte that repeat one operation, to find the operation that takes the most memory.
 pub fn costliest_pickles() -> Vec<Vec<u8>> {
     let operations: [&[u8]; 9] =
         [b"]", b"}", b"N", b"(", b"\x8c\x00", b"\x8c\x01x\x94", b"K\x01\x85", b"N\x94", b"C\x00\x94"];
@@ -136,15 +136,15 @@ pub(super) const CHECKPOINT: Target = Target {
     },
 };
 
-/// The shipped model as its header and its tensors.
+/// The header and the tensors of the model in the corpus.
 fn model_parts() -> [Vec<u8>; 2] {
     let whole = file("fuzz/corpus/model_s.sdg");
     let length = u64::from_le_bytes(whole[..8].try_into().expect("eight bytes")) as usize;
     [whole[8..8 + length].to_vec(), whole[8 + length..].to_vec()]
 }
 
-/// A taught model, without a network: its photo, marks and settings. An input that begins with `{` is a header, which gets the length and
-/// the tensors that belong to it; another is the whole file.
+/// A taught model without a network: its photo, marks and settings. An input that begins with `{` is a header; its
+/// length and the tensors are added. Any other input is the whole file.
 pub(super) const MODEL: Target = Target {
     name: "model",
     max_extra_bytes: 256 << 20,
@@ -178,7 +178,7 @@ pub(super) const MODEL: Target = Target {
     },
 };
 
-/// A detector's description.
+/// The description of a detector.
 pub(super) const DETECTOR_CONFIG: Target = Target {
     name: "detector_config",
     max_extra_bytes: 16 << 20,

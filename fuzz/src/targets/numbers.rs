@@ -1,6 +1,6 @@
-//! Numbers of an input, one after the other.
+//! Reads successive numbers from an input.
 
-/// What is left of an input; zeros follow its end.
+/// The rest of an input; zeros follow its end.
 pub(super) struct Numbers<'a>(pub(super) &'a [u8]);
 
 impl Numbers<'_> {
@@ -32,7 +32,7 @@ impl Numbers<'_> {
         f64::from_le_bytes(self.next())
     }
 
-    /// So many bytes, or those that are left.
+    /// The next `count` bytes, or the rest if it is shorter.
     pub(super) fn bytes(&mut self, count: usize) -> Vec<u8> {
         let (taken, rest) = self.0.split_at(count.min(self.0.len()));
         self.0 = rest;

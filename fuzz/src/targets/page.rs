@@ -19,10 +19,10 @@ use super::pictures::{encoded, picture};
 use super::{SEED_PORT, contains, replaced, split_at_marks};
 use crate::target::Target;
 
-/// The key to the page, which the seeds have.
+/// The page's key in the seeds.
 const TOKEN: &str = "0123456789abcdef0123456789abcdef";
 const MAX_EXTRA_BYTES: usize = 256 << 20;
-/// A connection that is silent for so long is closed; the program waits half a minute.
+/// An idle connection is closed after this time; the program waits half a minute.
 const PATIENCE: Duration = Duration::from_millis(50);
 const DICTIONARY: &[&[u8]] = &[
     b"GET ",
@@ -50,7 +50,7 @@ const DICTIONARY: &[&[u8]] = &[
     NEXT_REQUEST,
 ];
 
-/// A page with a photo, a camera and pictures to try.
+/// A page with a photo, a camera and trial pictures.
 pub(super) const PAGE: Target = Target {
     name: "page",
     max_extra_bytes: MAX_EXTRA_BYTES,
@@ -121,13 +121,13 @@ pub(super) const START_PAGE: Target = Target {
     run: |bytes| asked(bytes, &START, serve_start),
 };
 
-/// An input that begins so has requests without heads: `METHOD PATH`, a line end, a body. Each gets the head of a request that is let
-/// pass, with its body's length, so that mistakes get as far as the routes.
+/// Prefix of inputs whose requests have no heads: `METHOD PATH`, a line end, a body. Each request gets a valid head
+/// with its body's length, so that mistakes reach the routes.
 const HEADLESS: &[u8] = b"\x02";
-/// Between requests without heads.
+/// Separates requests without heads.
 const NEXT_REQUEST: &[u8] = b"\x1enext\x1e";
 
-/// Requests without heads as whole ones.
+/// Adds heads to requests without heads.
 fn with_heads(requests: &[u8]) -> Vec<u8> {
     let requests = split_at_marks(requests, NEXT_REQUEST);
     let last = requests.len() - 1;
@@ -140,7 +140,7 @@ fn with_heads(requests: &[u8]) -> Vec<u8> {
     whole.collect::<Vec<_>>().concat()
 }
 
-/// The seeds with their heads and without.
+/// The seeds with and without heads.
 fn both_ways(connections: &[&[(&str, &str, &[u8])]]) -> Vec<Vec<u8>> {
     let headless = |requests: &&[(&str, &str, &[u8])]| {
         let lines = requests
@@ -153,12 +153,12 @@ fn both_ways(connections: &[&[(&str, &str, &[u8])]]) -> Vec<Vec<u8>> {
     with.chain(without.iter().cloned()).collect()
 }
 
-/// A request that is the last of its connection.
+/// A request after which the connection closes.
 fn request(method: &str, path: &str, body: &[u8]) -> Vec<u8> {
     replaced(&kept_open(method, path, body), b"Content-Length", b"Connection: close\r\nContent-Length")
 }
 
-/// A request that another may follow.
+/// A request after which the connection stays open.
 fn kept_open(method: &str, path: &str, body: &[u8]) -> Vec<u8> {
     let head = format!(
         "{method} {path} HTTP/1.1\r\nHost: 127.0.0.1:4000\r\nCookie: sdg-annotate-4000={TOKEN}\r\nOrigin: http://localhost:4000\r\n\
@@ -168,7 +168,7 @@ fn kept_open(method: &str, path: &str, body: &[u8]) -> Vec<u8> {
     [head.as_bytes(), body].concat()
 }
 
-/// A server in its own folder, ended when dropped.
+/// A server with a folder of its own; dropping it stops the server.
 struct Serving {
     port: u16,
     _folder: tempfile::TempDir,
@@ -179,13 +179,14 @@ struct Serving {
 static SESSION: Mutex<Option<Serving>> = Mutex::new(None);
 static START: Mutex<Option<Serving>> = Mutex::new(None);
 
-/// Sends the input to a server as it was at its start.
+/// Sends the input to a server in its initial state.
 fn asked(bytes: &[u8], kept: &Mutex<Option<Serving>>, serve: fn() -> Serving) -> bool {
     let mut kept = kept.lock().unwrap_or_else(PoisonError::into_inner);
     let port = kept.get_or_insert_with(serve).port;
     let whole = bytes.strip_prefix(HEADLESS).map_or_else(|| bytes.to_vec(), with_heads);
     let request = replaced(&whole, SEED_PORT, port.to_string().as_bytes());
-    // A client that closes its direction is taken for one that has gone away; silence ends what is not whole.
+    // The server takes a client that closes its sending direction for one that is gone, so the direction stays open;
+    // the idle timeout ends an incomplete request.
     let answer = exchange(port, &request, false);
     let is_answered = contains(&answer, b"HTTP/1.1 200 ");
     assert!(
@@ -197,7 +198,8 @@ fn asked(bytes: &[u8], kept: &Mutex<Option<Serving>>, serve: fn() -> Serving) ->
         !is_answered || contains(&request, TOKEN.as_bytes()),
         "expected a refusal, found an answer to a request without the key"
     );
-    // Whatever was changed, the next execution begins anew. A first request that only reads may be followed by another.
+    // After any change, the next execution gets a new server. A server is reused after a single request that only
+    // reads.
     let is_reading =
         request.starts_with(b"GET ") && request.windows(4).filter(|window| window == b"\r\n\r\n").count() == 1;
     if !is_reading {
@@ -207,7 +209,7 @@ fn asked(bytes: &[u8], kept: &Mutex<Option<Serving>>, serve: fn() -> Serving) ->
 }
 
 fn folder() -> tempfile::TempDir {
-    // In memory where that can be: files are flushed to the disk whenever they are written.
+    // In memory where possible, because the program syncs files to the disk whenever it writes them.
     let memory = Path::new("/dev/shm");
     let folder = if memory.is_dir() { tempfile::tempdir_in(memory) } else { tempfile::tempdir() };
     folder.expect("a folder for files that are thrown away")
@@ -252,7 +254,7 @@ fn serve(folder: tempfile::TempDir, server: Server) -> Serving {
     let is_stopping = Arc::new(AtomicBool::new(false));
     let asked = Arc::clone(&is_stopping);
     let thread = thread::spawn(move || {
-        // A port that fails is an answer that does not come.
+        // An error of the server only means that no answer comes.
         let _ = server.with_patience(PATIENCE).run(move || asked.load(Ordering::SeqCst));
     });
     Serving { port, _folder: folder, is_stopping, thread: Some(thread) }
@@ -261,7 +263,7 @@ fn serve(folder: tempfile::TempDir, server: Server) -> Serving {
 impl Drop for Serving {
     fn drop(&mut self) {
         self.is_stopping.store(true, Ordering::SeqCst);
-        // It looks whether to stop after each connection.
+        // The server checks whether to stop after each connection.
         let _ = TcpStream::connect((Ipv4Addr::LOCALHOST, self.port));
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
@@ -269,7 +271,7 @@ impl Drop for Serving {
     }
 }
 
-/// A camera that shows one frame.
+/// A camera that always returns the same frame.
 #[derive(Debug)]
 struct Still;
 
@@ -280,7 +282,7 @@ impl LivePictures for Still {
     }
 }
 
-/// Teaches nothing: models have targets of their own.
+/// A teacher that always fails: models have targets of their own.
 struct Unwilling;
 
 const REFUSED: &str = "nothing is taught here";

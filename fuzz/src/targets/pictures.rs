@@ -1,4 +1,4 @@
-//! Pictures.
+//! Picture files.
 
 use std::io::Cursor;
 
@@ -8,9 +8,10 @@ use sdg_picture::{ImageLimits, JpegScanner, PixelFrame, PpmHead, decode_image_in
 use super::file;
 use crate::target::Target;
 
-/// So few that a header cannot ask for much: the program's own limit is 210 megapixels.
+/// A small limit, so that a header cannot request much memory: the program's own limit is
+/// 210 megapixels.
 const LIMITS: ImageLimits = ImageLimits { max_pixels: 1_000_000 };
-/// A decoder holds a picture twice, at 16 bits with alpha.
+/// A decoder holds a picture twice, in 16 bits with alpha.
 const MAX_EXTRA_BYTES: usize = 64 << 20;
 
 /// A small picture of many colours.
@@ -18,14 +19,14 @@ pub(super) fn picture() -> RgbImage {
     RgbImage::from_fn(31, 17, |x, y| Rgb([(x * 8) as u8, (y * 13) as u8, (x * y) as u8]))
 }
 
-/// The same as a file.
+/// The picture as a file.
 pub(super) fn encoded(format: ImageFormat) -> Vec<u8> {
     let mut bytes = Cursor::new(Vec::new());
     picture().write_to(&mut bytes, format).expect("a picture is encoded");
     bytes.into_inner()
 }
 
-/// The same with a channel that says how much of a pixel is seen.
+/// The picture with an alpha channel, as a file.
 fn with_alpha(format: ImageFormat) -> Vec<u8> {
     let mut bytes = Cursor::new(Vec::new());
     let mut picture = image::DynamicImage::ImageRgb8(picture()).into_rgba8();
@@ -40,7 +41,7 @@ fn read(bytes: &[u8]) -> bool {
     decode_image_in(bytes, &LIMITS, PixelFrame::Upright).is_ok()
 }
 
-/// PNG, of one and of several kinds of pixels.
+/// PNG, with one kind of pixels and with several.
 pub(super) const PNG: Target = Target {
     name: "png",
     max_extra_bytes: MAX_EXTRA_BYTES,
@@ -58,7 +59,7 @@ pub(super) const PNG: Target = Target {
     run: read,
 };
 
-/// PNG whose checksums are made right again, so that mistakes get behind them.
+/// PNG with corrected checksums, so that mistakes get past the checksum test.
 pub(super) const PNG_CHUNKS: Target = Target {
     name: "png_chunks",
     seeds: || {
@@ -72,7 +73,7 @@ pub(super) const PNG_CHUNKS: Target = Target {
     ..PNG
 };
 
-/// A PNG with the checksum that each of its whole chunks should have.
+/// A PNG with the correct checksum for each complete chunk.
 fn with_checksums(bytes: &[u8]) -> Vec<u8> {
     let mut png = bytes.to_vec();
     let mut at = 8;
@@ -87,7 +88,7 @@ fn with_checksums(bytes: &[u8]) -> Vec<u8> {
     png
 }
 
-/// JPEG with an orientation, and the scanner that cuts a stream of them.
+/// JPEG with an orientation, and the scanner that splits a stream of JPEGs.
 pub(super) const JPEG: Target = Target {
     name: "jpeg",
     max_extra_bytes: MAX_EXTRA_BYTES,
@@ -104,7 +105,7 @@ pub(super) const JPEG: Target = Target {
     ],
     seeds: || {
         let plain = encoded(ImageFormat::Jpeg);
-        // Orientation 6 in the big byte order.
+        // Orientation 6 in big-endian byte order.
         let exif = b"\xff\xe1\x00\x22Exif\0\0MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0";
         let turned = [&plain[..2], exif, &plain[2..]].concat();
         vec![plain, turned]
@@ -133,7 +134,7 @@ pub(super) const TIFF: Target = Target {
     run: read,
 };
 
-/// WebP, BMP, PPM, and a photograph as phones name it.
+/// WebP, BMP, PPM, and a photo with the file name that phones give it.
 pub(super) const OTHERS: Target = Target {
     name: "webp_bmp_ppm",
     max_extra_bytes: MAX_EXTRA_BYTES,

@@ -1,4 +1,4 @@
-//! Where cameras, robots and tables are.
+//! Files with positions of cameras, robots and tables.
 
 use sdg_calibration::{CalibratedCamera, read_robot_poses};
 use sdg_robot::workcell::Workcell;
@@ -8,7 +8,7 @@ use crate::target::Target;
 
 const MAX_EXTRA_BYTES: usize = 16 << 20;
 
-/// A camera beside its robot.
+/// A camera file whose table is given relative to the robot's base.
 const OVER_BASE: &[u8] = b"
 table:
   frame: base
@@ -17,7 +17,7 @@ table:
   workspace_m: {x: [0.3, 0.7], y: [-0.3, 0.3]}
 ";
 
-/// A camera's file.
+/// A camera file.
 pub(super) const CAMERA_FILE: Target = Target {
     name: "camera_file",
     max_extra_bytes: MAX_EXTRA_BYTES,
@@ -36,12 +36,12 @@ pub(super) const CAMERA_FILE: Target = Target {
     ],
     seeds: || {
         let shipped = file("datasets/workcell/camera.yaml");
-        // Up to its own table.
+        // Up to the section `table`.
         let lens =
             shipped.split(|byte| *byte == b'\n').take_while(|line| !line.starts_with(b"table:")).collect::<Vec<_>>();
         let beside = [lens.join(&b'\n').as_slice(), OVER_BASE].concat();
         let mut seeds = vec![shipped, beside];
-        // The same as our own program writes it.
+        // The same files, as the program writes them.
         let read = |bytes: &[u8]| CalibratedCamera::from_yaml(&String::from_utf8_lossy(bytes));
         seeds.extend(seeds.clone().iter().filter_map(|bytes| Some(read(bytes).ok()?.to_yaml().into_bytes())));
         seeds
@@ -52,7 +52,7 @@ pub(super) const CAMERA_FILE: Target = Target {
             return false;
         };
         let _ = (camera.posed().is_ok(), camera.check_picture((640, 480)), camera.update_yaml(&camera.to_yaml()));
-        // The lens is inverted wherever a picture is used.
+        // Every use of a picture inverts the lens model.
         for pixel in [[0.0, 0.0], [320.0, 240.0], [639.0, 1.0]] {
             let _ = camera.intrinsics.unproject(&pixel.into());
         }
@@ -89,7 +89,7 @@ pub(super) const ROBOT_POSES: Target = Target {
     },
 };
 
-/// A workcell's file.
+/// A workcell file.
 pub(super) const WORKCELL: Target = Target {
     name: "workcell",
     max_extra_bytes: MAX_EXTRA_BYTES,

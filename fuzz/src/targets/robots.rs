@@ -1,4 +1,4 @@
-//! Franka's protocol, on both sides.
+//! Franka's protocol, both sides.
 
 use std::io::{self, Read};
 
@@ -13,10 +13,10 @@ use crate::target::Target;
 
 const VERSIONS: [Version; 2] = [Version::V5, Version::V10];
 
-/// Messages over TCP and UDP, of robot and hand; the first byte of the input says of which kind it is read.
+/// Messages of the robot and the hand over TCP and UDP; the first byte of the input selects the kind of message.
 pub(super) const FRANKA: Target = Target {
     name: "franka",
-    // A header may announce 4 MB, which are taken as they arrive.
+    // A header may announce 4 MB; memory is allocated as the bytes arrive.
     max_extra_bytes: 1 << 20,
     quick_executions: 100_000,
     dictionary: &[b"\0\0@\0", b"\x01\0@\0", b"\xff\xff\xff\x7f", b"\0\0\0\0\0\0\xf0\x7f", b"\0\0\0\0\0\0\xf8\x7f"],
@@ -60,23 +60,32 @@ pub(super) const FRANKA: Target = Target {
     },
 };
 
-/// At most so many bytes of a message are asked for before they have arrived.
+/// Maximum number of bytes that are requested before they have arrived.
 const MAX_STEP: usize = 8192;
 
-/// The first message of a stream; memory is taken for no more than has arrived and a step, and never for more than the message has.
+/// Reads the first message of a stream. Asserts that memory is allocated only for the bytes that have arrived plus one
+/// step, and never for more than the message.
 pub(super) fn message(bytes: &[u8], kind: HeaderKind) -> Option<(Header, Vec<u8>)> {
     let mut stream = Watched { bytes, largest_buffer: 0 };
     let message = read_message(&mut stream, kind);
     let announced = bytes.get(..kind.size()).and_then(|bytes| Header::decode(bytes, kind).ok());
     let size = announced.map_or(kind.size(), |header| header.size as usize);
-    assert!(stream.largest_buffer <= size.min(MAX_STEP), "a buffer of {} for {size}", stream.largest_buffer);
+    assert!(
+        stream.largest_buffer <= size.min(MAX_STEP),
+        "expected a buffer of at most {size} bytes, found {}",
+        stream.largest_buffer
+    );
     if let Ok(Ok((_, payload))) = &message {
-        assert!(kind.size() + payload.capacity() <= size, "{} bytes for {size}", payload.capacity());
+        assert!(
+            kind.size() + payload.capacity() <= size,
+            "expected at most {size} bytes, found {}",
+            payload.capacity()
+        );
     }
     message.ok()?.ok()
 }
 
-/// A stream that knows the largest buffer that it was read into.
+/// A stream that records the largest buffer it was read into.
 struct Watched<'a> {
     bytes: &'a [u8],
     largest_buffer: usize,
@@ -135,7 +144,7 @@ pub(super) fn hand_requests() -> Vec<HandRequest> {
     ]
 }
 
-/// A command of a motion in joint space.
+/// A command of a joint motion.
 pub(super) fn command(message_id: u64, q: [f64; 7]) -> RobotCommand {
     let motion = MotionCommand { q, dq: [0.0; 7], valid_elbow: false, ..MotionCommand::default() };
     RobotCommand { message_id, motion, torque: [0.0; 7], torque_finished: false }

@@ -1,4 +1,4 @@
-//! Pictures of the calibration board, drawn as the tests of crate calibration draw them.
+//! Pictures of the calibration board, rendered as in the tests of crate calibration.
 
 use std::fs;
 use std::path::Path;
@@ -9,7 +9,7 @@ use sdg_calibration::CalibratedCamera;
 use crate::rendering::cameras::{CAMERAS, board, poses};
 use crate::rendering::{Exposure, Random, render};
 
-/// Writes `0.png` to `7.png`, `table.png` and the camera that took them, `camera.yaml`, unless they are there.
+/// Writes `0.png` to `7.png`, `table.png` and the camera that took them, `camera.yaml`, unless they exist.
 ///
 /// # Errors
 /// A folder that cannot be written.

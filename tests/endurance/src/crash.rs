@@ -1,8 +1,8 @@
-//! Commands killed at seeded moments, with the power cut that comes with it.
+//! Kills commands at random moments of a seed, each with a simulated power cut.
 //!
 //! ```text
-//! folder with inputs ─ the command, traced, killed before change k ─ the folder as the disk holds it ─ inputs unharmed? outputs
-//! old or new, whole? ─ the command again: it succeeds
+//! folder with inputs ─ the command, traced, killed before change k ─ the folder as the disk holds it ─ inputs unchanged? output
+//! old or new, and complete? ─ the command again: it succeeds
 //! ```
 
 use std::fs::{self, OpenOptions};
@@ -21,22 +21,22 @@ use crate::page::Page;
 use crate::scenario::{Places, Scenario};
 use crate::tracer::{Ending, Tracee};
 
-/// Kills a command `kills` times, less those of an earlier call, and prints what came of all.
+/// Kills a command until `kills` kills are in the log, including those of earlier calls, and prints a summary.
 ///
 /// # Errors
-/// A run without a kill that fails; at least one kill after which something is lost or damaged.
+/// A run without a kill that fails; at least one kill that loses or damages a file.
 pub fn kill(scenario: Scenario, kills: u64, seed: u64, places: &Places) -> Result<()> {
     let work = places.work.join("crash").join(scenario.name().replace(' ', "-"));
     fs::create_dir_all(&work)?;
     let log = work.join(format!("kills-{seed}.jsonl"));
-    // A damaged last line is that of a call that was cut off.
+    // An earlier call that was cut off leaves a damaged last line.
     let lines: Vec<Value> = match fs::File::open(&log) {
         Ok(file) => BufReader::new(file).lines().map_while(|line| serde_json::from_str(&line.ok()?).ok()).collect(),
         Err(_) => Vec::new(),
     };
     fs::write(&log, lines.iter().map(|line| format!("{line}\n")).collect::<String>())?;
 
-    // Without a kill first: how many changes there are, and what they lead to.
+    // First a run without a kill, which counts the changes and gives the reference result.
     let reference = work.join("reference");
     fresh(&reference)?;
     scenario.prepare(places, &reference, false)?;
@@ -46,7 +46,7 @@ pub fn kill(scenario: Scenario, kills: u64, seed: u64, places: &Places) -> Resul
     let mut lines = lines;
     for number in lines.len() as u64..kills {
         let mut random = Pcg64Mcg::seed_from_u64(seed ^ (number << 20));
-        // One more than there are: the power goes after the command has ended.
+        // `changes + 1` cuts the power after the command has ended.
         let at = random.random_range(1..=changes + 1);
         let line = one(scenario, number, at, &mut random, places, &work, &reference)
             .with_context(|| format!("{}: kill {number}", scenario.name()))?;
@@ -78,7 +78,7 @@ fn report(scenario: Scenario, changes: u64, lines: &[Value]) -> Result<()> {
 }
 
 fn is_good(scenario: Scenario, ending: Ending) -> bool {
-    // The page is ended by the same signal as by Ctrl-C.
+    // The page is ended by SIGINT, the signal of Ctrl-C.
     ending == Ending::Exited(0)
         || scenario == Scenario::Annotate && matches!(ending, Ending::Signalled(libc::SIGINT) | Ending::Exited(130))
 }
@@ -103,11 +103,11 @@ fn traced(
         if scenario == Scenario::Annotate {
             let photo = fs::read("datasets/demonstrations/pendulum/image.png");
             let done = Page::of(printed).and_then(|page| page.mark_teach_and_try(&photo?));
-            // SAFETY: no memory is involved. The tracer reaps it, so that the number is this program's until then.
+            // SAFETY: no memory is involved. The tracer reaps the process, so until then the number is this program's.
             unsafe { libc::kill(pid, libc::SIGINT) };
             return done;
         }
-        // Read, so that the program never waits for it.
+        // Read, so that the program never blocks on a full pipe.
         BufReader::new(printed).lines().for_each(drop);
         Ok(())
     });
@@ -121,7 +121,7 @@ fn traced(
     Ok((ending, changes, disk))
 }
 
-/// A kill, the power cut, what is found then, and the command again.
+/// Kills a command once, cuts the power, checks the folder, and runs the command again.
 fn one(
     scenario: Scenario,
     number: u64,
@@ -154,7 +154,7 @@ fn one(
             line["left"] = json!(left);
             fs::remove_dir_all(&after)?;
         }
-        // Its folder stays.
+        // The folder stays for inspection.
         Err(error) => line["fault"] = json!(format!("{error:#}")),
     }
     Ok(line)
@@ -168,7 +168,7 @@ fn judge(
     after: &Path,
 ) -> Result<(&'static str, usize)> {
     let output = scenario.output().map(Path::new);
-    // What the page writes anew is the marks.
+    // The page rewrites only the marks.
     let is_written =
         |file: &Path| Some(file) == output || scenario == Scenario::Annotate && file.ends_with("photo.json");
     for (file, content) in before {
@@ -202,7 +202,7 @@ fn judge(
     });
     ensure!(
         ending == Ending::Killed || output.is_none() || state == "new",
-        "the command had ended well, and what it wrote is lost ({state})"
+        "the command had succeeded, but its output is lost (found {state})"
     );
     Ok((state, left))
 }

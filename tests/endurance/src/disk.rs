@@ -1,9 +1,10 @@
-//! A folder as a disk would hold it after a power cut: what was synced, and a seeded part of the rest.
+//! A folder as a disk would hold it after a power cut: the synced content, and a random part of the rest, by seed.
 //!
 //! The rules are stricter than those of a journalled file system:
-//! - a file's content is durable from its own fsync; content that changed since may be lost, cut, or end in zeros;
-//! - names of a folder (create, rename, link, unlink) are durable from the folder's own fsync; of the changes since, any first part may
-//!   be there, in the order in which they were made, each folder for itself.
+//! - The content of a file is durable after the file's own fsync; content that changed since then may be lost,
+//!   truncated, or end in zeros.
+//! - The names in a folder (create, rename, link, unlink) are durable after the folder's own fsync; of the changes
+//!   since then, a first part of any length may be on the disk, in their order, independently for each folder.
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;
@@ -14,7 +15,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use rand::Rng;
 
-/// What a name of a folder stands for.
+/// The file or folder of a name, by inode.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Entry {
     Folder(u64),
@@ -23,36 +24,38 @@ enum Entry {
 
 type Names = BTreeMap<OsString, Entry>;
 
-/// The names of a folder since the start, and which of these states is on the disk.
+/// All states of the names in a folder since the start, and the index of the state that is durable.
 #[derive(Debug)]
 struct Folder {
     states: Vec<Names>,
     durable: usize,
 }
 
-/// A folder whose changes are followed.
+/// A folder whose changes are recorded.
 #[derive(Debug)]
 pub struct Disk {
     root: PathBuf,
-    /// A second name of every file that was ever seen, on the same file system: its content stays readable, its inode is not used again.
+    /// A folder on the same file system with a hard link to every file that was ever seen, so that its content stays
+    /// readable and its inode is not reused.
     kept: PathBuf,
     root_inode: u64,
     folders: BTreeMap<u64, Folder>,
-    /// The synced content of each file; none was synced of a file that is missing here.
+    /// The synced content of each file; a missing file was never synced.
     synced: BTreeMap<u64, Vec<u8>>,
 }
 
-/// How much was lost of what had not been synced.
+/// The amount of unsynced data that a power cut lost.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Loss {
-    /// Files whose content is not what the program wrote last.
+    /// Number of files whose content is not the last one that the program wrote.
     pub contents: usize,
-    /// Folders whose names are not the last ones.
+    /// Number of folders whose names are not the last ones.
     pub folders: usize,
 }
 
 impl Disk {
-    /// Begins to follow the folder `root`, all of which is durable now. `kept` is an empty folder on the same file system.
+    /// Starts to record the folder `root`, whose content now is durable. `kept` is an empty folder on the same file
+    /// system.
     ///
     /// # Errors
     /// A folder that cannot be read.
@@ -71,7 +74,7 @@ impl Disk {
         Ok(disk)
     }
 
-    /// The folder that is followed.
+    /// The recorded folder.
     pub fn root(&self) -> &Path {
         &self.root
     }
@@ -80,7 +83,7 @@ impl Disk {
         self.kept.join(inode.to_string())
     }
 
-    /// Takes the names of all folders as they are now.
+    /// Records the current names of all folders.
     ///
     /// # Errors
     /// A folder that cannot be read.
@@ -92,7 +95,7 @@ impl Disk {
         let mut names = Names::new();
         for entry in fs::read_dir(path).with_context(|| path.display().to_string())? {
             let entry = entry?;
-            // Another thread of the program may have removed it since.
+            // Another thread of the program may have removed the file in the meantime.
             let Ok(found) = entry.metadata() else { continue };
             let child = entry.path();
             if found.is_dir() {
@@ -116,19 +119,19 @@ impl Disk {
         Ok(())
     }
 
-    /// A file was synced with this content.
+    /// Records that a file was synced with this content.
     pub fn file_synced(&mut self, inode: u64, content: Vec<u8>) {
         self.synced.insert(inode, content);
     }
 
-    /// A folder was synced.
+    /// Records that a folder was synced.
     pub fn folder_synced(&mut self, inode: u64) {
         if let Some(folder) = self.folders.get_mut(&inode) {
             folder.durable = folder.states.len() - 1;
         }
     }
 
-    /// Writes the folder as it may be after a power cut now into the new folder `to`.
+    /// Writes the folder, as it may be after a power cut now, into the new folder `to`.
     ///
     /// # Errors
     /// Files that cannot be read or written.
@@ -167,14 +170,14 @@ fn files_of(names: &Names) -> Vec<u64> {
     names.values().filter_map(|entry| if let Entry::File(inode) = entry { Some(*inode) } else { None }).collect()
 }
 
-/// What a disk may hold of content that was written over `synced` content, or after it, and not synced.
+/// A random state of a file on the disk whose content `synced` was durable and whose content `written` was not synced.
 fn part_of(written: &[u8], synced: &[u8], random: &mut impl Rng) -> Vec<u8> {
     const BLOCK_BYTES: usize = 4096;
     match random.random_range(0..4) {
         0 => written.to_vec(),
         1 => synced.to_vec(),
         2 => written[..random.random_range(0..=written.len())].to_vec(),
-        // The length was written, the last blocks were not.
+        // The length reached the disk, but the last blocks did not.
         _ => {
             let blocks = random.random_range(0..=written.len() / BLOCK_BYTES) * BLOCK_BYTES;
             let mut content = written.to_vec();

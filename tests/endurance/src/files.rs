@@ -1,14 +1,14 @@
-//! Folders that are made anew and looked through.
+//! Creates and lists folders.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 
-/// Makes an empty folder.
+/// Creates an empty folder in place of an existing one.
 ///
 /// # Errors
-/// The system's reason.
+/// The errors of the file system.
 pub fn fresh(folder: &Path) -> Result<()> {
     if folder.exists() {
         fs::remove_dir_all(folder)?;
@@ -17,10 +17,10 @@ pub fn fresh(folder: &Path) -> Result<()> {
     Ok(())
 }
 
-/// All files under a folder, from it.
+/// All files under a folder, with paths relative to it.
 ///
 /// # Errors
-/// The system's reason.
+/// The errors of the file system.
 pub fn files_under(folder: &Path) -> Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     let mut folders = vec![PathBuf::new()];
@@ -35,10 +35,10 @@ pub fn files_under(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// All files under a folder, from it, with their contents.
+/// All files under a folder, with paths relative to it, and their contents.
 ///
 /// # Errors
-/// The system's reason.
+/// The errors of the file system.
 pub fn contents_under(folder: &Path) -> Result<Vec<(PathBuf, Vec<u8>)>> {
     files_under(folder)?.into_iter().map(|file| Ok((file.clone(), fs::read(folder.join(file))?))).collect()
 }

@@ -1,10 +1,12 @@
-//! Endurance: what `make endure` runs, each part resumable, on Linux for x86-64 alone.
+//! Endurance tests of `make endure`, each resumable, on Linux for x86-64 only.
 //!
-//! - [`crash`]: commands killed at seeded moments under [`tracer`], with [`disk`] losing what was not synced.
-//! - [`refusals`]: the same commands on a disk that is full or read-only, without descriptors, while the clock is set back.
-//! - [`soak`]: long runs of live detection, of the page, and of a camera that goes away.
+//! - [`crash`]: commands killed at random moments under [`tracer`]; [`disk`] loses unsynced data.
+//! - [`refusals`]: the same commands on a full or read-only disk, without free descriptors, or while the clock is set
+//!   back.
+//! - [`soak`]: long runs of live detection, of the page, and of a camera that disconnects.
 //!
-//! It drives the program `sdg` from outside, as a user, and knows none of its crates but `calibration`, whose board it draws.
+//! It runs the program `sdg` from outside, as a user does, and uses none of its crates except `calibration`, to render
+//! the board.
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 
 pub mod boards;

@@ -1,4 +1,4 @@
-//! The annotation page's requests, as its browser sends them.
+//! The requests of the annotation page, as a browser sends them.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
@@ -9,10 +9,10 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, bail, ensure};
 use serde_json::{Value, json};
 
-/// Longer than any request here takes on a busy machine.
+/// Longer than any request takes on a busy machine.
 const TIMEOUT: Duration = Duration::from_secs(120);
 
-/// A page that is served.
+/// A running page server.
 #[derive(Debug, Clone)]
 pub struct Page {
     address: String,
@@ -20,10 +20,10 @@ pub struct Page {
 }
 
 impl Page {
-    /// Reads its address from the first line that `sdg annotate --json` prints.
+    /// Reads the page's address from the first line that `sdg annotate --json` prints.
     ///
     /// # Errors
-    /// A program that ended, or printed something else.
+    /// A program that ended or printed something else.
     pub fn of(printed: ChildStdout) -> Result<Self> {
         let mut line = String::new();
         BufReader::new(printed).read_line(&mut line)?;
@@ -35,10 +35,10 @@ impl Page {
         Ok(Self { address: address.to_owned(), token: token.to_owned() })
     }
 
-    /// The answer to a request; an answer other than 200 is an error.
+    /// Sends a request and returns the body of its answer.
     ///
     /// # Errors
-    /// No connection; a refusal.
+    /// No connection, or an answer other than status 200.
     pub fn ask(&self, method: &str, path: &str, body: &[u8]) -> Result<Vec<u8>> {
         let mut stream = TcpStream::connect(&self.address)?;
         stream.set_read_timeout(Some(TIMEOUT))?;
@@ -57,19 +57,19 @@ impl Page {
         Ok(body)
     }
 
-    /// As [`Page::ask`], of JSON.
+    /// Like [`Page::ask`], with an answer in JSON.
     ///
     /// # Errors
-    /// As [`Page::ask`]; an answer that is no JSON.
+    /// The errors of [`Page::ask`]; an answer that is not JSON.
     pub fn json(&self, method: &str, path: &str, body: &[u8]) -> Result<Value> {
         Ok(serde_json::from_slice(&self.ask(method, path, body)?)?)
     }
 
-    /// A person's session: opens the page, moves the grasp by half a pixel, names the part, adds a picture, teaches model S and
-    /// tries it.
+    /// Does a user's session: opens the page, moves the grasp by half a pixel, names the part, adds a picture, teaches
+    /// model S and tests it.
     ///
     /// # Errors
-    /// A request that is refused; a teaching that fails.
+    /// A rejected request; a failed teaching.
     pub fn mark_teach_and_try(&self, picture: &[u8]) -> Result<()> {
         self.ask("GET", "/", b"")?;
         let session = self.json("GET", "/api/session", b"")?;
@@ -77,7 +77,7 @@ impl Page {
         let mut marks = session["images"][0]["marks"].clone();
         ensure!(marks.is_object(), "expected the marks of the photo in {session}");
         let x = marks["grasp"]["start"][0].as_f64().context("expected the marks' grasp")?;
-        // There and back, so that a session that goes on from here finds nearly the same.
+        // There and back, so that a following session starts from nearly the same grasp.
         for x in [x + 0.5, x] {
             marks["grasp"]["start"][0] = json!(x);
             self.json("PUT", "/api/images/0/marks", marks.to_string().as_bytes())?;

@@ -1,7 +1,7 @@
-//! Commands on a disk that is full or read-only, without descriptors, and while the clock is set back.
+//! Runs commands on a full or read-only disk, without free descriptors, and while the clock is set back.
 //!
-//! Each ends well or with one clear line, never in a panic; where it fails, the old file is there to the byte and no temporary one is.
-//! Mounting needs root.
+//! Each command must succeed or end with one clear line, never with a panic; if it fails, the old file is unchanged and
+//! no temporary file is left. Mounting needs root.
 
 use std::fs;
 use std::io::Read;
@@ -16,24 +16,24 @@ use crate::files::{contents_under, files_under, fresh};
 use crate::page::Page;
 use crate::scenario::{Places, Scenario};
 
-/// How long a page that refused is given to end, if it ends.
+/// How long a page that rejected a request gets to end on its own.
 const ENDING: Duration = Duration::from_secs(3);
 
-/// What is wrong with the machine.
+/// A fault of the machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Trouble {
-    /// So many KiB are free.
+    /// A disk with this number of KiB free.
     FullDisk(u64),
-    /// The folder's file system is mounted to be read.
+    /// The folder's file system is mounted read-only.
     ReadOnly,
-    /// So many descriptors may be open.
+    /// Maximum number of open descriptors.
     Descriptors(u32),
-    /// The clock goes back by thirty days while the command runs.
+    /// The clock is set back by thirty days while the command runs.
     ClockSetBack,
 }
 
 impl Trouble {
-    /// All that are tried.
+    /// All faults that are tested.
     pub fn all() -> Vec<Self> {
         let full = [0, 4, 8, 16, 32, 64, 256, 1024, 2048].map(Self::FullDisk);
         let descriptors = (3..=16).chain([20, 24, 32]).map(Self::Descriptors);
@@ -45,7 +45,7 @@ impl Trouble {
     }
 }
 
-/// A small disk in memory, unmounted when it is dropped.
+/// A small disk in memory, unmounted on drop.
 struct SmallDisk(PathBuf);
 
 impl SmallDisk {
@@ -55,7 +55,7 @@ impl SmallDisk {
         Ok(Self(folder.to_owned()))
     }
 
-    /// Fills it but for so many KiB.
+    /// Fills the disk except for `free_kib` KiB.
     fn fill(&self, free_kib: u64) -> Result<()> {
         let filler = self.0.join("filler.bin");
         run(Command::new("sh").arg("-c").arg(format!("cat /dev/zero > '{}' 2>/dev/null || true", filler.display())))?;
@@ -77,14 +77,14 @@ impl Drop for SmallDisk {
 
 fn run(command: &mut Command) -> Result<()> {
     let status = command.status().with_context(|| command.get_program().display().to_string())?;
-    ensure!(status.success(), "{command:?}: {status}; as root?");
+    ensure!(status.success(), "{command:?}: {status}; is this run as root?");
     Ok(())
 }
 
-/// Tries a command in every trouble and prints how often it was refused.
+/// Runs a command with every fault of the machine and prints how often it was refused.
 ///
 /// # Errors
-/// What was damaged, and what was said unclearly.
+/// Damaged files and unclear errors.
 pub fn try_all(scenario: Scenario, places: &Places) -> Result<()> {
     let (mut well, mut refused, mut faults) = (0, 0, Vec::new());
     let troubles = Trouble::all();
@@ -97,14 +97,14 @@ pub fn try_all(scenario: Scenario, places: &Places) -> Result<()> {
     }
     let (name, count) = (scenario.name(), troubles.len());
     println!(
-        "{name}: {count} troubles; ended well {well}, refused with one clear line {refused}, faults {}",
+        "{name}: {count} conditions: {well} succeeded, {refused} refused with one clear line, {} faults",
         faults.len()
     );
     ensure!(faults.is_empty(), "{}", faults.join("\n"));
     Ok(())
 }
 
-/// Whether the command ended well.
+/// Runs the command once; returns whether it succeeded.
 fn attempt(scenario: Scenario, trouble: Trouble, places: &Places) -> Result<bool> {
     let disk = SmallDisk::mount(&places.work.join(format!("small-{}", scenario.name().replace(' ', "-"))))?;
     let folder = disk.0.clone();
@@ -116,7 +116,7 @@ fn attempt(scenario: Scenario, trouble: Trouble, places: &Places) -> Result<bool
     }
     let before = contents_under(&folder)?;
     let mut command = places.sdg(&folder, scenario.arguments());
-    // Not on the disk that is full.
+    // Temporary files do not belong on the disk that is full.
     command.env("TMPDIR", &places.work);
     if let Trouble::Descriptors(count) = trouble {
         let inner = command;
@@ -151,7 +151,7 @@ fn attempt(scenario: Scenario, trouble: Trouble, places: &Places) -> Result<bool
             Ok(page) => refusal = page.mark_teach_and_try(&photo).err(),
             Err(error) => refusal = Some(error),
         }
-        // One that refused may be ending by itself.
+        // After a rejected request the page may be ending on its own.
         let given = Instant::now();
         let mut ended = child.try_wait()?;
         while refusal.is_some() && ended.is_none() && given.elapsed() < ENDING {
@@ -170,10 +170,10 @@ fn attempt(scenario: Scenario, trouble: Trouble, places: &Places) -> Result<bool
     let errors = reader.join().map_err(|_| anyhow::anyhow!("a reader panicked"))?;
     let is_good = match (&refusal, status) {
         (None, status) => status.is_none_or(|status| status.success()),
-        // The page's server goes on and says in an answer what is wrong.
+        // The page's server keeps running and reports the error in an answer.
         (Some(refusal), None) if refusal.to_string().contains("HTTP/1.1") => false,
         (Some(refusal), None) if refusal.to_string().contains("the teaching failed") => false,
-        (Some(refusal), None) => bail!("the page answered nothing: {refusal:#}; {errors}"),
+        (Some(refusal), None) => bail!("expected an answer of the page, found none: {refusal:#}; {errors}"),
         (Some(_), Some(_)) => false,
     };
     ensure!(!errors.contains("panicked"), "a panic: {errors}");
@@ -187,7 +187,7 @@ fn attempt(scenario: Scenario, trouble: Trouble, places: &Places) -> Result<bool
 
 fn check_is_clear(errors: &str, status: Option<ExitStatus>) -> Result<()> {
     let last = errors.lines().rfind(|line| !line.trim().is_empty()).unwrap_or_default();
-    // The loader's own words, before any of the program runs.
+    // The message is the dynamic loader's, before the program runs.
     let is_loaders =
         last.contains("error while loading shared libraries") || last.contains("cannot open shared object");
     let code = status.and_then(|status| status.code());

@@ -1,4 +1,4 @@
-//! The commands that are killed: what they start from, how they are called, and when what they left is whole.
+//! The commands under test: their inputs, their arguments, and the checks of their outputs.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -17,41 +17,41 @@ pub enum Scenario {
     Teach,
     /// `sdg evaluate` of one part with model S.
     Evaluate,
-    /// A session of the annotation page: marks, a picture, a teaching.
+    /// A session of the annotation page: marks, a picture, and teaching.
     Annotate,
     /// `sdg weights convert`.
     Convert,
     /// `sdg camera calibrate`.
     Calibrate,
-    /// `sdg camera table`, which writes into the camera's file.
+    /// `sdg camera table`, which writes into the camera file.
     Table,
 }
 
-/// Where things are.
+/// Paths and programs that the tests use.
 #[derive(Debug, Clone)]
 pub struct Places {
-    /// The program.
+    /// The program `sdg`.
     pub sdg: PathBuf,
-    /// The repository.
+    /// The root of the repository.
     pub root: PathBuf,
-    /// Where this program works: target/endurance.
+    /// The folder for the tests' own files: target/endurance.
     pub work: PathBuf,
 }
 
 impl Places {
-    /// `sdg` in a folder.
+    /// A call of `sdg` in a folder.
     pub fn sdg(&self, folder: &Path, arguments: &[&str]) -> Command {
         let mut command = Command::new(&self.sdg);
         command.args(arguments).current_dir(folder).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
-        // The page's list of projects is a file, too.
+        // The page's list of projects is also a file.
         command.env("XDG_STATE_HOME", folder.join("state")).env("HOME", folder);
         command
     }
 
-    /// Standard output of `sdg`, which has to succeed.
+    /// Runs `sdg` and returns its standard output.
     ///
     /// # Errors
-    /// Its standard error where it fails.
+    /// The standard error of a call that fails.
     pub fn run(&self, folder: &Path, arguments: &[&str]) -> Result<Vec<u8>> {
         let output = self.sdg(folder, arguments).output()?;
         let error = String::from_utf8_lossy(&output.stderr);
@@ -67,7 +67,7 @@ impl Places {
 }
 
 impl Scenario {
-    /// Its name in files and tables.
+    /// Name in files and tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::Teach => "teach",
@@ -79,7 +79,7 @@ impl Scenario {
         }
     }
 
-    /// Its arguments.
+    /// Arguments of `sdg`.
     pub fn arguments(self) -> &'static [&'static str] {
         match self {
             Self::Teach => &["teach", "--model", "S", "--demo", "photo.png", "--out", "part.sdg"],
@@ -122,7 +122,7 @@ impl Scenario {
         }
     }
 
-    /// The inputs, and where `has_old`, an output of an earlier call that differs from what will be written.
+    /// Writes the inputs and, with `has_old`, an output of an earlier call that differs from the new one.
     ///
     /// # Errors
     /// Files that cannot be made.
@@ -146,7 +146,7 @@ impl Scenario {
                     fs::copy(old, folder.join("part.sdg"))?;
                 }
             }
-            // It goes on where it ended, so an old one would be the new one.
+            // The command resumes, so an old result would be the new one.
             Self::Evaluate => {}
             Self::Annotate => {
                 photo()?;
@@ -193,7 +193,7 @@ impl Scenario {
         Ok(file)
     }
 
-    /// The name of the file that must be the new one where the command has ended well, and what it replaces.
+    /// Name of the output file, which must be the new one after the command has succeeded.
     pub fn output(self) -> Option<&'static str> {
         match self {
             Self::Teach => Some("part.sdg"),
@@ -204,7 +204,7 @@ impl Scenario {
         }
     }
 
-    /// Makes sure that a file that a command left can be read, by its kind.
+    /// Checks by its kind that a file left by a command can be read.
     ///
     /// # Errors
     /// A damaged file.
@@ -238,15 +238,15 @@ impl Scenario {
         Ok(())
     }
 
-    /// After every how many kills the command is called again: a teaching takes seconds.
+    /// Number of kills between repetitions of the command: a teaching takes seconds.
     pub fn again_every(self) -> u64 {
         if self == Self::Teach { 4 } else { 1 }
     }
 
-    /// Does what a person does after the power cut: the same command again, which has to end well.
+    /// Does what a user does after the power cut: runs the same command again, which must succeed.
     ///
     /// # Errors
-    /// A command that fails, or ends in another result than `reference`, the folder of a run without a power cut.
+    /// A command that fails, or whose result differs from `reference`, the folder of a run without a power cut.
     pub fn again(self, places: &Places, folder: &Path, reference: &Path) -> Result<()> {
         if self == Self::Annotate {
             let mut server = places.sdg(folder, self.arguments()).spawn()?;
@@ -268,7 +268,7 @@ impl Scenario {
     }
 }
 
-/// The tables of an evaluation without what differs from run to run.
+/// The tables of an evaluation without the values that differ from run to run.
 fn timeless(places: &Places, results: &Path) -> Result<Vec<u8>> {
     let output = Command::new("python3").arg(places.root.join("scripts/timeless-tables.py")).arg(results).output()?;
     ensure!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));

@@ -1,10 +1,11 @@
-//! Long runs: memory, threads and descriptors stay flat, and the last tenth is no slower.
+//! Long runs: memory, threads and descriptors must not grow, and the last tenth must not be slower.
 //!
 //! ```text
-//! a camera of ours (HTTP, motion JPEG) ─ frame ─ sdg detect --from http://… --json ─ line ─ the next frame
+//! camera of this test (HTTP, motion JPEG) ─ frame ─ sdg detect --from http://… --json ─ line ─ the next frame
 //! ```
 //!
-//! A frame is sent when the line of the one before was printed, so that none is dropped and the time between is that of one frame.
+//! A frame is sent after the line of the frame before was printed, so no frame is dropped, and the time between lines
+//! is the time of one frame.
 
 use std::fmt;
 use std::fs;
@@ -25,15 +26,16 @@ use crate::scenario::Places;
 
 /// Longer than any frame takes on a busy machine.
 const TIMEOUT: Duration = Duration::from_secs(120);
-/// What the allocator keeps for itself.
+/// Maximum relative growth of the memory: the allocator keeps some for itself.
 const MAX_GROWTH: f64 = 1.05;
-/// A page of the allocator, where the whole is small.
+/// Maximum growth in KiB where the whole is small: about one block of the allocator.
 const MAX_GROWTH_KIB: u64 = 4 << 10;
-/// Processor time a unit in the last tenth over that in the fifth: a busy neighbour takes some of the caches.
+/// Maximum ratio of the processor time per unit in the last tenth to that in the fifth: other programs take part of the
+/// caches.
 const MAX_SLOWER: f64 = 1.15;
 const NUM_FRAMES: u32 = 16;
 
-/// What a process holds, and the processor time that it has used.
+/// The memory, threads and descriptors of a process, and its processor time so far.
 #[derive(Debug, Clone, Copy, Default)]
 struct Held {
     memory_kib: u64,
@@ -50,24 +52,24 @@ impl Held {
             line.split_whitespace().next().and_then(|number| number.parse().ok()).context("expected a number")
         };
         let stat = fs::read_to_string(format!("/proc/{pid}/stat"))?;
-        // The name, in brackets, may have blanks in it.
+        // The name, in brackets, may contain blanks.
         let after_name = stat.rsplit(')').next().unwrap_or_default();
         let ticks: Vec<u64> = after_name.split_whitespace().skip(11).take(2).filter_map(|n| n.parse().ok()).collect();
         Ok(Self {
             memory_kib: field("VmRSS:")?,
             threads: field("Threads:")?,
             descriptors: fs::read_dir(format!("/proc/{pid}/fd"))?.count() as u64,
-            // A hundred ticks a second, whatever the kernel's own clock.
+            // `/proc` counts a hundred ticks per second, independent of the kernel's own clock.
             cpu_secs: ticks.iter().sum::<u64>() as f64 / 100.0,
         })
     }
 }
 
-/// What a process held after each unit: a frame, a session, a disconnection.
+/// The state of a process after each unit: a frame, a session, a disconnection.
 #[derive(Debug, Default)]
 struct Course(Vec<Held>);
 
-/// The largest values of a tenth.
+/// The largest values in a tenth of the run.
 #[derive(Debug, Clone, Copy)]
 struct Tenth {
     most: Held,
@@ -91,7 +93,8 @@ impl Course {
         }
     }
 
-    /// Prints the fifth tenth beside the last; what comes before is starting. Processor time is compared where every unit does the same.
+    /// Prints the fifth tenth and the last; the tenths before are the start-up. Processor time is compared only if
+    /// every unit does the same work.
     fn report(&self, what: impl fmt::Display, secs: f64, is_work_the_same: bool) -> Result<()> {
         ensure!(self.0.len() >= 30, "expected at least 30 units, found {}", self.0.len());
         let [early, late] = [4, 9].map(|idx| self.tenth(idx));
@@ -119,12 +122,12 @@ impl Course {
     }
 }
 
-/// The pendulum's photo, moved a little from frame to frame along a closed way.
+/// The pendulum's photo, shifted a little from frame to frame along a closed path.
 fn frames(places: &Places) -> Result<Vec<Vec<u8>>> {
     let photo = image::open(places.root.join("datasets/demonstrations/pendulum/image.png"))?.into_rgb8();
     let (width, height) = photo.dimensions();
     let moved = |idx: u32| {
-        // There and back, two pixels a frame.
+        // There and back, two pixels per frame.
         let shift = 2 * (NUM_FRAMES / 2).abs_diff(idx);
         let picture = RgbImage::from_fn(width, height, |x, y| *photo.get_pixel((x + shift) % width, y));
         let mut bytes = Cursor::new(Vec::new());
@@ -134,7 +137,7 @@ fn frames(places: &Places) -> Result<Vec<Vec<u8>>> {
     (0..NUM_FRAMES).map(moved).collect()
 }
 
-/// The model of a letter, taught once.
+/// The model file of a letter, taught once.
 fn model(places: &Places, letter: &str) -> Result<String> {
     let folder = places.work.join("once");
     fs::create_dir_all(&folder)?;
@@ -147,7 +150,7 @@ fn model(places: &Places, letter: &str) -> Result<String> {
             demonstrations.join("image.png").display(),
             demonstrations.join("annotation.json").display()
         );
-        // What it learns does not matter here: the same layers compute.
+        // The quality of the model does not matter: its layers do the same computation.
         let output = places
             .sdg(&folder, &["teach", "--model", letter, "--steps", "2", "--demo", &demonstration, "--out", &name])
             .output()?;
@@ -156,22 +159,22 @@ fn model(places: &Places, letter: &str) -> Result<String> {
     Ok(name)
 }
 
-/// How the frames of a run are looked at, and how often the camera goes away.
+/// How the frames of a run are processed, and how often the camera disconnects.
 #[derive(Debug, Clone)]
 pub struct FrameRun {
     /// The model's letter.
     pub model: String,
-    /// Frames in all.
+    /// Total number of frames.
     pub frames: usize,
-    /// Every frame is searched on its own.
+    /// Whether every frame is searched on its own.
     pub every_frame: bool,
-    /// The connection ends after so many frames.
+    /// Number of frames after which the connection ends.
     pub frames_a_connection: usize,
-    /// No frame is begun after that; what was done counts.
+    /// No frame is started after this time; finished frames count.
     pub max_secs: u64,
 }
 
-/// Live detection over many frames, from a camera that goes away as often as is asked for.
+/// Live detection over many frames, from a camera that disconnects every `frames_a_connection` frames.
 ///
 /// # Errors
 /// A run that grows, slows down, or ends early.
@@ -182,7 +185,7 @@ pub fn detect(run: &FrameRun, places: &Places) -> Result<()> {
     let address = format!("http://{}/video.mjpg", listener.local_addr()?);
     let (printed, lines) = channel();
     let (planned, each) = (run.frames, run.frames_a_connection);
-    // It ends with this process where nobody connects any more.
+    // The thread ends with this process if nobody connects any more.
     thread::spawn(move || serve(&listener, &frames, each, &lines));
     let mut arguments = vec!["detect", "--grasp-model", &model, "--from", &address, "--json", "--stall-secs", "60"];
     if run.every_frame {
@@ -197,7 +200,7 @@ pub fn detect(run: &FrameRun, places: &Places) -> Result<()> {
     let (start, mut course) = (Instant::now(), Course::default());
     for line in output.lines() {
         let line = line?;
-        // What is said of a camera that is gone is no frame.
+        // Lines about a camera that is disconnected are no frames.
         if !line.contains("\"detections\"") {
             continue;
         }
@@ -222,13 +225,14 @@ fn end(child: &mut Child) -> Result<()> {
     Ok(())
 }
 
-/// Serves motion JPEG: a frame, then the next when a line was printed; the connection is closed after `each` frames.
+/// Serves motion JPEG: sends a frame, then the next one after a line was printed; closes the connection after `each`
+/// frames.
 fn serve(listener: &TcpListener, frames: &[Vec<u8>], each: usize, lines: &Receiver<()>) -> Result<()> {
     let mut sent = 0;
     for stream in listener.incoming() {
         let mut stream = stream?;
         let of_connection = connection(&mut stream, frames, each, lines, &mut sent);
-        // The program ends a connection of its own when it ends.
+        // The program closes its connection when it ends, which is no error.
         let _ = of_connection;
     }
     Ok(())
@@ -250,7 +254,7 @@ fn connection(
     )?;
     for _ in 0..each {
         let frame = &frames[*sent % frames.len()];
-        // The boundary after a frame is its end.
+        // The boundary after a frame marks its end.
         let length = frame.len();
         write!(stream, "--frame\r\nContent-Type: image/jpeg\r\nContent-Length: {length}\r\n\r\n")?;
         stream.write_all(frame)?;
@@ -261,17 +265,18 @@ fn connection(
     Ok(())
 }
 
-/// Sessions of the annotation page on one server: a project, marks, a teaching, a picture that is tried, the project left.
+/// Sessions of the annotation page on one server: each creates a project, marks the photo, teaches, tests a picture and
+/// leaves the project.
 ///
 /// # Errors
-/// As [`detect`].
+/// The errors of [`detect`].
 pub fn page(sessions: usize, max_secs: u64, places: &Places) -> Result<()> {
     let folder = places.work.join("soak");
     fresh(&folder)?;
     fs::create_dir(folder.join("state"))?;
     let demonstrations = places.root.join("datasets/demonstrations/pendulum");
     let photo = fs::read(demonstrations.join("image.png"))?;
-    // The marks as the page takes them, read by the page from the shipped file.
+    // The marks in the form that the page expects, which it reads from the shipped file.
     fs::copy(demonstrations.join("image.png"), folder.join("photo.png"))?;
     fs::copy(demonstrations.join("annotation.json"), folder.join("photo.json"))?;
     let mut server =
@@ -287,7 +292,7 @@ pub fn page(sessions: usize, max_secs: u64, places: &Places) -> Result<()> {
         served.mark_teach_and_try(&photo)?;
         served.ask("DELETE", "/api/projects", b"")?;
         course.0.push(Held::of(server.id())?);
-        // The disk is not what is tried.
+        // The disk is not under test.
         remove(&folder.join(&name))?;
     }
     end(&mut server)?;

@@ -1,7 +1,7 @@
-//! Runs a program under ptrace, follows what it changes in a folder, and kills it at a given change.
+//! Runs a program under ptrace, follows its changes in a folder, and kills it at a given change.
 //!
-//! A seccomp filter stops the program at the system calls that change files and nowhere else, also where a library makes them itself
-//! instead of calling the C library, so that nothing has to be preloaded.
+//! A seccomp filter stops the program only at the system calls that change files. It also catches calls that a library
+//! makes without the C library, so no library has to be preloaded.
 
 use std::fs;
 use std::io;
@@ -15,7 +15,7 @@ use libc::{c_int, c_long, pid_t, sock_filter};
 
 use crate::disk::Disk;
 
-/// The calls that stop the program.
+/// The calls without paths that stop the program.
 const WRITES: [c_long; 10] = [
     libc::SYS_write,
     libc::SYS_pwrite64,
@@ -28,9 +28,9 @@ const WRITES: [c_long; 10] = [
     libc::SYS_copy_file_range,
     libc::SYS_sendfile,
 ];
-/// Numbers of arguments: a folder's descriptor, and the path from it.
+/// Positions of path arguments: the argument with the folder's descriptor, if any, and the argument with the path.
 type PathArguments = &'static [(Option<usize>, usize)];
-/// Those with paths: where the (folder, path) arguments are. A call without a folder's descriptor has `None`.
+/// The calls with paths that stop the program, and their path arguments.
 const NAMES: [(c_long, PathArguments); 16] = [
     (libc::SYS_open, &[(None, 0)]),
     (libc::SYS_creat, &[(None, 0)]),
@@ -53,23 +53,23 @@ const NAMES: [(c_long, PathArguments); 16] = [
 /// How the program ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ending {
-    /// At the change that was asked for.
+    /// Killed at the requested change.
     Killed,
-    /// By itself, with this code.
+    /// Ended by itself, with this exit code.
     Exited(i32),
-    /// By another signal.
+    /// Ended by another signal.
     Signalled(i32),
 }
 
-/// A program that waits to be followed. It belongs to the thread that started it.
+/// A program that is stopped at its start. Only the thread that started it can trace it.
 #[derive(Debug)]
 pub struct Tracee {
-    /// Its pipes may be taken.
+    /// The process; its pipes may be taken.
     pub child: Child,
 }
 
 impl Tracee {
-    /// Starts a program; it stands still until [`Tracee::follow`].
+    /// Starts a program; it stays stopped until [`Tracee::follow`].
     ///
     /// # Errors
     /// A program that cannot be started or traced.
@@ -100,14 +100,15 @@ impl Tracee {
         Ok(Self { child })
     }
 
-    /// Follows the program to its end, or kills it before its `kill_at`th change (from 1). Returns how many changes it began, too.
+    /// Follows the program to its end, or kills it before its change number `kill_at` (from 1). Also returns the number
+    /// of changes that it began.
     ///
     /// # Errors
-    /// What ptrace or the folder refuses.
+    /// Errors of ptrace and of the folder.
     pub fn follow(self, disk: &mut Disk, kill_at: Option<u64>) -> Result<(Ending, u64)> {
         let main = self.child.id() as pid_t;
         let (mut changes, mut ending) = (0, None);
-        // No more threads once the program has ended.
+        // The loop ends when the program has no threads left.
         while let Some((tid, status)) = wait(-1)? {
             if libc::WIFEXITED(status) || libc::WIFSIGNALED(status) {
                 if tid == main && ending.is_none() {
@@ -121,12 +122,12 @@ impl Tracee {
                 continue;
             }
             if ending == Some(Ending::Killed) {
-                // What the program had started ends with it, before another change.
+                // The processes that the program started are killed before they make another change.
                 kill(tid);
                 continue;
             }
             let (signal, event) = (libc::WSTOPSIG(status), status >> 16);
-            // A thread that is killed meanwhile answers no request.
+            // A thread that was killed in the meantime answers no request.
             let step = if event == libc::PTRACE_EVENT_SECCOMP {
                 let Ok(call) = Call::of(tid) else { continue };
                 if call.changes(disk.root()) {
@@ -146,18 +147,18 @@ impl Tracee {
                 }
                 libc::PTRACE_CONT
             };
-            // Stops of ptrace's own; a new thread begins with SIGSTOP.
+            // These stops belong to ptrace; a new thread begins with SIGSTOP. Other signals are passed on.
             let is_ours = event != 0 || [libc::SIGTRAP, libc::SIGTRAP | 0x80, libc::SIGSTOP].contains(&signal);
             let _ = request(step as c_long, tid, if is_ours { 0 } else { c_long::from(signal) });
         }
         match ending {
             Some(ending) => Ok((ending, changes)),
-            None => bail!("the program ended unseen"),
+            None => bail!("expected the end of the program, found no process to wait for"),
         }
     }
 }
 
-/// The next stop or end of a program of this thread; `None` where there is none left.
+/// The next stop or end of a process of this thread; `None` if there is none left.
 fn wait(pid: pid_t) -> Result<Option<(pid_t, c_int)>> {
     let mut status = 0;
     // SAFETY: `status` outlives the call.
@@ -170,17 +171,17 @@ fn wait(pid: pid_t) -> Result<Option<(pid_t, c_int)>> {
 }
 
 fn kill(pid: pid_t) {
-    // SAFETY: no memory is involved. It was not waited for yet, so that the number is its own.
+    // SAFETY: no memory is involved. The process was not reaped yet, so the number is still its own.
     unsafe { libc::kill(pid, libc::SIGKILL) };
 }
 
 fn request(request: c_long, tid: pid_t, data: c_long) -> io::Result<()> {
-    // SAFETY: the requests that are made here take numbers alone.
+    // SAFETY: the requests of this file take only numbers.
     let answer = unsafe { libc::ptrace(request as libc::c_uint, tid, 0, data) };
     if answer < 0 { Err(io::Error::last_os_error()) } else { Ok(()) }
 }
 
-/// Stops at the calls of the tables, lets all others pass.
+/// A filter that stops at the calls of the tables and allows all others.
 fn filter() -> Vec<sock_filter> {
     const X86_64: u32 = 0xC000_003E;
     let instruction = |code: u32, jt: u8, jf: u8, k: u32| sock_filter { code: code as u16, jt, jf, k };
@@ -196,7 +197,7 @@ fn filter() -> Vec<sock_filter> {
     program
 }
 
-/// A system call that a thread stands in.
+/// The system call at which a thread is stopped.
 struct Call {
     tid: pid_t,
     number: c_long,
@@ -217,7 +218,7 @@ impl Call {
         Ok(Self { tid, number: found.orig_rax as c_long, arguments, answer: found.rax as i64 })
     }
 
-    /// The descriptor that is written or synced: the second where bytes go from file to file.
+    /// The descriptor that is written or synced: the second one if bytes are copied between files.
     fn descriptor(&self) -> Option<PathBuf> {
         let argument = match self.number {
             libc::SYS_copy_file_range => 2,
@@ -235,7 +236,7 @@ impl Call {
         }
     }
 
-    /// Whether it changes or syncs something under `root`.
+    /// Whether the call changes or syncs something under `root`.
     fn changes(&self, root: &Path) -> bool {
         if let Some(descriptor) = self.descriptor() {
             return fs::read_link(descriptor).is_ok_and(|path| path.starts_with(root));
@@ -260,7 +261,7 @@ impl Call {
         Some(if path.is_absolute() { path } else { fs::read_link(folder).ok()?.join(path) })
     }
 
-    /// Whether its end is of interest: names may have changed, or something was synced.
+    /// Whether the call must be followed to its end: names may have changed, or something was synced.
     fn is_followed(&self) -> bool {
         match self.number {
             libc::SYS_fsync | libc::SYS_fdatasync => true,
@@ -269,7 +270,7 @@ impl Call {
         }
     }
 
-    /// Tells the disk what a call has done that was followed to its end.
+    /// Updates the disk after a call that was followed to its end.
     fn done(&self, disk: &mut Disk) -> Result<()> {
         if self.answer < 0 {
             return Ok(());

@@ -1,4 +1,5 @@
-//! That the followed disk loses what was not synced, keeps what was, and that programs are killed at the change that is asked for.
+//! Tests that the simulated disk loses unsynced data and keeps synced data, and that programs are killed at the
+//! requested change.
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 #![allow(missing_docs, clippy::unwrap_used)]
 
@@ -13,7 +14,8 @@ use sdg_endurance::tracer::{Ending, Tracee};
 
 const OLD: &str = "an old file";
 
-/// The contents of `file`, `None` where there is none, in 64 power cuts after the shell's commands, killed before a change or not.
+/// The contents of `file` (`None` if it does not exist) after 64 power cuts, each after the shell's commands,
+/// optionally killed before a change.
 fn after(commands: &str, kill_at: Option<u64>) -> (Ending, BTreeSet<Option<String>>) {
     let folder = tempfile::tempdir().unwrap();
     let [root, kept] = ["root", "kept"].map(|name| folder.path().join(name));
@@ -60,7 +62,7 @@ fn what_was_synced_and_renamed_is_the_old_file_or_the_new_one() {
 
 #[test]
 fn a_program_is_killed_before_the_change_that_is_asked_for() {
-    // Made, written, synced, renamed unless the name is taken, renamed, and the folder synced.
+    // Create, write, sync, a rename that fails if the name is taken, a rename, and the sync of the folder.
     let synced = "printf new > t; sync t; mv t file; sync .";
     assert_eq!(after(synced, Some(5)), (Ending::Killed, only([OLD])));
     assert_eq!(after(synced, Some(6)), (Ending::Killed, only([OLD, "new"])));

@@ -4,7 +4,7 @@
 
 SOURCE holds `faster`, `keypoint` and `mask`, each with `weights.pkl` (the model zoo's format), `config.json`,
 `input.png` and `expected.safetensors`, written by Detectron2 on the CPU. Weights are copied under the same names;
-of the expected tensors, those that are the same in all three cases are kept in `faster` alone. Needs numpy 2 and
+expected tensors that are equal in all three cases are kept only in `faster`. Needs numpy 2 and
 safetensors.
 """
 

@@ -1,10 +1,10 @@
-"""OpenCV's calibrateCamera on the pictures that crates/calibration/tests/intrinsics.rs renders.
+"""Runs OpenCV's calibrateCamera on the pictures that crates/calibration/tests/intrinsics.rs renders.
 
     cargo test --release -p sdg-calibration --test calibration intrinsics::write_pictures -- --ignored --nocapture   # prints FOLDER
     python tests/golden/opencv/calibrate.py FOLDER > tests/golden/opencv/calibration.json
 
-Needs opencv-contrib-python-headless 4.11. The lens has k1, k2, p1, p2, as ours has without --k3. Corners are those of
-findChessboardCornersSB or of findChessboardCorners with cornerSubPix (five windows), whichever gives the lower reprojection error.
+Needs opencv-contrib-python-headless 4.11. The lens has k1, k2, p1, p2, as ours without --k3. The corners are found by
+findChessboardCornersSB or by findChessboardCorners with cornerSubPix (five windows): the one with the lower reprojection error.
 """
 
 import json
@@ -60,7 +60,7 @@ for name, camera in told["cameras"].items():
         if best is None or rms < best["rms_px"]:
             best = {"corners": way.__name__, "pictures": len(corners), "rms_px": rms, "fx": matrix[0, 0], "fy": matrix[1, 1],
                     "cx": matrix[0, 2], "cy": matrix[1, 2], "lens": list(lens)}
-    # Ours have the first pixel's centre at (0.5, 0.5), OpenCV's at (0, 0).
+    # Our corners have the first pixel's centre at (0.5, 0.5), OpenCV's at (0, 0).
     points = [np.array([[i * square, j * square, 0] for i, j, _, _ in view], np.float32) for view in camera["corners"]]
     ours = [np.array([[[x - 0.5, y - 0.5]] for _, _, x, y in view], np.float32) for view in camera["corners"]]
     rms, matrix, _ = calibrate(points, ours, size)

@@ -1,9 +1,9 @@
-"""OpenCV's calibrateHandEye on the robots that crates/calibration/tests/hand_eye.rs simulates.
+"""Runs OpenCV's calibrateHandEye on the robots that crates/calibration/tests/hand_eye.rs simulates.
 
     cargo test --release -p sdg-calibration --test calibration hand_eye::write_trials -- --ignored --nocapture   # prints FILE
     python tests/golden/opencv/hand_eye.py FILE > tests/golden/opencv/hand_eye.json
 
-Needs opencv-contrib-python-headless 4.11. Each board's pose is solvePnP's (SOLVEPNP_ITERATIVE, which minimises reprojection).
+Needs opencv-contrib-python-headless 4.11. The pose of each board comes from solvePnP (SOLVEPNP_ITERATIVE, which minimises the reprojection error).
 """
 
 import hashlib
@@ -16,7 +16,7 @@ import numpy as np
 text = open(sys.argv[1], "rb").read()
 told = json.loads(text)
 fx, fy, cx, cy = told["camera"]
-# Ours have the first pixel's centre at (0.5, 0.5), OpenCV's at (0, 0).
+# Our frame has the first pixel's centre at (0.5, 0.5), OpenCV's at (0, 0).
 matrix = np.array([[fx, 0, cx - 0.5], [0, fy, cy - 0.5], [0, 0, 1]])
 lens = np.array(told["lens"])
 METHODS = ["TSAI", "PARK", "HORAUD", "ANDREFF", "DANIILIDIS"]

@@ -1,11 +1,12 @@
-"""Makes the golden files beside it: torchvision's own outputs for small random networks of all three kinds.
+"""Makes the golden files in this folder: torchvision's own outputs for small random networks of all three kinds.
 
     python export.py            the three small ones, with expected outputs
     python export.py --whole D  a whole R50 keypoint network into folder D, for the test that compares it when torch
                                 is present; exact.safetensors there holds its gradients computed in double precision
 
 The three small ones were made with torch 2.7.1, torchvision 0.22.1, Pillow 11.1.0 and numpy 2.2.6; the whole one is
-made with whatever is there. The weights have torchvision's names. Losses have this project's names, detections are in pixels of the image, targets in those of the resized image.
+made with the installed versions. The weights have torchvision's names. Losses have this project's names, detections
+are in pixels of the image, targets in pixels of the resized image.
 Every anchor and proposal takes part in the losses: nothing is random.
 """
 
@@ -78,7 +79,7 @@ def save_file(tensors, path):
 def build(kind, narrow, limits):
     if narrow:
         body = NarrowResNet(Bottleneck, [1, 1, 1, 1], norm_layer=FrozenBatchNorm2d)
-        # Its own width is not used here and would be checked.
+        # Its own width is not used, but would be checked.
         body.fc = torch.nn.Identity()
         layers = ["layer4", "layer3", "layer2"]
         for name, parameter in body.named_parameters():
@@ -103,7 +104,7 @@ def build(kind, narrow, limits):
         model = {"faster": FasterRCNN, "keypoint": KeypointRCNN, "mask": MaskRCNN}[kind](backbone, **heads, **limits)
     else:
         model = KeypointRCNN(backbone, num_classes=2, **limits)
-    # As the released COCO weights are loaded.
+    # As for the released COCO weights.
     overwrite_eps(model, 0.0)
     model.rpn.fg_bg_sampler = BalancedPositiveNegativeSampler(1_000_000, 0.5)
     model.roi_heads.fg_bg_sampler = BalancedPositiveNegativeSampler(1_000_000, 0.25)
@@ -217,7 +218,7 @@ def training_step(model, kind, image):
         y = boxes[:, 1, None] + steps.flip(0) ** 2 * (boxes[:, 3] - boxes[:, 1])[:, None]
         visible = torch.ones_like(x)
         visible[1, 2] = 0
-        # Taken in single precision only.
+        # Only single precision is accepted.
         target["keypoints"] = torch.stack([x, y, visible], 2).float()
     if kind == "mask":
         masks = []

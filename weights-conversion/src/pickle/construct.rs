@@ -1,4 +1,4 @@
-//! The results of the allowed globals for their arguments, and the effect of a state on an object.
+//! The results of calls of the allowed globals, and the effect of a state on an object.
 
 use crate::element::ElementType;
 use crate::error::{Result, WeightsError};
@@ -15,7 +15,7 @@ fn damaged(at: u64, expected: impl Into<String>, found: impl Into<String>) -> We
 /// Emulates a call.
 pub(crate) fn call(arena: &mut Arena, global: Global, arguments: &[Value], at: u64) -> Result<Value> {
     let object = match (global, arguments) {
-        // The class, a shape and a letter; the state overrides them all.
+        // The arguments are the class, a shape and a type code; the state replaces all of them.
         (Global::Reconstruct, [Value::Global(Global::NdArray), ..]) => Object::Array(None),
         (Global::FromBuffer, &[buffer, dtype, shape, order]) => {
             let fortran_order = arena.text(order) == Some("F");
@@ -27,7 +27,7 @@ pub(crate) fn call(arena: &mut Arena, global: Global, arguments: &[Value], at: u
             (Some(Object::Text(text)), Some("latin1")) => {
                 Object::Bytes(Payload { span: text.span, encoding: text.encoding })
             }
-            _ => return Err(damaged(at, "text to be coded as latin1", arena.describe(text))),
+            _ => return Err(damaged(at, "text to encode as latin1", arena.describe(text))),
         },
         (Global::Bytes, []) => Object::Bytes(Payload { span: Span { offset: at, len: 0 }, encoding: Encoding::Raw }),
         (Global::OrderedDict, []) => Object::Dict(Vec::new()),

@@ -1,4 +1,4 @@
-//! The globals that a pickle of weights may ask for.
+//! The globals that a pickle of weights may use.
 
 use crate::element::ElementType;
 
@@ -15,7 +15,7 @@ pub(crate) enum Global {
     NdArray,
     /// Makes a numpy element type.
     Dtype,
-    /// Turns text into bytes (bytes under protocol 2).
+    /// Converts text to bytes (bytes under protocol 2).
     CodecsEncode,
     /// Makes empty bytes (protocol 2).
     Bytes,
@@ -30,7 +30,7 @@ pub(crate) enum Global {
 }
 
 impl Global {
-    /// The global of that name, if weights need it.
+    /// The global with this name, if weights need it.
     pub fn resolve(module: &str, name: &str) -> Option<Self> {
         Some(match (module, name) {
             ("numpy.core.multiarray" | "numpy._core.multiarray", "_reconstruct") => Self::Reconstruct,

@@ -1,4 +1,4 @@
-//! The stack machine.
+//! The stack machine of pickles.
 
 use std::collections::HashMap;
 
@@ -123,7 +123,7 @@ impl Machine<'_> {
         Ok(())
     }
 
-    /// The stack above the last mark.
+    /// Height of the stack at the last mark.
     fn floor(&self) -> usize {
         self.marks.last().copied().unwrap_or(0)
     }
@@ -183,7 +183,7 @@ impl Machine<'_> {
         Ok(())
     }
 
-    /// Text, Python 2 strings and bytes: short ones are read, of the others the position is stored.
+    /// Text, Python 2 strings and bytes: short ones are read; of the others only the position is stored.
     fn string(&mut self, opcode: u8) -> Result<()> {
         let scanner = &mut self.scanner;
         let len = match opcode {
@@ -275,7 +275,7 @@ impl Machine<'_> {
         let idx = match opcode {
             b'q' => u32::from(self.scanner.byte()?),
             b'r' => u32::from_le_bytes(self.scanner.take()?),
-            // MEMOIZE counts by itself.
+            // MEMOIZE stores at the next free index.
             _ => self.memo.len() as u32,
         };
         let top = self.top()?;

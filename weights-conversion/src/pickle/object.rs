@@ -139,7 +139,7 @@ impl Arena {
         }
     }
 
-    /// The last entry of that key, as in Python.
+    /// The last entry with this key, as in Python.
     pub fn entry(&self, dict: Value, key: &str) -> Option<Value> {
         let entries = self.dict(dict)?;
         entries.iter().rev().find(|(found, _)| self.text(*found) == Some(key)).map(|(_, value)| *value)

@@ -5,7 +5,7 @@ pub fn cat(parts: &[&[u8]]) -> Vec<u8> {
     parts.concat()
 }
 
-/// A text of at most 255 bytes, as an operation.
+/// A text of at most 255 bytes, as a pickle operation.
 pub fn text(text: &str) -> Vec<u8> {
     cat(&[&[0x8c, text.len() as u8], text.as_bytes()])
 }
@@ -37,7 +37,7 @@ pub fn array_pickle(shape: &[i64], code: &str, order: &str, bytes: &[u8]) -> Vec
     dict_with("w", &array)
 }
 
-/// A zip archive of stored entries with right checksums.
+/// A zip archive of uncompressed entries with correct checksums.
 pub fn zip(entries: &[(&str, &[u8])]) -> Vec<u8> {
     let (mut file, mut directory) = (Vec::new(), Vec::new());
     for (name, content) in entries {

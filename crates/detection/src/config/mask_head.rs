@@ -4,41 +4,41 @@ use serde::{Deserialize, Serialize};
 
 use super::roi_pooler::RoiPoolerConfig;
 
-/// From an object's outline to the target of its mask logits.
+/// Method of computing the target of an object's mask logits from its outline.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum MaskTargets {
-    /// Polygons are drawn into the box by COCO's rasteriser; bitmaps are pooled and thresholded at one half:
+    /// Polygons are filled in the box by COCO's rasteriser; bitmaps are pooled and thresholded at one half:
     /// Detectron2.
     Rasterized,
-    /// The mask of the whole image is pooled by ROIAlign in the legacy alignment, fractions kept: torchvision.
+    /// The mask of the whole image is pooled by ROIAlign with legacy alignment, and fractions are kept: torchvision.
     Pooled,
 }
 
-/// From the mask of a box to a mask of the image.
+/// Method of converting the mask of a box to a mask of the image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum MaskPasting {
-    /// Every pixel's centre is looked up in the box; zeros outside: Detectron2.
+    /// Every pixel's centre is looked up in the box; zero outside the box: Detectron2.
     PixelCenters,
-    /// The mask, one zero cell wider on each side, is resized to the box in whole pixels: torchvision.
+    /// The mask, padded by one zero cell on each side, is resized to the box in whole pixels: torchvision.
     WholePixels,
 }
 
-/// Weight in the loss of a cell of the part relative to a cell beside it.
+/// Weight in the loss of a cell inside the part, relative to a cell outside it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum MaskBalance {
     /// Equal: Detectron2 and torchvision.
     #[default]
     Cells,
-    /// Larger if the part fills little of its box: the root of the number of cells beside it per cell of it, at most
+    /// Larger if the part fills little of its box: the square root of the ratio of outside to inside cells, at most
     /// [`MaskBalance::MAX`]. A pipe fills a tenth of its box, and a head trained for 300 steps learnt to mark no cell.
     ThinParts,
 }
 
 impl MaskBalance {
-    /// The largest weight of a cell of the part.
+    /// Maximum weight of a cell inside the part.
     pub const MAX: f32 = 4.0;
 
-    /// The weight of a cell of the part, from the number of its cells among all `cells`.
+    /// The weight of a cell inside the part, given the number of inside cells and the number of all `cells`.
     pub(crate) fn weight(self, inside: f32, cells: usize) -> f32 {
         match self {
             Self::Cells => 1.0,
@@ -60,14 +60,14 @@ pub struct MaskHeadConfig {
     pub max_train_rois_per_image: Option<usize>,
     /// Factor on the mask loss.
     pub loss_weight: f64,
-    /// Weights of the cells in it.
+    /// Weights of the cells in the mask loss.
     #[serde(default)]
     pub balance: MaskBalance,
     /// The targets of the logits.
     pub targets: MaskTargets,
     /// Method of pasting a mask into the image.
     pub pasting: MaskPasting,
-    /// Minimum probability of a pixel inside.
+    /// Minimum probability of a pixel inside the object.
     pub threshold: f64,
 }
 

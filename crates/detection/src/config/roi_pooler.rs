@@ -5,7 +5,8 @@ use serde::{Deserialize, Serialize};
 /// Positions of ROIAlign's samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum RoiAlignment {
-    /// Shifted by half a cell, which is right for this pixel model: Detectron2's `aligned`.
+    /// Shifted by half a cell, which is correct for this pixel model: Detectron2's
+    /// `aligned`.
     HalfPixel,
     /// Not shifted: torchvision's detectors.
     Legacy,
@@ -38,10 +39,10 @@ pub struct RoiPoolerConfig {
     pub alignment: RoiAlignment,
     /// Number of samples.
     pub sampling_ratio: SamplingRatio,
-    /// Side of the box that belongs on `canonical_level`, pixels.
+    /// Side of the boxes that are pooled from `canonical_level`, in pixels.
     pub canonical_size_px: f64,
-    /// Level of a box of `canonical_size_px`.
+    /// Pyramid level for boxes of `canonical_size_px`.
     pub canonical_level: usize,
-    /// Guard against rounding.
+    /// Small number that protects against rounding.
     pub level_epsilon: LevelEpsilon,
 }

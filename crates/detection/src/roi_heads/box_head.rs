@@ -1,4 +1,4 @@
-//! The box head: class and box of each proposal.
+//! The box head: computes class and box of each proposal.
 //!
 //! Shapes: R ROIs, C channels, S side of the pooled square, F hidden width, K classes.
 
@@ -34,7 +34,7 @@ pub struct BoxHead {
 }
 
 impl BoxHead {
-    /// Draws the parameters for a pyramid of `channels` channels.
+    /// Initialises the parameters at random, for a pyramid of `channels` channels.
     pub fn init(config: &BoxHeadConfig, channels: usize, init: &mut Initializer) -> Self {
         let inputs = channels * config.pooler.output_size.pow(2);
         let hidden = config.fc_channels;
@@ -54,7 +54,7 @@ impl BoxHead {
     }
 }
 
-/// Groups of four box deltas.
+/// Number of groups of four box deltas.
 fn num_delta_columns(config: &BoxHeadConfig, num_classes: usize) -> usize {
     match (config.box_deltas, config.background) {
         (BoxDeltas::ClassAgnostic, _) => 1,
@@ -76,7 +76,7 @@ pub struct BoxPredictor {
 }
 
 impl BoxPredictor {
-    /// Draws the parameters.
+    /// Initialises the parameters at random.
     pub fn init(config: &BoxHeadConfig, num_classes: usize, init: &mut Initializer) -> Self {
         let hidden = config.fc_channels;
         let columns = num_delta_columns(config, num_classes);

@@ -1,20 +1,20 @@
-//! Keypoints as heatmaps over a box, and back.
+//! Conversion of keypoints to heatmaps over a box, and back.
 //!
-//! A heatmap is a square of `S×S` cells stretched over a box. The target of a keypoint is the one
-//! cell that contains it; in inference its position inside the box is computed from all cells.
+//! A heatmap is a square of `S×S` cells stretched over a box. The target of a keypoint is the one cell that contains
+//! it; in inference the position inside the box is computed from all cells.
 
 use sdg_geometry::Keypoint;
 
 use crate::boxes::Corners;
 use crate::config::{KeypointReadout, KeypointScore};
 
-/// The cell `y·S + x` of a keypoint in a box, or `None` if it is unlabelled or outside.
+/// The cell `y·S + x` of a keypoint in a box, or `None` if the keypoint is unlabelled or outside the box.
 ///
 /// `keypoint` and `roi` are in pixels of the resized image. A keypoint exactly on the right or
 /// lower edge belongs to the last cell.
 ///
 /// # Source
-///  Detectron2's `keypoints_to_heatmap` and torchvision's.
+/// Detectron2's and torchvision's `keypoints_to_heatmap`.
 pub fn encode(keypoint: &Keypoint, roi: &Corners, heatmap_size: usize) -> Option<usize> {
     if !keypoint.is_labelled() {
         return None;
@@ -33,18 +33,18 @@ pub fn encode(keypoint: &Keypoint, roi: &Corners, heatmap_size: usize) -> Option
     Some(y * heatmap_size + x)
 }
 
-/// A keypoint read from a heatmap: position in pixels of the resized image, and a score.
+/// A keypoint computed from a heatmap: position in pixels of the resized image, and a score.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ReadKeypoint {
-    /// Pixels, x right.
+    /// Position in pixels, x right.
     pub x: f32,
-    /// Pixels, y down.
+    /// Position in pixels, y down.
     pub y: f32,
-    /// See [`KeypointScore`].
+    /// Score; see [`KeypointScore`].
     pub score: f32,
 }
 
-/// Reads the keypoint of a heatmap (`S×S` logits, row by row) over a box.
+/// Computes the keypoint from its heatmap (`S×S` logits, row by row) over a box.
 pub fn decode(
     logits: &[f32],
     heatmap_size: usize,
@@ -52,7 +52,7 @@ pub fn decode(
     readout: KeypointReadout,
     score: KeypointScore,
 ) -> ReadKeypoint {
-    assert_eq!(logits.len(), heatmap_size * heatmap_size, "a heatmap is square");
+    assert_eq!(logits.len(), heatmap_size * heatmap_size, "expected a square heatmap");
     let width = (roi[2] - roi[0]).max(1.0);
     let height = (roi[3] - roi[1]).max(1.0);
     let (x, y, peak) = match readout {
@@ -88,7 +88,7 @@ fn argmax(values: &[f32]) -> usize {
     best
 }
 
-/// Mean cell centre (column, row) under the softmax of the cells around `best`.
+/// Mean cell centre (column, row), weighted by the softmax of the cells around `best`.
 fn local_mean(logits: &[f32], size: usize, best: usize, radius: usize) -> (f32, f32) {
     let (best_row, best_column) = (best / size, best % size);
     let span = |center: usize| center.saturating_sub(radius)..(center + radius + 1).min(size);
@@ -107,7 +107,7 @@ fn local_mean(logits: &[f32], size: usize, best: usize, radius: usize) -> (f32, 
 /// The parameter of the cubic convolution kernel: PyTorch's -0.75.
 const CUBIC: f32 = -0.75;
 
-/// Four cubic weights for a point at share `t` between the second and the third sample.
+/// Four cubic weights for a point between the second and the third sample, at the fraction `t` of their distance.
 fn cubic_weights(t: f32) -> [f32; 4] {
     let near = |d: f32| ((CUBIC + 2.0) * d - (CUBIC + 3.0)) * d * d + 1.0;
     let far = |d: f32| ((CUBIC * d - 5.0 * CUBIC) * d + 8.0 * CUBIC) * d - 4.0 * CUBIC;
@@ -176,7 +176,7 @@ mod tests {
     fn cubic_weights_sum_to_one_and_hit_samples() {
         assert_eq!(cubic_weights(0.0), [0.0, 1.0, 0.0, 0.0]);
         assert!((cubic_weights(0.3).iter().sum::<f32>() - 1.0).abs() < 1e-6);
-        // In the middle: -0.09375, 0.59375, 0.59375, -0.09375 for a = -0.75.
+        // Halfway: -0.09375, 0.59375, 0.59375, -0.09375 for a = -0.75.
         assert!((cubic_weights(0.5)[0] + 0.09375).abs() < 1e-6);
     }
 
@@ -209,8 +209,8 @@ mod tests {
         ) {
             let roi = [30.0, 40.0, 30.0 + w, 40.0 + h];
             let point = keypoint(30.0 + fx * f64::from(w), 40.0 + fy * f64::from(h));
-            // A hill around the target cell: resizing to fewer pixels than cells has no
-            // antialiasing and would miss a single high cell.
+            // A hill around the target cell, because resizing to fewer pixels than cells has no antialiasing and would
+            // miss a single high cell.
             let cell = encode(&point, &roi, 56).unwrap();
             let (row, column) = ((cell / 56) as f32, (cell % 56) as f32);
             let logits: Vec<f32> = (0..56 * 56)

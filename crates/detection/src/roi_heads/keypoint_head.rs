@@ -1,4 +1,4 @@
-//! The keypoint head: a heatmap over the box for each keypoint.
+//! The keypoint head: computes a heatmap over the box for each keypoint.
 //!
 //! Shapes: R ROIs, C channels, P side of the pooled square, K keypoints, S = 4·P side of a heatmap.
 //!
@@ -32,7 +32,7 @@ pub struct KeypointHead {
 }
 
 impl KeypointHead {
-    /// Draws the parameters for a pyramid of `channels` channels.
+    /// Initialises the parameters at random, for a pyramid of `channels` channels.
     pub fn init(config: &KeypointHeadConfig, channels: usize, init: &mut Initializer) -> Self {
         let conv_fcn = head_convs::init(channels, &config.conv_channels, init);
         let in_channels = config.conv_channels.last().copied().unwrap_or(channels);

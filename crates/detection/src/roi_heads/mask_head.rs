@@ -1,4 +1,4 @@
-//! The mask head: the area of a box that its object covers.
+//! The mask head: computes the area of a box that its object covers.
 //!
 //! Shapes: R ROIs, C channels, P side of the pooled square, K maps (one per class), S = 2·P side of a mask.
 //!
@@ -22,7 +22,8 @@ use super::mask_target::encode;
 use super::roi::{RoiClass, RoiDetection, SampledRoi};
 use crate::target::ResizedTarget;
 
-/// Standard deviation of the predictor's initial weights: small, so that training starts undecided.
+/// Standard deviation of the predictor's initial weights: small, so that training starts from undecided
+/// masks.
 const PREDICTOR_STD: f64 = 0.001;
 
 /// Convolutions, a transposed and a 1×1 convolution: mask logits of each class.
@@ -34,16 +35,16 @@ pub struct MaskHead {
     pub deconv: ConvTranspose2x,
     /// 1×1 to one map per class.
     pub predictor: Conv2d,
-    /// Number of maps before that of class 0: one if the background comes first.
+    /// Number of maps before the map of class 0: one if the background comes first.
     first_class_map: usize,
     #[module(skip)]
     config: MaskHeadConfig,
 }
 
 impl MaskHead {
-    /// Draws the parameters for a pyramid of `channels` channels.
+    /// Initialises the parameters at random, for a pyramid of `channels` channels.
     ///
-    /// If the background comes first it also has an unused map: torchvision.
+    /// If the background comes first, it also has a map, which is not used: torchvision.
     pub fn init(
         config: &MaskHeadConfig,
         channels: usize,
@@ -95,7 +96,7 @@ impl MaskHead {
 
     /// Returns the binary cross-entropy of the true class's map, averaged over all cells of all ROIs.
     ///
-    /// `rois` are on objects, at least one; `image_sizes` are those of the resized images.
+    /// `rois` are at least one, all on objects; `image_sizes` are those of the resized images.
     pub fn loss(
         &self,
         features: &[Tensor<4>; 5],
@@ -128,7 +129,7 @@ impl MaskHead {
         loss * (self.config.loss_weight / count as f64)
     }
 
-    /// Reads the mask of every detection.
+    /// Computes the mask of every detection.
     pub async fn read_masks(&self, features: &[Tensor<4>; 5], detections: &mut [Vec<RoiDetection>]) {
         let (mut rois, mut classes) = (Vec::new(), Vec::new());
         for (image_idx, found) in detections.iter().enumerate() {

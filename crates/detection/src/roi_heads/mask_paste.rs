@@ -1,4 +1,4 @@
-//! From the mask of a box to a mask of the image.
+//! Converts the mask of a box to a mask of the image.
 
 use sdg_geometry::{BoundingBox, Mask};
 
@@ -7,18 +7,18 @@ use crate::config::MaskPasting;
 /// The probabilities of one detection's mask, `S×S`, row by row, stretched over its box.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BoxMask {
-    /// Cells along each side.
+    /// Number of cells along each side.
     pub size: usize,
     /// Values from 0 to 1.
     pub probabilities: Vec<f32>,
 }
 
 impl BoxMask {
-    /// The mask on an image of `width × height` pixels: the pixels at or above `threshold`.
+    /// The mask on an image of `width × height` pixels: the pixels with at least `threshold`.
     ///
-    /// `bounds` in pixels of that image.
+    /// `bounds` is in pixels of that image.
     pub fn paste(&self, bounds: &BoundingBox, width: u32, height: u32, threshold: f64, pasting: MaskPasting) -> Mask {
-        assert_eq!(self.probabilities.len(), self.size * self.size, "a mask over a box is square");
+        assert_eq!(self.probabilities.len(), self.size * self.size, "expected a square mask");
         match pasting {
             MaskPasting::PixelCenters => self.paste_pixel_centers(bounds, width, height, threshold as f32),
             MaskPasting::WholePixels => self.paste_whole_pixels(bounds, width, height, threshold as f32),
@@ -30,7 +30,7 @@ impl BoxMask {
     fn paste_pixel_centers(&self, bounds: &BoundingBox, width: u32, height: u32, threshold: f32) -> Mask {
         let (x1, y1, x2, y2) = (bounds.x1 as f32, bounds.y1 as f32, bounds.x2 as f32, bounds.y2 as f32);
         let mut mask = Mask::empty(width, height);
-        // No cell reaches further than half its own size beyond the box.
+        // A cell extends at most half of its own size beyond the box.
         let cells = |low: f32, high: f32, extent: u32| -> (u32, Vec<f32>) {
             let reach = (high - low) / self.size as f32;
             let first = (low - reach).floor().clamp(0.0, extent as f32) as u32;
@@ -50,7 +50,7 @@ impl BoxMask {
         mask
     }
 
-    /// The value at a position in cells (centres at whole numbers); cells outside are zero.
+    /// The value at a position in cells (centres at integers); cells outside are zero.
     fn bilinear_or_zero(&self, column: f32, row: f32) -> f32 {
         let (left, top) = (column.floor(), row.floor());
         let (fx, fy) = (column - left, row - top);
@@ -63,15 +63,15 @@ impl BoxMask {
     }
 
     /// # Source
-    /// torchvision's `paste_masks_in_image`: the padded mask over the box enlarged by the same factor and
-    /// truncated to whole pixels, last ones included; above the threshold, as in its examples.
+    /// torchvision's `paste_masks_in_image`: the padded mask over the box, which is enlarged by the same factor
+    /// and truncated to whole pixels, including the last ones; above the threshold, as in its examples.
     fn paste_whole_pixels(&self, bounds: &BoundingBox, width: u32, height: u32, threshold: f32) -> Mask {
         let padded = self.padded();
         let enlarged = padded.size as f32 / self.size as f32;
         let span = |low: f64, high: f64| -> (i64, usize) {
             let (low, high) = (low as f32, high as f32);
             let (half, center) = ((high - low) * 0.5 * enlarged, (high + low) * 0.5);
-            // Towards zero, as a conversion to integers does.
+            // Rounds towards zero, like a conversion to integers.
             let (low, high) = ((center - half) as i64, (center + half) as i64);
             (low, (high - low + 1).max(1) as usize)
         };
@@ -103,7 +103,7 @@ impl BoxMask {
         mask
     }
 
-    /// One zero cell more on each side.
+    /// The mask with one more zero cell on each side.
     fn padded(&self) -> Self {
         let size = self.size + 2;
         let mut probabilities = vec![0f32; size * size];
@@ -114,9 +114,10 @@ impl BoxMask {
     }
 }
 
-/// Between four cells, upper left first: at share `fx` towards the right ones and `fy` towards the lower ones.
+/// Interpolates between four cells, upper left first: fraction `fx` towards the right, fraction `fy` downwards.
 ///
-/// Both originals sum in this order; a cell is one probability, not a pixel of three bytes as in `sdg-shape`.
+/// Both reference implementations sum in this order; a cell is one probability, not a pixel of three bytes as in
+/// `sdg-shape`.
 fn blend([a, b, c, d]: [f32; 4], fx: f32, fy: f32) -> f32 {
     (a * (1.0 - fx) + b * fx) * (1.0 - fy) + (c * (1.0 - fx) + d * fx) * fy
 }
@@ -139,8 +140,9 @@ mod tests {
 
     #[test]
     fn whole_pixels_take_the_last_one_in() {
-        // The padded box is 10·30/28 wide: from 3 (3.64) to 14 (14.36), 12 pixels for 30 cells; the outermost are
-        // at most a quarter of a cell inside and read 0.75. In y likewise from 5 to 10.
+        // The padded box is 10·30/28 wide: from 3 (3.64) to 14 (14.36), 12 pixels for 30 cells; the outermost
+        // pixels are at most a quarter of a cell inside and have the value 0.75. In y, from 5 to 10 in the same
+        // way.
         let mask = full().paste(&BOUNDS, 20, 20, 0.5, MaskPasting::WholePixels);
         assert_eq!(mask.bounds(), Some(BoundingBox { x1: 3.0, y1: 5.0, x2: 15.0, y2: 11.0 }));
     }

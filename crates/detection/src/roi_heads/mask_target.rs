@@ -14,12 +14,12 @@ use crate::target::{ObjectMask, union};
 /// Sub-cells of a cell along each axis in COCO's rasteriser.
 const SUBCELLS: f64 = 5.0;
 
-/// The minimum side of a box, pixels, over which a mask is stretched; smaller ones would give huge factors.
+/// Minimum side of a box over which a mask is stretched, in pixels; smaller boxes would give huge factors.
 const MIN_SIDE_PX: f32 = 0.1;
 
 /// Returns the target mask of an object over a box, `S·S` values from 0 to 1, row by row.
 ///
-/// `mask` and `roi` in pixels of the resized image, which has `[height, width]` pixels.
+/// `mask` and `roi` are in pixels of the resized image, which has `[height, width]` pixels.
 ///
 /// # Source
 /// Detectron2's `PolygonMasks.crop_and_resize` and `BitMasks.crop_and_resize`; torchvision's
@@ -43,7 +43,7 @@ pub fn encode(mask: &ObjectMask, roi: &Corners, image_size: [usize; 2], size: us
 }
 
 fn pool_mask(mask: &Mask, roi: &Corners, size: usize, alignment: RoiAlignment) -> Vec<f32> {
-    // A plain device: the target has no gradient, and its crop is small.
+    // A device without autodiff: the target has no gradient, and its crop is small.
     let device = Device::flex();
     let (width, height) = (mask.width(), mask.height());
     let values: Vec<f32> =
@@ -60,7 +60,7 @@ fn pool_mask(mask: &Mask, roi: &Corners, size: usize, alignment: RoiAlignment) -
     host_values(roi_align(map, rois, params))
 }
 
-/// Draws polygons, stretched from a box to `S×S` cells, as the union of their areas.
+/// Fills polygons, stretched from a box to `S×S` cells, as the union of their areas.
 fn rasterize_in_box(polygons: &[Polygon], roi: &Corners, size: usize) -> Vec<bool> {
     let scale = |low: f32, high: f32| f64::from(size as f32 / (high - low).max(MIN_SIDE_PX));
     let (scale_x, scale_y) = (scale(roi[0], roi[2]), scale(roi[1], roi[3]));
@@ -76,10 +76,10 @@ fn rasterize_in_box(polygons: &[Polygon], roi: &Corners, size: usize) -> Vec<boo
     inside
 }
 
-/// Fills a polygon given in cells as COCO's run-length coder does, by the even-odd rule along columns.
+/// Fills a polygon, given in cells, like COCO's run-length coder: by the even-odd rule along columns.
 ///
-/// Vertices are rounded to a grid of fifths of a cell and joined by digital lines. Where a line steps
-/// across the centre of a column, the column changes between outside and inside.
+/// Vertices are rounded to a grid of fifths of a cell and joined by digital lines. Where a line steps across the
+/// centre of a column, the column changes between outside and inside.
 ///
 /// # Source
 /// The behaviour of COCO's `rleFrPoly`, including rounding towards zero, on which Detectron2's mask loss is based.
@@ -102,7 +102,7 @@ fn fill_as_coco(vertices: &[[f64; 2]], size: usize, inside: &mut [bool]) {
     }
 }
 
-/// Steps from one grid point to another along the longer axis, and returns each step's ends.
+/// Steps from one grid point to another along the longer axis, and calls `step` with the ends of each step.
 fn digital_line(from: [i64; 2], to: [i64; 2], mut step: impl FnMut([i64; 2], [i64; 2])) {
     let lengths = [0, 1].map(|axis| (to[axis] - from[axis]).abs());
     let (long, short) = if lengths[0] >= lengths[1] { (0, 1) } else { (1, 0) };
@@ -122,7 +122,7 @@ fn digital_line(from: [i64; 2], to: [i64; 2], mut step: impl FnMut([i64; 2], [i6
     }
 }
 
-/// Records the row at which a step across the centre of a column changes it.
+/// Records the row at which a step across the centre of a column switches the column between outside and inside.
 fn note_turn(before: [i64; 2], after: [i64; 2], size: usize, turns: &mut [Vec<usize>]) {
     if before[0] == after[0] {
         return;
@@ -176,14 +176,14 @@ mod tests {
         };
         assert_eq!(filled(&triangle), filled(&backwards));
         let area = filled(&triangle).iter().filter(|inside| **inside).count() as f64;
-        // Half of the cross product of two edges, within a cell along half of the outline.
+        // Half of the cross product of two edges, up to one cell along half of the outline.
         let exact = 0.5 * ((9.6 * 12.3) - (1.8 * 4.8));
         assert!((area - exact).abs() < 8.0, "{area} {exact}");
     }
 
     #[test]
     fn pooled_targets_keep_fractions_and_rasterized_ones_are_cut() {
-        // The left quarter of an 8x8 image, pooled into 2x2 cells of four pixels: half of the left ones.
+        // The left quarter of an 8x8 image, pooled into 2x2 cells of four pixels, covers half of the left cells.
         let bitmap = ObjectMask::Bitmap(Mask::from_fn(8, 8, |x, _| x < 2));
         let roi = [0.0, 0.0, 8.0, 8.0];
         let legacy = encode(&bitmap, &roi, [8, 8], 2, MaskTargets::Pooled);

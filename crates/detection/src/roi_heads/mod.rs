@@ -1,9 +1,9 @@
-//! The second stage: the class of each proposal, and its exact box.
+//! The second stage: computes the class of each proposal, and its exact box.
 //!
 //! ```text
 //! proposals ─ sample (training) ─ box_head ─┬─ losses             (training)
 //!                                           └─ detections ─ NMS   (inference)
-//!             positive ones / detections ─┬─ keypoint_head ─ losses / keypoints
+//!        positive proposals / detections ─┬─ keypoint_head ─ losses / keypoints
 //!                                         └─ mask_head ─ losses / masks
 //! ```
 
@@ -42,7 +42,7 @@ pub use roi::RoiDetection;
 pub struct RoiHeads {
     /// Two fully connected layers.
     pub box_head: BoxHead,
-    /// From the box head's features to classes and box deltas.
+    /// Computes classes and box deltas from the box head's features.
     pub box_predictor: BoxPredictor,
     /// Head for keypoints, if the model has one.
     pub keypoint_head: Option<KeypointHead>,
@@ -66,7 +66,7 @@ pub struct RoiLosses {
 }
 
 impl RoiHeads {
-    /// Draws the parameters.
+    /// Initialises the parameters at random.
     pub fn init(config: &RoiHeadsConfig, fpn: &FpnConfig, init: &mut Initializer) -> Self {
         Self {
             box_head: BoxHead::init(&config.box_head, fpn.channels, init),
@@ -80,9 +80,9 @@ impl RoiHeads {
         }
     }
 
-    /// Matches proposals and objects, and draws those in the losses.
+    /// Matches proposals and objects, and samples the proposals of the losses.
     ///
-    /// The objects' own boxes are among the candidates, so that there are positives from the start.
+    /// The objects' own boxes are among the candidates, so there are positives from the start.
     pub fn sample_rois(
         &self,
         proposals: &[Proposals],
@@ -106,7 +106,7 @@ impl RoiHeads {
         rois
     }
 
-    /// Returns the losses of the drawn proposals.
+    /// Returns the losses of the sampled proposals.
     ///
     /// `image_sizes` are those of the resized images, without padding.
     pub fn losses(
@@ -176,7 +176,7 @@ impl RoiHeads {
     }
 }
 
-/// The proposals on objects that go through a head in training: those that are `fit` for it (given the
+/// Samples proposals on objects for a head in training: those that are `fit` for it (a function of the
 /// object's index in its image), at most `max` per image.
 fn choose_objects(
     rois: &[SampledRoi],

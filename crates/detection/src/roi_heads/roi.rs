@@ -6,7 +6,7 @@ use crate::roi_pooler::Roi;
 use super::heatmap::ReadKeypoint;
 use super::mask_paste::BoxMask;
 
-/// A proposal in the losses.
+/// A sampled proposal of the losses.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SampledRoi {
     /// Box and image.
@@ -15,7 +15,7 @@ pub struct SampledRoi {
     pub class: RoiClass,
 }
 
-/// The match of a sampled proposal.
+/// The result of matching a sampled proposal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RoiClass {
     /// No object.
@@ -24,7 +24,7 @@ pub enum RoiClass {
     Object {
         /// Index of the class, from 0 without the background.
         class_idx: usize,
-        /// Index among the image's objects.
+        /// Index of the object among the objects of the image.
         gt_idx: usize,
     },
 }

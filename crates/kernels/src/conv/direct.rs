@@ -12,7 +12,8 @@ use crate::simd::Isa;
 
 /// Approximate number of positions per unit of work: 96 rows of 256 floats are 98 KB.
 const UNIT_POSITIONS: usize = 96;
-/// The same if a unit copies the data shared by its rows, for which larger units are better.
+/// Approximate number of positions per unit if the unit copies its input: neighbouring rows share the copy, so larger
+/// units are better.
 const COPYING_UNIT_POSITIONS: usize = 240;
 /// Target number of units, so that no thread waits long for the last.
 const MIN_UNITS: usize = 8;
@@ -64,10 +65,10 @@ impl DirectConv<'_> {
             && self.grid == self.source.size
             && self.grid == self.target.size;
         if pointwise {
-            // SAFETY: the caller promises that nothing else has the target's pixels of `output`.
+            // SAFETY: the caller promises that nothing else accesses the target's pixels of `output`.
             unsafe { self.run_pointwise(isa, output) };
         } else {
-            // SAFETY: the caller promises that nothing else has the target's pixels of `output`.
+            // SAFETY: the caller promises that nothing else accesses the target's pixels of `output`.
             unsafe { self.run_window(isa, output) };
         }
     }
@@ -143,7 +144,7 @@ impl DirectConv<'_> {
         });
     }
 
-    /// Panels of one of several groups.
+    /// The panels of group number `group` of `groups`.
     fn panels_of(&self, group: usize, groups: usize) -> std::ops::Range<usize> {
         let panels = self.num_panels();
         group * panels / groups..(group + 1) * panels / groups
@@ -175,7 +176,8 @@ impl DirectConv<'_> {
         }
     }
 
-    /// The data read after a panel: the next panel or, after the last (`end`), the next unit's positions, `next`.
+    /// The data read after a panel: the next panel or, after the last panel (`end`), `next`, the next unit's
+    /// positions.
     fn prefetch<'a>(&'a self, panel: usize, end: usize, next: &'a [f32]) -> Prefetch<'a> {
         let run = if panel + 1 < end { self.filters.panel(0, panel + 1).0 } else { next };
         Prefetch { runs: [run, &[]] }

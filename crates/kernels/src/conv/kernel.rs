@@ -11,9 +11,9 @@ use crate::parallel::{Output, Raw};
 use crate::product::Epilogue;
 use crate::simd::Isa;
 
-/// Runs a convolution in either direction: `[N, Ho, Wo, Co]` from `x` in the forward direction, `[N, Hi, Wi,
-/// Ci]` from the output's gradient backwards. `filters` contains the packed weight, for Winograd's method or
-/// directly.
+/// Runs a convolution in either direction: `[N, Ho, Wo, Co]` from `x` forwards, `[N, Hi, Wi, Ci]` from the
+/// output's gradient backwards. `filters` contains the packed weight, for Winograd's method or for direct
+/// products.
 pub(crate) fn convolve(
     isa: Isa,
     direction: Direction,
@@ -35,14 +35,14 @@ pub(crate) fn convolve(
             Direction::Forward => shape.params.padding,
             Direction::Backward => shape.params.padding.map(|padding| 2 - padding),
         };
-        // SAFETY: nothing else has the output.
+        // SAFETY: nothing else accesses the output.
         if unsafe { winograd::run(isa, source, padding, [to[2], to[3]], &panels, epilogue, output.raw()) } {
             // SAFETY: the tiles together are the whole output.
             return unsafe { output.into_vec() };
         }
     }
     if let Filters::Direct(products) = filters(false) {
-        // SAFETY: nothing else has the output.
+        // SAFETY: nothing else accesses the output.
         unsafe { run_direct(isa, direction, source, &products, epilogue, shape, output.raw()) };
     }
     // SAFETY: the grid, or the phases together, are the whole output.
@@ -71,7 +71,7 @@ unsafe fn run_direct(
             epilogue,
             target: Target { size: shape.out_size, origin: [0, 0], step: [1, 1] },
         };
-        // SAFETY: the caller promises that nothing else has the output, all of which is the target.
+        // SAFETY: the caller promises that nothing else accesses the output; the target is the whole output.
         unsafe { conv.run(isa, output) };
         return;
     }

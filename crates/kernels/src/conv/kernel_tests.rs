@@ -306,7 +306,7 @@ fn sums_over_positions_by_hand() {
     let values = [1.0, 10.0, 2.0, 20.0, 3.0, 30.0];
     let isa = Isa::detect();
     assert_eq!(channel_sums(isa, &values, 2), [6.0, 60.0]);
-    // The second position's first channel, and the third's second, were cut.
+    // The ReLU cut the first channel of the second position, and the second channel of the third.
     let output = [1.0, 1.0, 0.0, 1.0, f32::NAN, -0.0];
     let (masked, sums) = relu_gradient(isa, &values, &output, 2);
     assert_eq!(masked, [1.0, 10.0, 0.0, 20.0, 3.0, 0.0]);

@@ -29,7 +29,7 @@ impl Direction {
     }
 }
 
-/// Panels of packed weights, `[⌈columns/32⌉, depth, 32]`, once or 36 times.
+/// Panels of packed weights, `[⌈columns/32⌉, depth, 32]`; for Winograd's method once per frequency.
 #[derive(Clone)]
 pub(crate) struct Panels {
     pub(crate) values: Arc<Scratch>,

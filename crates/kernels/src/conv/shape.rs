@@ -34,7 +34,7 @@ impl ConvShape {
         }
     }
 
-    /// Sizes of the convolution whose transpose takes `x` `[N, Co, Ho, Wo]` with `weight` `[Co, Ci, Kh, Kw]`.
+    /// Sizes of the convolution whose transpose maps `x` `[N, Co, Ho, Wo]` with `weight` `[Co, Ci, Kh, Kw]`.
     pub(crate) fn transposed(x: [usize; 4], weight: [usize; 4], params: Conv2dParams) -> Self {
         let [num_images, out_channels, out_height, out_width] = x;
         let [_, in_channels, kernel_height, kernel_width] = weight;
@@ -53,19 +53,19 @@ impl ConvShape {
         }
     }
 
-    /// `[N, Ci, Hi, Wi]`
+    /// Shape of the input, `[N, Ci, Hi, Wi]`.
     pub(crate) fn input(&self) -> [usize; 4] {
         let [height, width] = self.in_size;
         [self.num_images, self.in_channels, height, width]
     }
 
-    /// `[N, Co, Ho, Wo]`
+    /// Shape of the output, `[N, Co, Ho, Wo]`.
     pub(crate) fn output(&self) -> [usize; 4] {
         let [height, width] = self.out_size;
         [self.num_images, self.out_channels, height, width]
     }
 
-    /// `[Co, Ci, Kh, Kw]`
+    /// Shape of the weight, `[Co, Ci, Kh, Kw]`.
     pub(crate) fn weight(&self) -> [usize; 4] {
         let [height, width] = self.kernel;
         [self.out_channels, self.in_channels, height, width]
@@ -77,11 +77,11 @@ impl ConvShape {
 /// Input pixel i is reached by output pixel o through kernel cell k if `i + padding = o·stride + k`: each phase is a
 /// convolution of stride 1 over the output's gradient, with those cells only.
 pub(super) struct Phase {
-    /// First pixel.
+    /// First pixel of the phase.
     pub(super) origin: [usize; 2],
-    /// Pixels.
+    /// Number of pixels, down and across.
     pub(super) grid: [usize; 2],
-    /// Output pixel of the first of the cells, at the first pixel.
+    /// Output pixel that the first of the cells reads at the first pixel.
     pub(super) first: [isize; 2],
     /// Rows of the kernel, by ascending output pixel.
     pub(super) cells_y: Vec<usize>,

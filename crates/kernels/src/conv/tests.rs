@@ -65,7 +65,7 @@ fn conv2d_agrees_with_burn_and_its_gradients() {
 #[test]
 fn conv_transpose2d_agrees_with_burn_and_its_gradients() {
     let cases = [
-        // The keypoint head's and the mask head's.
+        // The kernels of the keypoint head and the mask head.
         ([2, 6, 7, 7], [6, 5, 4, 4], [2, 2], [1, 1]),
         ([3, 4, 5, 6], [4, 7, 2, 2], [2, 2], [0, 0]),
         ([1, 3, 4, 5], [3, 2, 3, 3], [1, 1], [1, 1]),
@@ -141,7 +141,7 @@ fn transposed_and_sliced_tensors_are_read_as_what_they_show() {
         let w = w.swap_dims(0, 1).slice([0..4, 0..3, 0..3, 0..3]);
         (x, w)
     };
-    // The output is transposed, too, so that the incoming gradient is not a contiguous tensor.
+    // The output is also transposed, so that the incoming gradient is not a contiguous tensor.
     let ours = |x, w, b| {
         let (x, w) = views(x, w);
         conv2d(x, w, Some(b), params).swap_dims(2, 3)
@@ -155,7 +155,7 @@ fn transposed_and_sliced_tensors_are_read_as_what_they_show() {
 }
 
 /// Output and gradients of `Σ output · pattern` of a convolution with all its epilogue or, with `in_steps`, of the
-/// same as separate operations.
+/// same computation by separate operations.
 fn run_fused(x: [usize; 4], weight: [usize; 4], params: Conv2dParams, in_steps: bool) -> Vec<Vec<f32>> {
     let device = Device::flex().autodiff();
     let channels = weight[0];
@@ -308,7 +308,7 @@ fn a_stride_of_zero_is_refused() {
     conv2d(Tensor::ones([1, 3, 4, 4], &device), Tensor::ones([2, 3, 3, 3], &device), None, Conv2dParams::square(0, 0));
 }
 
-/// Maps and a leaf that several operations read, once through ours and once through burn's.
+/// Maps and a leaf that several operations read, once through our operations and once through burn's.
 #[test]
 fn gradients_of_what_is_read_more_than_once_are_added() {
     let device = Device::flex().autodiff();
@@ -326,7 +326,7 @@ fn gradients_of_what_is_read_more_than_once_are_added() {
         let map = conv(image.clone(), &weights[0]);
         let loss = conv(map.clone(), &weights[1]).square().sum()
             + conv(map.clone(), &weights[2]).exp().sum()
-            // By burn itself, between ours and in parallel.
+            // An operation of burn itself, between ours and in parallel.
             + (map * 3.0).sum()
             + conv(image.clone() * 0.5, &weights[0]).square().sum()
             + conv(image.clone(), &weights[0]).exp().sum();

@@ -35,7 +35,7 @@ pub(crate) fn weight_gradient(isa: Isa, x: Maps<'_>, output_grad: Maps<'_>, shap
     direct_weight_gradient(isa, x, output_grad, shape)
 }
 
-/// The same by plain sums over positions.
+/// The weight's gradient by plain sums over positions.
 pub(super) fn direct_weight_gradient(isa: Isa, x: Maps<'_>, output_grad: Maps<'_>, shape: &ConvShape) -> Vec<f32> {
     let padded = PaddedInput::new(x, shape);
     let [out_height, out_width] = shape.out_size;

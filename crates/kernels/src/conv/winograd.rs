@@ -35,8 +35,9 @@ pub(super) use weight_gradient::weight_gradient;
 
 /// Tiles per unit of work: the transformed values of 48 tiles and 64 channels are 442 KB.
 const UNIT_TILES: usize = 48;
-/// Target number of units, so that no thread waits long for the last. A single thread takes few tiles at a time
-/// through all steps, which stay in its cache (a browser's 64→64 on 64×80: 5.2 ms with eight, 3.5 with one).
+/// Target number of units, so that no thread waits long for the last one. A single thread processes few tiles at
+/// a time through all steps, so that they stay in its cache (a browser's 64→64 on 64×80: 5.2 ms with eight units,
+/// 3.5 ms with one).
 const MIN_UNITS: usize = if cfg!(all(feature = "parallel", not(target_arch = "wasm32"))) { 8 } else { 1 };
 
 /// Whether a convolution is computed by this method.
@@ -105,7 +106,7 @@ pub(super) unsafe fn run(
             unsafe { conv.tiles(unit * per_unit, per_unit.min(num_tiles - unit * per_unit), false) };
         });
     } else {
-        // SAFETY: no other call writes tiles of this output: there is this one call.
+        // SAFETY: this single call writes all tiles of the output.
         unsafe { conv.tiles(0, num_tiles, true) };
     }
     finite.load(Ordering::Relaxed)
@@ -124,7 +125,7 @@ struct Winograd<'a> {
 }
 
 impl Winograd<'_> {
-    /// Takes `count` tiles from `first` on through all steps.
+    /// Processes `count` tiles, beginning with `first`, through all steps.
     ///
     /// # Safety
     /// Nothing else accesses these tiles of the output.

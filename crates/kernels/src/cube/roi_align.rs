@@ -5,7 +5,7 @@
 //! ```
 //!
 //! The conventions are those of [`AxisBins`](crate::roi_bins::AxisBins), sample by sample. One difference: an image
-//! index beyond the batch means the last image, since a kernel cannot return an error.
+//! index beyond the batch means the last image, because a kernel cannot return an error.
 
 use burn::backend::Cube;
 use burn::backend::ops::FloatTensorOps;
@@ -16,7 +16,7 @@ use cubecl::prelude::*;
 
 use crate::params::{RoiAlignParams, RoiAlignment, SamplingRatio};
 
-/// As [`roi_align`](crate::roi_align()), for `f32` tensors whose shapes were checked.
+/// Like [`roi_align`](crate::roi_align()), for `f32` tensors whose shapes were checked.
 pub(super) fn launched(
     features: FloatTensor<Cube>,
     rois: FloatTensor<Cube>,
@@ -47,7 +47,8 @@ pub(super) fn launched(
     crops
 }
 
-/// `samples` per bin and axis; 0 for the length of the bin in feature pixels.
+/// ROIAlign of one output value. `samples` is the number of samples per bin and axis; 0 for the length of the bin in
+/// feature pixels.
 #[cube(launch)]
 fn roi_align_kernel(
     features: &Tensor<f32>,
@@ -113,7 +114,8 @@ fn roi_align_kernel(
 }
 
 /// The samples of one bin along one axis that may lie on the map: the bin's start and length in feature pixels, the
-/// first sample, how many follow; and the number of samples on the map and off it. None if a corner is not finite.
+/// first sample, the number of samples that follow it, and the number of all samples, on the map and off it. There are
+/// none if a corner is not finite.
 #[cube]
 fn axis_samples(
     low: f32,
@@ -138,8 +140,8 @@ fn axis_samples(
     let mut count = grid;
     let size = f32::cast_from(map_size);
     if comptime!(samples == 0) && grid >= f32::new(1024.0) {
-        // So that a huge ROI costs no more than the map's length: a step is at least half a pixel here. One
-        // additional sample on both sides for rounding.
+        // A step is at least half a pixel here, so a huge ROI costs no more than the map's length. One additional
+        // sample on both sides covers rounding.
         let step = bin / grid;
         first = max(((f32::new(-1.0) - bin_start) / step - f32::new(1.5)).floor(), f32::new(0.0));
         let end = min(((size - bin_start) / step + f32::new(1.5)).ceil(), grid);
@@ -151,7 +153,7 @@ fn axis_samples(
     (bin_start, bin, first, u32::cast_from(count), grid)
 }
 
-/// By its bits: shading languages may assume that every number is finite.
+/// Whether a number is finite, tested by its bits: shading languages may assume that every number is finite.
 #[cube]
 fn is_real(value: f32) -> bool {
     u32::reinterpret(value) & 0x7f80_0000u32 != 0x7f80_0000u32

@@ -43,7 +43,7 @@ impl Sizes {
         self.num_images * self.chunks()
     }
 
-    /// Image, and elements.
+    /// Image of a unit, and its range of elements.
     fn unit(&self, unit: usize) -> (usize, std::ops::Range<usize>) {
         let (image, chunk) = (unit / self.chunks(), unit % self.chunks());
         let pixels = chunk * CHUNK..self.pixels.min((chunk + 1) * CHUNK);
@@ -55,7 +55,7 @@ impl Sizes {
         channel / (self.channels / self.groups)
     }
 
-    /// Values of a group.
+    /// Number of values of a group.
     fn group_len(&self) -> f64 {
         (self.channels / self.groups * self.pixels) as f64
     }
@@ -90,7 +90,7 @@ pub(crate) fn forward(
             let squares: f64 = moments
                 .map(|(pivot, shift, second)| {
                     let pixels = sizes.pixels as f64;
-                    // Around the channel's mean, and of the channel's mean around the group's.
+                    // First around the channel's mean, then the channel's mean around the group's mean.
                     second - pixels * shift * shift + pixels * (pivot + shift - mean).powi(2)
                 })
                 .sum();
@@ -126,11 +126,12 @@ pub(crate) struct GroupNormGrads {
     pub(crate) x: Vec<f32>,
     pub(crate) gamma: Vec<f32>,
     pub(crate) beta: Vec<f32>,
-    /// The gradient of the output where the ReLU passed it, which is that of the residual; none without a ReLU.
+    /// The gradient of the output at values that the ReLU passed, which is the gradient of the residual; `None`
+    /// without a ReLU.
     pub(crate) masked: Option<Vec<f32>>,
 }
 
-/// The gradients, from that of the output and the output itself.
+/// The gradients, from the output's gradient and the output itself.
 pub(crate) fn backward(
     isa: Isa,
     [output_grad, output]: [&[f32]; 2],
@@ -328,7 +329,7 @@ widest! {
     }
 }
 
-/// Written so that a NaN stays NaN.
+/// ReLU, written so that a NaN stays NaN.
 #[inline(always)]
 fn relu(value: f32) -> f32 {
     if value <= 0.0 { 0.0 } else { value }

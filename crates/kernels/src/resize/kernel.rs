@@ -21,12 +21,12 @@ impl PoolShape {
         Self { num_images, channels, in_size, out_size, params }
     }
 
-    /// `[N, C, Hi, Wi]`
+    /// Shape of the input, `[N, C, Hi, Wi]`.
     pub(crate) fn input(&self) -> [usize; 4] {
         [self.num_images, self.channels, self.in_size[0], self.in_size[1]]
     }
 
-    /// `[N, C, Ho, Wo]`
+    /// Shape of the output, `[N, C, Ho, Wo]`.
     pub(crate) fn output(&self) -> [usize; 4] {
         [self.num_images, self.channels, self.out_size[0], self.out_size[1]]
     }
@@ -106,7 +106,7 @@ pub(crate) fn max_pool_gradient(
     grad
 }
 
-/// Each pixel four times: `[N, 2H, 2W, C]`.
+/// Repeats each pixel four times: `[N, 2H, 2W, C]`.
 pub(crate) fn upsample(x: &[f32], [num_images, channels, height, width]: [usize; 4]) -> Vec<f32> {
     let row_len = width * channels;
     let mut output = vec![0.0; 4 * x.len()];
@@ -126,7 +126,7 @@ pub(crate) fn upsample(x: &[f32], [num_images, channels, height, width]: [usize;
     output
 }
 
-/// The gradient with respect to the input, of this shape: sums of four.
+/// The gradient with respect to the input: sums of four pixels of the output's gradient.
 pub(crate) fn upsample_gradient(
     isa: Isa,
     output_grad: &[f32],

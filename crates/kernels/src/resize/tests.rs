@@ -1,4 +1,5 @@
-//! Compares pooling and doubling with burn's own and its gradients, and with values computed by hand.
+//! Compares pooling and doubling with burn's own operations and their gradients, and with values
+//! computed by hand.
 
 use burn::tensor::module;
 use burn::tensor::ops::MaxPoolOptions;

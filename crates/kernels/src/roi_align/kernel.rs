@@ -7,7 +7,7 @@ use crate::params::RoiAlignParams;
 use crate::roi_bins::RoiBins;
 use crate::simd::{Isa, widest};
 
-/// Channels of the backward pass's units.
+/// Number of channels per unit of the backward pass.
 const CHANNEL_BLOCK: usize = 16;
 
 /// Crops of `features` `[N, H, W, C]` at `rois` `[R, 5]`: `[R, Ph, Pw, C]`. The shape is `[N, C, H, W]`.
@@ -39,7 +39,7 @@ pub(crate) fn forward(features: &[f32], shape: [usize; 4], rois: &[f32], params:
     output
 }
 
-/// Gradient with respect to the features, `[N, H, W, C]`, from that of the crops, `[R, Ph, Pw, C]`.
+/// Gradient with respect to the features, `[N, H, W, C]`, from the gradient of the crops, `[R, Ph, Pw, C]`.
 pub(crate) fn backward(crop_grad: &[f32], shape: [usize; 4], rois: &[f32], params: &RoiAlignParams) -> Vec<f32> {
     let isa = Isa::detect();
     let [num_images, channels, height, width] = shape;

@@ -129,7 +129,7 @@ fn the_composed_default_agrees() {
 
 #[test]
 fn a_ramp_gives_the_bins_centres() {
-    // feature(y, x) = x; the ROI spans feature pixels 2 to 6, so that bins of 2 are centred at 3 and 5.
+    // feature(y, x) = x; the ROI spans feature pixels 2 to 6, so bins of 2 are centred at 3 and 5.
     let features: Vec<f32> = (0..8 * 9).map(|idx| (idx % 9) as f32).collect();
     let rois = [0.0, 4.0, 4.0, 12.0, 12.0];
     for ratio in RATIOS {

@@ -17,13 +17,13 @@ pub(crate) enum Isa {
 }
 
 impl Isa {
-    /// The widest this machine has.
+    /// The widest instruction set of this machine.
     pub(crate) fn detect() -> Self {
         static DETECTED: OnceLock<Isa> = OnceLock::new();
         *DETECTED.get_or_init(|| Self::available()[0])
     }
 
-    /// All this machine has, widest first.
+    /// All instruction sets of this machine, widest first.
     pub(crate) fn available() -> Vec<Self> {
         let mut available = Vec::new();
         #[cfg(target_arch = "x86_64")]

@@ -1,4 +1,5 @@
-//! Sixteen floats at a time, as one AVX-512 register, two AVX2 registers, four of NEON's or WebAssembly's (quads.rs), or an array.
+//! Sixteen floats at a time, as one AVX-512 register, two AVX2 registers, four registers of NEON or WebAssembly
+//! (quads.rs), or an array.
 //!
 //! Kernels are written once over [`Lanes`] and compiled for every instruction set by
 //! [`lanes_kernel!`](super::lanes_kernel), inside functions with enabled instructions: only there do
@@ -7,7 +8,7 @@
 #[cfg(target_arch = "x86_64")]
 use std::arch::x86_64::*;
 
-/// Floats in a [`Lanes`].
+/// Number of floats in a [`Lanes`].
 pub(crate) const LANES: usize = 16;
 
 /// Sixteen floats.
@@ -24,21 +25,21 @@ pub(crate) trait Lanes: Copy {
     unsafe fn splat(value: f32) -> Self;
     unsafe fn load(from: *const f32) -> Self;
     unsafe fn store(self, to: *mut f32);
-    /// The first `len` of sixteen, followed by zeros.
+    /// Loads the first `len` of sixteen floats, followed by zeros.
     #[inline(always)]
     unsafe fn load_first(from: *const f32, len: usize) -> Self {
         let mut values = [0.0_f32; LANES];
-        // SAFETY: good for `len` floats, which is at most 16.
+        // SAFETY: valid for `len` floats, which is at most 16.
         unsafe {
             std::ptr::copy_nonoverlapping(from, values.as_mut_ptr(), len);
             Self::load(values.as_ptr())
         }
     }
-    /// The first `len` of sixteen; the memory after them is not changed.
+    /// Stores the first `len` of sixteen floats; the memory after them is not changed.
     #[inline(always)]
     unsafe fn store_first(self, to: *mut f32, len: usize) {
         let mut values = [0.0_f32; LANES];
-        // SAFETY: good for `len` floats, which is at most 16.
+        // SAFETY: valid for `len` floats, which is at most 16.
         unsafe {
             self.store(values.as_mut_ptr());
             std::ptr::copy_nonoverlapping(values.as_ptr(), to, len);
@@ -51,7 +52,7 @@ pub(crate) trait Lanes: Copy {
     unsafe fn mul_add(self, factor: Self, summand: Self) -> Self;
     /// `max(self, 0)`; a NaN stays NaN.
     unsafe fn relu(self) -> Self;
-    /// Prefetches a cache line that is read soon; a hint that reads nothing, for any pointer.
+    /// Prefetches a cache line that is read soon; a hint only, valid for any pointer.
     #[inline(always)]
     fn prefetch(at: *const f32) {
         #[cfg(target_arch = "x86_64")]
@@ -81,22 +82,22 @@ impl Lanes for Zmm {
     }
     #[inline(always)]
     unsafe fn load(from: *const f32) -> Self {
-        // SAFETY: the caller promises AVX-512, and `from` is good for 16 floats; the instruction needs no alignment.
+        // SAFETY: the caller promises AVX-512, and `from` is valid for 16 floats; the instruction needs no alignment.
         unsafe { Self(_mm512_loadu_ps(from)) }
     }
     #[inline(always)]
     unsafe fn load_first(from: *const f32, len: usize) -> Self {
-        // SAFETY: the caller promises AVX-512, and `from` is good for `len` floats: the masked load reads no others.
+        // SAFETY: the caller promises AVX-512, and `from` is valid for `len` floats: the masked load reads no others.
         unsafe { Self(_mm512_maskz_loadu_ps(first_mask(len), from)) }
     }
     #[inline(always)]
     unsafe fn store(self, to: *mut f32) {
-        // SAFETY: the caller promises AVX-512, and `to` is good for 16 floats; the instruction needs no alignment.
+        // SAFETY: the caller promises AVX-512, and `to` is valid for 16 floats; the instruction needs no alignment.
         unsafe { _mm512_storeu_ps(to, self.0) }
     }
     #[inline(always)]
     unsafe fn store_first(self, to: *mut f32, len: usize) {
-        // SAFETY: the caller promises AVX-512, and `to` is good for `len` floats: the masked store writes no others.
+        // SAFETY: the caller promises AVX-512, and `to` is valid for `len` floats: the masked store writes no others.
         unsafe { _mm512_mask_storeu_ps(to, first_mask(len), self.0) }
     }
     #[inline(always)]
@@ -121,7 +122,7 @@ impl Lanes for Zmm {
     }
     #[inline(always)]
     unsafe fn relu(self) -> Self {
-        // The second operand is what comes out where either is NaN.
+        // If either operand is NaN, the result is the second operand.
         // SAFETY: the caller promises AVX-512; no memory is touched.
         unsafe { Self(_mm512_max_ps(_mm512_setzero_ps(), self.0)) }
     }
@@ -200,7 +201,7 @@ impl Lanes for Ymm2 {
     }
 }
 
-/// An array, which compilers turn into the vectors of the machine.
+/// An array, which compilers translate to the vectors of the machine.
 #[derive(Clone, Copy)]
 pub(crate) struct Plain([f32; LANES]);
 
@@ -225,12 +226,12 @@ impl Lanes for Plain {
     }
     #[inline(always)]
     unsafe fn load(from: *const f32) -> Self {
-        // SAFETY: good for 16 floats by the caller's promise; arrays of floats need no more alignment.
+        // SAFETY: valid for 16 floats by the caller's promise; arrays of floats need no more alignment.
         unsafe { Self(*from.cast::<[f32; LANES]>()) }
     }
     #[inline(always)]
     unsafe fn store(self, to: *mut f32) {
-        // SAFETY: good for 16 floats by the caller's promise.
+        // SAFETY: valid for 16 floats by the caller's promise.
         unsafe { *to.cast::<[f32; LANES]>() = self.0 };
     }
     #[inline(always)]

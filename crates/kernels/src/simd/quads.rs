@@ -1,5 +1,5 @@
 //! Lanes of four vectors of 128 bits: NEON's on aarch64, and WebAssembly's. Their presence is fixed when a kernel is
-//! compiled, so that their intrinsics need no runtime check.
+//! compiled, so their intrinsics need no runtime check.
 
 use super::lanes::Lanes;
 
@@ -44,7 +44,7 @@ mod vector {
         unsafe { vfmaq_f32(summand, a, factor) }
     }
 
-    /// The instruction gives a NaN if either operand is one.
+    /// ReLU; the instruction gives a NaN if either operand is one.
     #[inline(always)]
     pub(super) fn relu(a: Vector) -> Vector {
         // SAFETY: every aarch64 has NEON; no memory is touched.
@@ -82,7 +82,7 @@ mod vector {
     pub(super) const ROWS: usize = 2;
 
     /// # Safety
-    /// `from` is good for four floats.
+    /// `from` is valid for four floats.
     #[inline(always)]
     pub(super) unsafe fn load(from: *const f32) -> Vector {
         // SAFETY: the caller's promise; the instruction needs no alignment.
@@ -90,7 +90,7 @@ mod vector {
     }
 
     /// # Safety
-    /// `to` is good for four floats.
+    /// `to` is valid for four floats.
     #[inline(always)]
     pub(super) unsafe fn store(to: *mut f32, vector: Vector) {
         // SAFETY: the caller's promise; the instruction needs no alignment.
@@ -151,13 +151,13 @@ impl Lanes for Quads {
     #[inline(always)]
     unsafe fn load(from: *const f32) -> Self {
         use vector::load;
-        // SAFETY: good for 16 floats by the caller's promise; the instruction needs no alignment.
+        // SAFETY: valid for 16 floats by the caller's promise; the instruction needs no alignment.
         unsafe { Self([load(from), load(from.add(4)), load(from.add(8)), load(from.add(12))]) }
     }
     #[inline(always)]
     unsafe fn store(self, to: *mut f32) {
         for (idx, vector) in self.0.into_iter().enumerate() {
-            // SAFETY: good for 16 floats by the caller's promise; the instruction needs no alignment.
+            // SAFETY: valid for 16 floats by the caller's promise; the instruction needs no alignment.
             unsafe { vector::store(to.add(4 * idx), vector) };
         }
     }

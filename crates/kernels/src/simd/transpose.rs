@@ -1,4 +1,4 @@
-//! Transposition between channels first and channels last.
+//! Transposes maps between channels first and channels last.
 
 use super::isa::Isa;
 

@@ -11,10 +11,11 @@ use super::material::Material;
 use super::shape::Shape;
 use crate::random::Draw;
 
-/// Minimum radius of a wire as a share of the part's size: in a photo, thinner ones break into pieces.
+/// Minimum radius of a wire as a fraction of the part's size: in a photo, thinner wires break into
+/// pieces.
 const MIN_WIRE_SHARE: f32 = 0.018;
 
-/// Draws a bent wire or tube with straight legs, eyes, sleeves and fittings, or a coil.
+/// Samples a bent wire or tube with straight legs, eyes, sleeves and fittings, or a coil.
 pub(super) fn draw_wire(rng: &mut Pcg64Mcg) -> Recipe {
     let mut builder = Builder::new(Material::draw(rng));
     let size = rng.log_uniform(40.0, 190.0);
@@ -65,7 +66,7 @@ pub(super) fn draw_wire(rng: &mut Pcg64Mcg) -> Recipe {
     builder.finish(rng)
 }
 
-/// Straight legs joined by arcs.
+/// Centre line of straight legs joined by arcs.
 fn bends(size: f32, radius: f32, rng: &mut Pcg64Mcg) -> Vec<[f32; 3]> {
     let num_bends = rng.whole(1, 6);
     let (mut at, mut heading) = ([0.0f32, 0.0f32], 0.0f32);
@@ -101,7 +102,7 @@ fn bends(size: f32, radius: f32, rng: &mut Pcg64Mcg) -> Vec<[f32; 3]> {
     points
 }
 
-/// Where the line approaches an earlier strand, it is raised over it.
+/// Raises the line where it approaches an earlier strand.
 fn lift_crossings(points: &mut [[f32; 3]], radius: f32) {
     for i in 2..points.len() {
         let clash = (0..i - 1).any(|j| {
@@ -116,7 +117,7 @@ fn lift_crossings(points: &mut [[f32; 3]], radius: f32) {
     }
 }
 
-/// A helical spring lying on its side, with straight ends.
+/// Centre line of a helical spring lying on its side, with straight ends.
 fn coil(size: f32, radius: f32, rng: &mut Pcg64Mcg) -> Vec<[f32; 3]> {
     let turns = rng.whole(3, 8);
     let wire = radius.min(0.03 * size);
@@ -131,7 +132,7 @@ fn coil(size: f32, radius: f32, rng: &mut Pcg64Mcg) -> Vec<[f32; 3]> {
     points
 }
 
-/// Centres the line and bounds its size.
+/// Centres the line and limits its size.
 fn fit(points: &mut [[f32; 3]], size: f32) {
     let (mut low, mut high) = ([f32::MAX; 2], [f32::MIN; 2]);
     for p in points.iter() {
@@ -149,7 +150,7 @@ fn fit(points: &mut [[f32; 3]], size: f32) {
     }
 }
 
-/// Draws a bracket: a base with walls bent up, steps bent down, slopes and holes.
+/// Samples a bracket: a base with walls bent up, steps bent down, slopes and holes.
 pub(super) fn draw_sheet(rng: &mut Pcg64Mcg) -> Recipe {
     let mut builder = Builder::new(Material::draw(rng));
     let inner = builder.material(Material::metal(rng));

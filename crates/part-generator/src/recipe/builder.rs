@@ -18,7 +18,7 @@ pub(super) struct Builder {
 }
 
 impl Builder {
-    /// A recipe with a body of `material`.
+    /// Starts a recipe with a body of `material`.
     pub fn new(material: Material) -> Self {
         Self { materials: vec![material], features: Vec::new(), taken: Vec::new(), group: 0 }
     }
@@ -44,12 +44,12 @@ impl Builder {
         self.push(shape, center, turn, Operation::Add { bottom: 0.0, top, edge }, material);
     }
 
-    /// A hole through everything, or a pocket down to `floor`.
+    /// Cuts a hole through everything, or a pocket down to `floor`.
     pub fn cut(&mut self, shape: Shape, center: [f32; 2], turn: f32, floor: f32, chamfer: f32, material: u8) {
         self.push(shape, center, turn, Operation::Cut { floor, chamfer, machined: false }, material);
     }
 
-    /// The current surface above a point.
+    /// The surface above a point, as built so far.
     pub fn state_at(&self, x: f32, y: f32) -> State {
         let mut state = State::EMPTY;
         self.features.iter().for_each(|feature| feature.prepare().apply(x, y, &mut state));
@@ -61,13 +61,13 @@ impl Builder {
         self.taken.push([center[0], center[1], radius]);
     }
 
-    /// The bounding box of everything added.
+    /// The bounding box of all features so far.
     pub fn bounds(&self) -> [f32; 4] {
         let whole = Recipe { materials: Vec::new(), features: self.features.clone(), grain_seed: 0 };
         whole.bounds()
     }
 
-    /// A random free place on level ground of `radius`, which is reserved.
+    /// Reserves and returns a random free circle of `radius` on level ground.
     pub fn room(&mut self, radius: f32, rng: &mut Pcg64Mcg) -> Option<[f32; 2]> {
         let b = self.bounds();
         for _ in 0..40 {
@@ -97,7 +97,8 @@ impl Builder {
             })
     }
 
-    /// A few lines of marks that look like print, in a frame with half size `half` around `center`.
+    /// Adds a few lines of marks that look like print, in a frame with half size `half` around
+    /// `center`.
     pub fn print(&mut self, center: [f32; 2], turn: f32, half: [f32; 2], material: u8, rng: &mut Pcg64Mcg) {
         let (sin, cos) = turn.sin_cos();
         let lines = rng.whole(1, 3);

@@ -11,7 +11,7 @@ use super::material::Material;
 use super::shape::Shape;
 use crate::random::Draw;
 
-/// Draws a casting.
+/// Samples a casting.
 pub(super) fn draw_cast(rng: &mut Pcg64Mcg) -> Recipe {
     let surface = match rng.whole(0, 4) {
         0..=2 => Material::cast(rng),
@@ -110,7 +110,7 @@ pub(super) fn draw_cast(rng: &mut Pcg64Mcg) -> Recipe {
     builder.finish(rng)
 }
 
-/// Draws a moulded body: a box, grip or cap with recesses, ribs, inserts, screws and print.
+/// Samples a moulded body: a box, grip or cap with recesses, ribs, inserts, screws and print.
 pub(super) fn draw_moulded(rng: &mut Pcg64Mcg) -> Recipe {
     let surface = if rng.chance(0.35) { Material::black(rng) } else { Material::plastic(rng) };
     let mut builder = Builder::new(surface);

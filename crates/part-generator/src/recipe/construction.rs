@@ -8,7 +8,7 @@ use super::material::Material;
 /// The part's frame has x right, y down as seen from above, z up from the table.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Recipe {
-    /// The materials; features name them by index.
+    /// The materials; features refer to them by index.
     pub materials: Vec<Material>,
     /// The features in the order in which they are applied.
     pub features: Vec<Feature>,

@@ -9,7 +9,7 @@ use super::material::Material;
 use super::shape::Shape;
 use crate::random::Draw;
 
-/// Draws an object of about `size` millimetres that can cover a part.
+/// Samples an object of about `size` millimetres that can cover a part.
 pub(crate) fn cover(size: f32, rng: &mut Pcg64Mcg) -> Recipe {
     let half = 0.5 * size;
     match rng.whole(0, 3) {

@@ -5,9 +5,9 @@ use super::shape::Shape;
 /// The surface above a point of the table: material between `bottom` and `top`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct State {
-    /// Highest point in millimetres; not positive if there is no material.
+    /// Highest point, in millimetres; not positive if there is no material.
     pub top: f32,
-    /// Lowest point.
+    /// Lowest point, in millimetres.
     pub bottom: f32,
     /// Index of the material.
     pub material: u8,
@@ -69,9 +69,9 @@ impl Edge {
 /// A section of a turned part with varying radius.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Ripple {
-    /// Its start on the axis.
+    /// Start on the axis.
     pub from: f32,
-    /// Its end on the axis.
+    /// End on the axis.
     pub to: f32,
     /// Length of one period: a thread's pitch.
     pub pitch: f32,
@@ -84,9 +84,9 @@ pub(crate) struct Ripple {
 /// How a turned section differs from a cylinder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum RippleKind {
-    /// A helix of the pitch, right-handed.
+    /// A right-handed helix with the given pitch.
     Thread,
-    /// A helix of the pitch, left-handed: the mirror image of a thread.
+    /// A left-handed helix with the given pitch: the mirror image of a thread.
     LeftThread,
     /// Valleys along the axis.
     Knurl,
@@ -158,7 +158,7 @@ pub(crate) enum Operation {
 }
 
 impl Operation {
-    /// Whether it adds material to empty points.
+    /// Whether the operation adds material to empty points.
     pub fn adds(&self) -> bool {
         matches!(self, Self::Add { .. } | Self::Blend { .. } | Self::Slope { .. } | Self::Tube | Self::Turned { .. })
     }
@@ -171,7 +171,7 @@ pub(crate) struct Feature {
     pub shape: Shape,
     /// Position of its origin in the part's frame.
     pub center: [f32; 2],
-    /// Its rotation, in radians from x to y.
+    /// Rotation, in radians from x to y.
     pub turn: f32,
     /// The operation.
     pub operation: Operation,
@@ -186,7 +186,7 @@ pub(crate) struct Feature {
 pub(crate) struct Prepared<'a> {
     feature: &'a Feature,
     sin_cos: [f32; 2],
-    /// Square of the distance beyond which it has no effect.
+    /// Square of the distance beyond which the feature has no effect.
     reach_squared: f32,
 }
 
@@ -244,8 +244,8 @@ impl Feature {
                 if let Shape::Path { radius, .. } = &self.shape {
                     let across = distance + radius;
                     let rise = (radius * radius - across * across).max(0.0).sqrt();
-                    // Only one layer is stored above a point: a raised strand is filled down to the table, otherwise
-                    // the material below it would be lost and the part would fall apart.
+                    // Only one layer is stored above a point. A raised strand is filled down to the table; otherwise
+                    // the material below it would be lost, and the part would fall apart.
                     let bottom = if z > 1.6 * radius { 0.0 } else { (z - rise).max(0.0) };
                     state.fill(bottom, z + rise, self.material);
                 }

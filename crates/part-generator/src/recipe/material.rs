@@ -16,7 +16,7 @@ pub(crate) enum Brushing {
     Around,
 }
 
-/// The look of a surface.
+/// The appearance of a surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Material {
     /// Diffuse reflectance of each channel.
@@ -36,7 +36,7 @@ pub(crate) struct Material {
 }
 
 impl Material {
-    /// A random material of a part.
+    /// Samples a material of a part.
     pub fn draw(rng: &mut Pcg64Mcg) -> Self {
         match rng.whole(0, 9) {
             0..=2 => Self::metal(rng),

@@ -24,7 +24,7 @@ pub(crate) use shape::Shape;
 use crate::part_kind::PartKind;
 
 impl Recipe {
-    /// Draws a part of a kind.
+    /// Samples a part of a kind.
     pub fn draw(kind: PartKind, rng: &mut Pcg64Mcg) -> Self {
         match kind {
             PartKind::Stamping => stamping::draw(rng),

@@ -5,7 +5,7 @@
 pub(crate) enum Shape {
     /// A circle.
     Disc {
-        /// In millimetres, about the origin.
+        /// Radius in millimetres, around the origin.
         radius: f32,
     },
     /// A rectangle with rounded corners.
@@ -24,7 +24,7 @@ pub(crate) enum Shape {
     },
     /// A circle whose radius varies with the direction: gears, knobs, knurls.
     Lobed {
-        /// Mean over all directions, in millimetres.
+        /// Mean radius over all directions, in millimetres.
         radius: f32,
         /// Number of lobes.
         lobes: u32,
@@ -43,7 +43,8 @@ pub(crate) enum Shape {
 }
 
 impl Shape {
-    /// Signed distance of a point, and the height of the centre line there (0 for shapes other than paths).
+    /// Signed distance of a point, and the height of the nearest point of the centre line (0 for shapes other than
+    /// paths).
     pub fn locate(&self, x: f32, y: f32) -> (f32, f32) {
         match self {
             Self::Disc { radius } => ((x * x + y * y).sqrt() - radius, 0.0),
@@ -81,8 +82,8 @@ impl Shape {
         match self {
             Self::Polygon { vertices, .. } => vertices.iter_mut().for_each(|v| v[0] = -v[0]),
             Self::Path { points, .. } => points.iter_mut().for_each(|p| p[0] = -p[0]),
-            // A lobe points along x. With an even number of lobes the shape is its own mirror image; with an odd number
-            // it is turned by half a turn, which the feature's turn compensates.
+            // A lobe points along x. With an even number of lobes the shape is its own mirror image. With an odd number
+            // its mirror image is rotated by 180°, which the feature's `turn` compensates.
             Self::Disc { .. } | Self::Rectangle { .. } | Self::Lobed { .. } => {}
         }
     }
@@ -106,8 +107,8 @@ fn polygon_distance(vertices: &[[f32; 2]], x: f32, y: f32) -> f32 {
     if inside { -nearest.sqrt() } else { nearest.sqrt() }
 }
 
-/// Distance to an open line, and the height of its centre at the nearest point within `radius`: where the line crosses
-/// itself, the upper strand counts.
+/// Distance to an open line, and the height of its nearest point within `radius`: where the line crosses itself, the
+/// upper strand counts.
 fn path_distance(points: &[[f32; 3]], radius: f32, x: f32, y: f32) -> (f32, f32) {
     let (mut best, mut best_z, mut best_top) = (f32::MAX, 0.0, f32::MIN);
     for ends in points.windows(2) {

@@ -11,7 +11,7 @@ use super::material::Material;
 use super::shape::Shape;
 use crate::random::Draw;
 
-/// Draws a stamping.
+/// Samples a stamping.
 pub(super) fn draw(rng: &mut Pcg64Mcg) -> Recipe {
     let mut builder = Builder::new(Material::draw(rng));
     let inner = builder.material(Material::metal(rng));
@@ -56,7 +56,7 @@ pub(super) fn draw(rng: &mut Pcg64Mcg) -> Recipe {
     builder.finish(rng)
 }
 
-/// The blank, from which the rest is cut.
+/// Adds the blank, from which everything else is cut.
 fn outline(builder: &mut Builder, size: f32, top: f32, edge: Edge, rng: &mut Pcg64Mcg) {
     let mut add = |shape: Shape, center: [f32; 2], turn: f32| builder.add(shape, center, turn, top, edge, 0);
     let half = 0.5 * size;
@@ -194,7 +194,7 @@ fn bolt_circle(builder: &mut Builder, size: f32, material: u8, rng: &mut Pcg64Mc
     }
 }
 
-/// A hole, a slot, a window, a polygon, or a pocket.
+/// Cuts a hole, a slot, a window, a polygon, or a pocket.
 fn opening(builder: &mut Builder, size: f32, thickness: f32, material: u8, rng: &mut Pcg64Mcg) {
     let reach = size * rng.log_uniform(0.02, 0.12);
     let Some(center) = builder.room(reach * 1.2, rng) else { return };
@@ -214,7 +214,7 @@ fn opening(builder: &mut Builder, size: f32, thickness: f32, material: u8, rng: 
     builder.cut(shape, center, turn, floor, chamfer, material);
 }
 
-/// A cut from the edge inwards.
+/// Cuts from the edge inwards.
 fn notch(builder: &mut Builder, size: f32, material: u8, rng: &mut Pcg64Mcg) {
     let b = builder.bounds();
     let reach = size * rng.uniform(0.03, 0.1);
@@ -244,7 +244,7 @@ fn emboss(builder: &mut Builder, size: f32, thickness: f32, rng: &mut Pcg64Mcg) 
     builder.push(shape, center, rng.angle(), Operation::Emboss { by, width: (0.5 * short).max(0.6) }, 0);
 }
 
-/// A rivet, stud or welded nut.
+/// Adds a rivet, stud or welded nut.
 fn stud(builder: &mut Builder, size: f32, thickness: f32, rng: &mut Pcg64Mcg) {
     let radius = (size * rng.uniform(0.025, 0.07)).clamp(1.5, 7.0);
     let Some(center) = builder.room(radius * 1.2, rng) else { return };

@@ -11,7 +11,7 @@ use super::material::Material;
 use super::shape::Shape;
 use crate::random::Draw;
 
-/// Draws a stepped shaft with grooves, threads, flats and cross holes, of one or several materials.
+/// Samples a stepped shaft with grooves, threads, flats and cross holes, of one or several materials.
 pub(super) fn draw_lying(rng: &mut Pcg64Mcg) -> Recipe {
     let surface = if rng.chance(0.5) { Material::metal(rng) } else { Material::draw(rng) };
     let mut builder = Builder::new(surface);
@@ -88,7 +88,7 @@ pub(super) fn draw_lying(rng: &mut Pcg64Mcg) -> Recipe {
     builder.finish(rng)
 }
 
-/// A cylinder or cone with its cuts.
+/// Adds a cylinder or cone with its cuts.
 fn section(builder: &mut Builder, from: f32, to: f32, radius: f32, axis_z: f32, moves: bool, rng: &mut Pcg64Mcg) {
     let material = match rng.whole(0, 5) {
         0 => builder.material(Material::draw(rng)),
@@ -128,7 +128,7 @@ fn section(builder: &mut Builder, from: f32, to: f32, radius: f32, axis_z: f32, 
     builder.push(shape, [0.0; 2], 0.0, Operation::Turned { profile, axis_z, ripples }, material);
 }
 
-/// Draws a ring, flange, pulley, gear, nut or knob seen from above.
+/// Samples a ring, flange, pulley, gear, nut or knob seen from above.
 pub(super) fn draw_standing(rng: &mut Pcg64Mcg) -> Recipe {
     let surface = match rng.whole(0, 3) {
         0 | 1 => Material::turned(rng),

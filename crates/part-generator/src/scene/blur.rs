@@ -10,7 +10,7 @@ pub(crate) fn pad_row(row: &[f32], reach: usize, padded: &mut [f32]) {
     }
 }
 
-/// A Gaussian blur, along one axis after the other; `spare` has the length of the picture.
+/// Blurs a picture by a Gaussian, first along one axis, then along the other; `spare` has the length of the picture.
 pub(crate) fn blur(light: &mut [[f32; 3]], spare: &mut [[f32; 3]], width: usize, sigma: f32) {
     let height = light.len() / width;
     let reach = ((2.3 * sigma).ceil() as usize).clamp(1, 12);

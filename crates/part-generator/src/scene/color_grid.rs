@@ -5,8 +5,8 @@ use crate::tiles::floor;
 /// The values of `cells`, with `width` cells per row, at `(x, y)`, in cells from the first cell's centre. Beyond the
 /// outermost centres, the outermost values are used.
 ///
-/// Separate from the interpolation of `sdg-shape`: four floats per cell, which compilers vectorise, and no failure
-/// outside.
+/// Separate from the interpolation of `sdg-shape`: this one has four floats per cell, which compilers vectorise, and
+/// is defined everywhere.
 #[inline(always)]
 pub(super) fn bilinear(cells: &[[f32; 4]], [width, height]: [usize; 2], x: f32, y: f32) -> [f32; 4] {
     let x = x.max(0.01).min(width as f32 - 1.01);

@@ -18,14 +18,16 @@ use super::view::View;
 use crate::Part;
 use crate::random::Draw;
 
-/// Maximum size ratio, in both directions, between other parts and the part, if a few draws find such a part.
+/// Maximum ratio of sizes between other parts and the part, in both directions, if a few draws find such a
+/// part.
 pub(super) const SIZE_RATIO: f64 = 1.8;
 
-/// The number of these draws.
+/// Maximum number of draws for a part of suitable size.
 const MAX_SIZE_DRAWS: usize = 6;
 
 impl Scenes {
-    /// Draws camera, light, table, and positions: first of the instances, then of the others with their kinds.
+    /// Samples camera, light, table, and positions: first of the instances, then of the other objects, with
+    /// their kinds.
     pub(super) fn compose(&self, part_idx: usize, rng: &mut Pcg64Mcg) -> (Scene, Vec<OtherKind>, usize, Conditions) {
         let (config, subject) = (&self.config, &self.subjects[part_idx]);
         let (view, conditions) = self.draw_view(subject, rng);
@@ -49,7 +51,7 @@ impl Scenes {
         (finish(view, bodies, conditions.glare, rng), kinds, num_instances, conditions)
     }
 
-    /// Draws the camera and the picture's difficulties.
+    /// Samples the camera and the conditions of the picture.
     pub(super) fn draw_view(&self, subject: &Subject, rng: &mut Pcg64Mcg) -> (View, Conditions) {
         let config = &self.config;
         let chance = |rng: &mut Pcg64Mcg, p: f64| rng.chance(p as f32);
@@ -79,7 +81,7 @@ impl Scenes {
         (view, conditions)
     }
 
-    /// Places other parts beside the instances and covers over them; returns their kinds.
+    /// Places other parts beside the instances, and covers on them; returns their kinds.
     pub(super) fn place_others(
         &self,
         subject: &Subject,
@@ -127,7 +129,7 @@ impl Scenes {
             return (OtherKind::LookAlike(*kind), part.clone());
         }
         let pool = if self.others.is_empty() { std::slice::from_ref(&subject.part) } else { &self.others[..] };
-        // Other objects are about as large as the part, otherwise the picture would show little else.
+        // Other objects have about the size of the part; otherwise the picture would show little else.
         let mut best = &pool[rng.whole(0, pool.len() - 1)];
         let ratio = |other: &Arc<Part>| (other.diagonal_mm() / subject.part.diagonal_mm()).ln().abs();
         for _ in 0..MAX_SIZE_DRAWS {
@@ -171,7 +173,7 @@ impl Scenes {
     }
 }
 
-/// Draws light and table for the placed bodies.
+/// Samples light and table for the placed bodies.
 pub(super) fn finish(view: View, bodies: Vec<Placement>, glare: bool, rng: &mut Pcg64Mcg) -> Scene {
     let far_shadow = (glare && rng.chance(0.5) || rng.chance(0.12)).then(|| {
         let (sin, cos) = rng.angle().sin_cos();

@@ -2,7 +2,7 @@
 
 use crate::{GeneratorError, PhotoConfig, Result};
 
-/// A single difficulty.
+/// A single condition of scenes that makes detection difficult.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Condition {
@@ -68,24 +68,24 @@ impl Condition {
     }
 }
 
-/// Properties of scenes: probabilities and ranges. Every picture is drawn from all of them independently.
+/// Properties of scenes: probabilities and ranges, sampled independently for every picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SceneConfig {
-    /// Width, in pixels.
+    /// Width of the picture, in pixels.
     pub width: u32,
-    /// Height, in pixels.
+    /// Height of the picture, in pixels.
     pub height: u32,
-    /// The demonstration that the truth refers to.
+    /// Settings of the demonstration's photo, to which the ground truth refers.
     pub photo: PhotoConfig,
     /// Seed of the demonstration's photo.
     pub photo_seed: u64,
-    /// Share of pictures without the part.
+    /// Fraction of pictures without the part.
     pub absent_share: f64,
     /// Minimum and maximum number of instances, if the part is present.
     pub instances: [usize; 2],
     /// Minimum and maximum number of other parts.
     pub others: [usize; 2],
-    /// Share of the other parts that are look-alikes.
+    /// Fraction of the other parts that are look-alikes.
     pub look_alike_share: f64,
     /// Probability that another part touches an instance.
     pub touch_probability: f64,
@@ -97,7 +97,7 @@ pub struct SceneConfig {
     pub tilt_probability: f64,
     /// Probability that a part is covered.
     pub cover_probability: f64,
-    /// Range of the covered share of the part.
+    /// Range of the covered fraction of the part.
     pub cover_share: [f64; 2],
     /// Probability of little light and much noise.
     pub dark_probability: f64,
@@ -111,14 +111,14 @@ pub struct SceneConfig {
     pub glare_probability: f64,
     /// Probability that the picture is compressed as JPEG.
     pub jpeg_probability: f64,
-    /// Minimum share of a part's silhouette inside the picture when it is placed.
+    /// Minimum fraction of a part's silhouette inside the picture when it is placed.
     pub min_inside_share: f64,
     /// Number of other parts to choose from.
     pub num_other_parts: usize,
 }
 
 impl Default for SceneConfig {
-    /// All difficulties at once, each in some of the pictures.
+    /// All conditions at once, each in some of the pictures.
     fn default() -> Self {
         Self {
             width: 320,
@@ -148,7 +148,7 @@ impl Default for SceneConfig {
 }
 
 impl SceneConfig {
-    /// A single difficulty, in every picture.
+    /// A single condition, in every picture.
     pub fn only(condition: Condition) -> Self {
         let nominal = Self {
             absent_share: 0.0,

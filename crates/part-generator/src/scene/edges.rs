@@ -1,4 +1,4 @@
-//! Antialiasing: pixels on edges are drawn from several samples.
+//! Antialiasing: pixels on edges are rendered from several samples.
 
 use super::contents::{Scene, TABLE};
 use super::placement::Contact;
@@ -32,8 +32,8 @@ fn is_like(a: &Contact, b: &Contact, step: f32) -> bool {
     (a.z - b.z).abs() <= step && a.texel.material == b.texel.material && a.is_on_wall() == b.is_on_wall()
 }
 
-/// Redraws pixels on edges: the contact of each sample is computed; its light is taken from a neighbouring pixel that
-/// shows the same piece, if there is one.
+/// Renders pixels on edges again: it computes the contact of each sample and takes its light from a neighbouring
+/// pixel that shows the same piece, if there is one.
 pub(crate) fn smooth_edges(
     scene: &Scene,
     seen: &Seen,
@@ -57,7 +57,7 @@ pub(crate) fn smooth_edges(
     }
     let mut table_row = TableRow::default();
     let mut drawn: Vec<(usize, [f32; 3])> = Vec::new();
-    // Their row in the picture, and for each body its lines of sight at the samples' heights.
+    // The pixels' row in the picture, and for each body its lines of sight at the samples' heights.
     let (mut rows_at, mut rows) = (usize::MAX, Vec::new());
     for (idx, _) in on_edge.iter().enumerate().filter(|(_, on_edge)| **on_edge) {
         let (x, y) = (idx % width, idx / width);

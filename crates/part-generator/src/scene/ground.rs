@@ -12,20 +12,20 @@ pub(crate) struct Ground {
     width: usize,
     height: usize,
     tops: Vec<f32>,
-    /// Heights blurred over some millimetres: the amount of material around a place.
+    /// Heights blurred over some millimetres: the amount of material around a position.
     blurred: Vec<f32>,
-    /// Light on the table: red, green, blue, and a factor of reflections.
+    /// Light on the table: red, green, blue, and a factor for reflections.
     table_light: Vec<[f32; 4]>,
 }
 
-/// Height below which a place is in shadow, for several directions of one lamp.
+/// Height below which a position is in shadow, for several directions of one lamp.
 pub(crate) struct Shadow {
     /// For each cell, the heights for the lamp's directions.
     heights: Vec<[f32; SWEEPS]>,
     inverse_softness: f32,
 }
 
-/// Directions that sample a lamp's width: shares of its radius sideways and upwards.
+/// Directions that sample a lamp's width: fractions of its radius sideways and upwards.
 const LAMP_DIRECTIONS: [[f32; 2]; SWEEPS] = [[0.7, 0.5], [-0.7, 0.5], [0.0, -0.9], [0.0, 0.0]];
 
 /// Number of sweeps.
@@ -49,7 +49,7 @@ impl Ground {
         }
     }
 
-    /// The cell of a place; `None` outside.
+    /// The cell of a position; `None` outside.
     #[inline(always)]
     pub fn index(&self, [x, y]: [f32; 2]) -> Option<usize> {
         let (gx, gy) = ((x - self.min[0]) * self.inverse_cell, (y - self.min[1]) * self.inverse_cell);
@@ -57,7 +57,7 @@ impl Ground {
         inside.then(|| floor(gy).max(0) as usize * self.width + floor(gx).max(0) as usize)
     }
 
-    /// Calls `visit` with (index of the cell, top of the body there) for the cells covered by a body.
+    /// Calls `visit` with the index of each cell covered by a body, and the top of the body in that cell.
     fn cells(&self, body: &Placement, cell: f32, mut visit: impl FnMut(usize, f32)) {
         let relief = &body.part.relief;
         let level = relief.level_for(cell);
@@ -81,7 +81,7 @@ impl Ground {
         self.tops = tops;
     }
 
-    /// The highest point under a body, and the share of its cells above other bodies.
+    /// The highest point under a body, and the fraction of its cells above other bodies.
     pub fn under(&self, body: &Placement) -> (f32, f32) {
         let (mut highest, mut shared, mut count) = (0.0f32, 0usize, 0usize);
         self.cells(body, 2.0 * self.cell, |idx, _| {
@@ -123,7 +123,7 @@ impl Ground {
         self.blurred = blurred;
     }
 
-    /// Share of the ambient light that reaches height `z` above a cell: less beside and between bodies.
+    /// Fraction of the ambient light that reaches height `z` above a cell; it is smaller beside and between bodies.
     #[inline(always)]
     pub fn openness(&self, cell: Option<usize>, z: f32, radius: f32) -> f32 {
         open_share(cell.map_or(0.0, |idx| self.blurred[idx]), z, radius)
@@ -151,13 +151,13 @@ impl Ground {
         let (stride, stride_across) = if along_x { (1, self.width) } else { (self.width, 1) };
         let lean = minor / major.abs();
         let fall = self.cell / major.abs() * slope;
-        // A line of cells across the direction of propagation: the maximum of the height there and of the shadow. Two
-        // extra cells at both ends, since the lean of -1 to 1 reads beyond.
+        // A line of cells across the direction of propagation: the maximum of the cell's height and of the shadow. It
+        // has two extra cells at both ends, because a lean of -1 to 1 reads beyond the ends.
         let (mut before, mut line) = (vec![0.0f32; across + 4], vec![0.0f32; across]);
         let shift = lean.floor();
         let share = lean - shift;
         let first = (2 + shift as i32) as usize;
-        // From the lit side to the other.
+        // From the lit side to the opposite side.
         for step in 0..count {
             let at = if major > 0.0 { count - 1 - step } else { step };
             for ((carried, a), b) in line.iter_mut().zip(&before[first..]).zip(&before[first + 1..]) {
@@ -182,14 +182,14 @@ impl Ground {
         }
     }
 
-    /// Share of a lamp's light that reaches height `z` above a cell.
+    /// Fraction of a lamp's light that reaches height `z` above a cell.
     #[inline(always)]
     pub fn light(&self, shadow: &Shadow, cell: Option<usize>, z: f32) -> f32 {
         cell.map_or(1.0, |idx| shadow.light_at(idx, z))
     }
 
-    /// Prepares the light on the table: `light` gets the place and the shares of ambient light and of each lamp, and
-    /// returns red, green, blue and a factor of reflections.
+    /// Prepares the light on the table: `light` gets a position and the fractions of the ambient light and of each
+    /// lamp, and returns red, green, blue and a factor for reflections.
     pub fn light_table(&mut self, radius: f32, shadows: &[Shadow], light: impl Fn([f32; 2], f32, &[f32]) -> [f32; 4]) {
         let mut reached = vec![1.0; shadows.len()];
         let mut made = Vec::with_capacity(self.tops.len());
@@ -213,7 +213,7 @@ impl Ground {
     }
 }
 
-/// Share of the ambient light that reaches height `z` if the surroundings have the height `around`.
+/// Fraction of the ambient light that reaches height `z` if the surroundings have the height `around`.
 #[inline(always)]
 fn open_share(around: f32, z: f32, radius: f32) -> f32 {
     1.0 - 0.55 * ((around - z) / (0.7 * radius)).clamp(0.0, 1.0)

@@ -1,4 +1,4 @@
-//! Positions of objects: space for parts, touching neighbours, covers.
+//! Positions of objects: free positions for parts, touching neighbours, covers.
 
 use std::sync::Arc;
 
@@ -13,14 +13,14 @@ use crate::random::Draw;
 /// Number of positions tried for each part.
 const MAX_TRIES: usize = 24;
 
-/// Maximum share of a part's cells over another part.
+/// Maximum fraction of a part's cells over another part.
 const MAX_OVERLAP: f32 = 0.0;
 
 /// The table while objects are placed on it.
 pub(crate) struct Layout<'a> {
     view: &'a View,
     ground: Ground,
-    /// In the order of placement.
+    /// The bodies, in the order of placement.
     pub bodies: Vec<Placement>,
 }
 
@@ -32,7 +32,8 @@ impl<'a> Layout<'a> {
         Self { view, ground: Ground::new(bounds, 2.0 * view.mm_per_px()), bodies: Vec::new() }
     }
 
-    /// Places a part on a free position with at least a share of its box inside the picture.
+    /// Places a part at a free position where at least the fraction `min_inside` of its box
+    /// is inside the picture.
     pub fn lay(&mut self, part: &Arc<Part>, min_inside: f32, rng: &mut Pcg64Mcg) -> bool {
         let (w, h) = (self.view.width as f32, self.view.height as f32);
         for _ in 0..MAX_TRIES {
@@ -46,7 +47,7 @@ impl<'a> Layout<'a> {
         false
     }
 
-    /// Pushes a part against a body until they touch.
+    /// Moves a part towards a body until they touch.
     pub fn lay_touching(&mut self, part: &Arc<Part>, neighbour: usize, rng: &mut Pcg64Mcg) -> bool {
         let middle = self.middle(neighbour);
         let step = 1.5 * self.view.mm_per_px();
@@ -71,7 +72,7 @@ impl<'a> Layout<'a> {
         false
     }
 
-    /// Places a cover over a body so that about `share` of it is covered.
+    /// Places a cover on a body so that about the fraction `share` of it is covered.
     pub fn cover(&mut self, cover: &Arc<Part>, covered: usize, share: f32, rng: &mut Pcg64Mcg) -> bool {
         let points = self.cells_of(covered);
         let middle = self.middle(covered);
@@ -135,7 +136,7 @@ impl<'a> Layout<'a> {
         places
     }
 
-    /// Share of a body's outline inside the picture.
+    /// Fraction of a body's outline inside the picture.
     fn inside(&self, body: &Placement) -> f32 {
         let vertices = &body.part.outline.vertices;
         let (w, h) = (self.view.width as f32, self.view.height as f32);

@@ -9,7 +9,7 @@ use crate::recipe::Material;
 /// Side of the map of reflections.
 const SIDE: usize = 32;
 
-/// Blur of the maps, in texels: from a mirror to a matt surface.
+/// Blur of the maps, in texels, from a mirror to a matt surface.
 const BLURS: [f32; 4] = [0.0, 1.0, 2.7, 6.0];
 
 /// A lamp at infinite distance.
@@ -17,11 +17,11 @@ const BLURS: [f32; 4] = [0.0, 1.0, 2.7, 6.0];
 pub(crate) struct Lamp {
     /// Unit vector towards the lamp, z up.
     pub direction: [f32; 3],
-    /// Light scattered by a white surface that faces it.
+    /// Light scattered by a white surface that faces the lamp.
     pub color: [f32; 3],
-    /// Its angular radius, in radians.
+    /// Angular radius of the lamp, in radians.
     pub radius: f32,
-    /// Strength of its reflection in glossy surfaces.
+    /// Strength of the lamp's reflection in glossy surfaces.
     pub glare: f32,
 }
 
@@ -30,7 +30,7 @@ pub(crate) struct Lighting {
     pub lamps: Vec<Lamp>,
     /// Ambient light.
     pub ambient: [f32; 3],
-    /// Change of the light across the picture, as a share per picture width: x, y.
+    /// Relative change of the light across the picture, per picture width, in x and in y.
     pub gradient: [f32; 2],
     /// Reflected light by direction, for each roughness; the fourth channel is unused.
     maps: Vec<Vec<[f32; 4]>>,
@@ -48,7 +48,7 @@ pub(crate) struct LightStyle {
 }
 
 impl Lighting {
-    /// Draws lamps and surroundings.
+    /// Samples lamps and surroundings.
     pub fn draw(style: LightStyle, rng: &mut Pcg64Mcg) -> Self {
         let hall = tint(rng, 0.05);
         let share_ambient = if style.even {
@@ -103,7 +103,7 @@ impl Lighting {
         bilinear(&self.maps[level], [SIDE; 2], x, y)
     }
 
-    /// The map for a material.
+    /// Index of the map for a material.
     pub fn level_of(material: &Material) -> usize {
         match material.roughness {
             r if r < 0.13 => 0,
@@ -114,18 +114,18 @@ impl Lighting {
     }
 }
 
-/// White, warmer or colder by at most a share.
+/// White made warmer or colder by a random fraction of at most `share`.
 fn tint(rng: &mut Pcg64Mcg, share: f32) -> [f32; 3] {
     let warmth = rng.uniform(-1.0, 1.0) * share;
     [1.0 + warmth, 1.0, 1.0 - 1.2 * warmth]
 }
 
-/// The upper hemisphere of the surroundings as seen in a horizontal mirror: walls, ceiling, windows, the dark camera
-/// above.
+/// The upper hemisphere of the surroundings as a horizontal mirror reflects it: walls, ceiling, windows, the dark
+/// camera above.
 fn reflections(lamps: &[Lamp], ambient: [f32; 3], style: LightStyle, rng: &mut Pcg64Mcg) -> Vec<Vec<[f32; 4]>> {
     let (ceiling, wall) = (rng.uniform(0.7, 1.5), rng.uniform(0.25, 1.0));
     let lean = [rng.uniform(-0.6, 0.6), rng.uniform(-0.6, 0.6)];
-    // Windows and soft boxes: centre, half size, turn, brightness.
+    // Windows and soft boxes: centre, half size, rotation, brightness.
     let panels: Vec<([f32; 2], [f32; 2], f32, f32)> = (0..rng.whole(1, 4))
         .map(|_| {
             let (angle, reach) = (rng.angle(), rng.uniform(0.1, 0.85));

@@ -11,7 +11,7 @@ use super::scenes::{CANVAS, Scenes, instance};
 use super::sensor;
 use crate::random::{Draw, Stream, generator};
 
-/// Number of draws for a part of the wanted size.
+/// Maximum number of draws for a part of the wanted size.
 const MAX_DRAWS: usize = 12;
 
 /// A picture of several parts with their poses.
@@ -19,29 +19,29 @@ const MAX_DRAWS: usize = 12;
 pub struct MixedSample {
     /// The picture.
     pub image: RgbImage,
-    /// Every labelled part in the picture. Other objects are none of the parts.
+    /// Every labelled part in the picture. Other objects are not in the list.
     pub instances: Vec<MixedInstance>,
 }
 
 /// A part in a [`MixedSample`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct MixedInstance {
-    /// Its index among the parts of [`Scenes`].
+    /// Index of the part among the parts of [`Scenes`].
     pub part_idx: usize,
-    /// Its marks and pose in the picture.
+    /// The part's marks and pose in the picture.
     pub instance: Instance,
 }
 
 impl Scenes {
-    /// Draws sample `index` of several parts: their number follows
-    /// [`SceneConfig::instances`](crate::SceneConfig::instances), all have about the same size, and other parts and
-    /// covers are as in [`Self::sample`]. The parts are chosen at random.
+    /// Renders sample `index` with several parts. Their number follows
+    /// [`SceneConfig::instances`](crate::SceneConfig::instances), and all have about the same size; other objects
+    /// and covers are as in [`Self::sample`]. The parts are chosen at random.
     pub fn mixed_sample(&self, index: u64) -> MixedSample {
         let all: Vec<usize> = (0..self.subjects.len()).collect();
         self.mixed_sample_of(&all, index)
     }
 
-    /// The same for a subset of the parts, given by their indices.
+    /// Like [`Self::mixed_sample`], with a subset of the parts, given by their indices.
     ///
     /// # Panics
     /// If `of` is empty.
@@ -79,7 +79,7 @@ impl Scenes {
         MixedSample { image, instances }
     }
 
-    /// A part of about the size of another one, if a few draws find it.
+    /// A part of about the same size as another one, if a few draws find it.
     fn draw_of_size(&self, of: &[usize], part_idx: usize, rng: &mut Pcg64Mcg) -> usize {
         let diagonal = |idx: usize| self.subjects[idx].part.diagonal_mm();
         let ratio = |idx: usize| (diagonal(idx) / diagonal(part_idx)).ln().abs();

@@ -19,8 +19,8 @@ use crate::random::{Draw, Stream, generator};
 /// Focal length divided by the picture's width: that of the project's wrist camera.
 pub(crate) const FOCAL_OVER_WIDTH: f32 = 0.86;
 
-/// Minimum difference between table and part (sum over channels of square roots of linear values); a table below it is
-/// replaced if there is a better one.
+/// Sufficient difference between table and part (sum over channels of square roots of linear values). If a table has
+/// less, one with more contrast replaces it.
 const MIN_CONTRAST: f32 = 0.5;
 
 /// Settings of the photo.
@@ -49,7 +49,7 @@ pub struct DemonstrationPhoto {
     pub photo_from_part: PlanarSimilarity,
     /// The camera's distance from the table, in millimetres.
     pub distance_mm: f64,
-    /// The camera, in metres over the table.
+    /// The camera's pose, in metres, in a frame on the table.
     pub camera: PosedCamera,
 }
 
@@ -66,7 +66,7 @@ impl DemonstrationPhoto {
         let shorter = config.width.min(config.height) as f32;
         let fill = rng.uniform(config.fill[0] as f32, config.fill[1] as f32);
         let diagonal = part.diagonal_mm() as f32;
-        // Tall parts are nearer to the camera.
+        // The top of a tall part is nearer to the camera.
         let distance = diagonal * focal / (fill * shorter) + part.relief.top_mm;
         let view = View::new(config.width, config.height, focal, distance, 0.0, 0.0);
         let mm_per_px = view.mm_per_px();
@@ -110,7 +110,7 @@ impl DemonstrationPhoto {
     }
 }
 
-/// A plain table that differs from the part in brightness, as users are advised: the best of a few.
+/// Chooses from a few plain tables one that differs in colour from the part, as recommended to users.
 fn contrasting_table(part: &Part, rng: &mut rand_pcg::Pcg64Mcg) -> Table {
     let look: Vec<f32> = {
         let level = &part.relief.levels[2];
@@ -156,7 +156,7 @@ pub(crate) fn pose(scene: &Scene, body: usize) -> PlanarSimilarity {
     PlanarSimilarity::fit(&from, &to).unwrap_or(PlanarSimilarity::IDENTITY)
 }
 
-/// The marks of a part under a pose.
+/// The marks of a part at a pose.
 pub(crate) fn grasp_line(part: &Part, picture_from_part: &PlanarSimilarity) -> GraspLine {
     let mark = |p: [f32; 2]| picture_from_part.apply(&Point2::new(f64::from(p[0]), f64::from(p[1])));
     GraspLine::new(mark(part.grasp.start), mark(part.grasp.end))
@@ -182,14 +182,14 @@ impl Silhouette {
         Point2::new(p.x + f64::from(self.origin[0]), p.y + f64::from(self.origin[1]))
     }
 
-    /// Its bounding box, in pixels of the picture; may extend outside.
+    /// Bounding box, in pixels of the picture; may extend outside the picture.
     pub fn bbox(&self) -> BoundingBox {
         let b = self.mask.bounds().unwrap_or(BoundingBox { x1: 0.0, y1: 0.0, x2: 1.0, y2: 1.0 });
         let (a, c) = (self.shift(Point2::new(b.x1, b.y1)), self.shift(Point2::new(b.x2, b.y2)));
         BoundingBox { x1: a.x, y1: a.y, x2: c.x, y2: c.y }
     }
 
-    /// Its outer outline, in pixels of the picture; may extend outside.
+    /// Outer outline, in pixels of the picture; may extend outside the picture.
     pub fn outline(&self) -> Option<Polygon> {
         let outline = outer_outline(&self.mask)?;
         Some(Polygon { vertices: outline.vertices.into_iter().map(|v| self.shift(v)).collect() })

@@ -22,21 +22,21 @@ pub(crate) struct Placement {
     pub part: Arc<Part>,
     /// Position of the part's origin on the table, in millimetres.
     pub at: [f32; 2],
-    /// Turn from x to y, in radians.
+    /// Rotation from x to y, in radians.
     pub turn: f32,
-    /// Height of the part's underside above the table.
+    /// Height of the part's underside above the table, in millimetres.
     pub base: f32,
     sin_cos: [f32; 2],
-    /// Index of the relief's grid that is used.
+    /// Index of the relief's grid that this placement uses.
     level: usize,
 }
 
 /// The intersection of a line of sight with a body.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Contact {
-    /// Height above the table.
+    /// Height above the table, in millimetres.
     pub z: f32,
-    /// The grid's texel there.
+    /// The grid's texel at the contact.
     pub texel: Texel,
     /// Horizontal outward normal in the table's frame if the contact is on a wall, else zero.
     pub wall: [f32; 2],

@@ -24,7 +24,7 @@ pub(crate) struct Footprint {
 pub(crate) struct Rendered {
     /// The body at each pixel's centre.
     pub ids: Vec<u8>,
-    /// The first bodies' pixels.
+    /// The pixels of the first bodies.
     pub footprints: Vec<Footprint>,
 }
 
@@ -33,7 +33,7 @@ pub(crate) struct Rendered {
 pub(crate) struct Canvas {
     /// The picture in linear light, row by row.
     pub light: Vec<[f32; 3]>,
-    /// As long as the picture; used by the sensor.
+    /// A buffer of the picture's length, used by the sensor.
     pub spare: Vec<[f32; 3]>,
     contacts: Vec<Contact>,
     row: TableRow,

@@ -20,7 +20,7 @@ pub struct Instance {
     pub image_from_demonstration: PlanarSimilarity,
     /// Size relative to the demonstration: the similarity's scale.
     pub scale: f64,
-    /// Share of the part's silhouette that is inside the picture and not covered, from 0 to 1.
+    /// Fraction of the part's silhouette that is inside the picture and not covered, from 0 to 1.
     pub visible_share: f64,
     /// Bounding box of the complete silhouette, covered or not; may extend outside the picture.
     pub bbox: BoundingBox,
@@ -40,11 +40,11 @@ impl Instance {
     }
 }
 
-/// Kind of another object in a picture.
+/// Kind of an object that is not the part.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum OtherKind {
-    /// Another part.
+    /// A different part.
     Part(PartKind),
     /// A look-alike of the part.
     LookAlike(LookAlike),
@@ -55,9 +55,9 @@ pub enum OtherKind {
 /// An object in the picture other than the part.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OtherObject {
-    /// Its kind.
+    /// Kind of the object.
     pub kind: OtherKind,
-    /// Its bounding box, in pixels; may extend outside the picture.
+    /// Bounding box, in pixels; may extend outside the picture.
     pub bbox: BoundingBox,
 }
 
@@ -85,15 +85,15 @@ pub struct Conditions {
 pub struct Sample {
     /// The picture.
     pub image: RgbImage,
-    /// Index of its part among the parts of [`Scenes`](crate::Scenes).
+    /// Index of the picture's part among the parts of [`Scenes`](crate::Scenes).
     pub part_idx: usize,
     /// Every instance of the part in the picture.
     pub instances: Vec<Instance>,
     /// All other objects on the table.
     pub others: Vec<OtherObject>,
-    /// Conditions under which it was taken.
+    /// Conditions under which the picture was taken.
     pub conditions: Conditions,
-    /// The camera, in metres over the table; its frame has y up as in a vertical picture.
+    /// The camera's pose, in metres, in a frame on the table with y up as in a vertical picture.
     pub camera: PosedCamera,
     /// The object at each pixel: instances first, then others, [`Sample::TABLE`] for none.
     pub ids: Vec<u8>,

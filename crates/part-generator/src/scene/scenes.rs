@@ -1,4 +1,4 @@
-//! Scenes with random access.
+//! Scenes of parts, with random access to samples.
 
 use std::cell::RefCell;
 use std::sync::Arc;
@@ -24,7 +24,7 @@ const NUM_MOVED: u64 = 3;
 /// Number of covers to choose from for each part.
 const NUM_COVERS: u64 = 6;
 
-/// Maximum number of bodies in a picture: their ids and the table's fit into a byte.
+/// Maximum number of bodies in a picture: their ids and the table's id fit into a byte.
 pub(super) const MAX_BODIES: usize = 200;
 
 thread_local! {
@@ -105,7 +105,7 @@ impl Scenes {
         self.subjects[part_idx].look_alikes.iter().map(|(kind, part)| (*kind, part.as_ref()))
     }
 
-    /// Draws a sample.
+    /// Renders sample `index`.
     pub fn sample(&self, index: u64) -> Sample {
         let part_idx = (index % self.subjects.len() as u64) as usize;
         let mut rng = generator(self.seed, Stream::Sample, index);

@@ -19,7 +19,7 @@ pub(crate) struct Sensor {
     pub exposure: f32,
     /// Gains of red, green, blue.
     pub white_balance: [f32; 3],
-    /// Standard deviation of noise at middle grey, as a share of full scale.
+    /// Standard deviation of noise at middle grey, as a fraction of full scale.
     pub noise: f32,
     /// Radius of blur in pixels.
     pub blur: f32,
@@ -27,9 +27,9 @@ pub(crate) struct Sensor {
     pub motion: [f32; 2],
     /// Relative loss of light in the corners.
     pub vignetting: f32,
-    /// Light that the lens scatters over the whole picture, as a share of full scale.
+    /// Light that the lens scatters over the whole picture, as a fraction of full scale.
     pub veil: f32,
-    /// Contrast: exponent of the tone curve, 1 for sRGB's.
+    /// Contrast: exponent of the tone curve; 1 gives sRGB's curve.
     pub contrast: f32,
     /// Saturation: 0 is grey, 1 is unchanged.
     pub saturation: f32,
@@ -37,7 +37,7 @@ pub(crate) struct Sensor {
     pub jpeg: Option<u8>,
 }
 
-/// Takes the picture on the canvas.
+/// Develops the light on the canvas into a picture.
 pub(crate) fn take(canvas: &mut Canvas, width: usize, sensor: &Sensor, rng: &mut Pcg64Mcg) -> RgbImage {
     let Canvas { light, spare, .. } = canvas;
     let height = light.len() / width;
@@ -75,7 +75,7 @@ pub(crate) fn take(canvas: &mut Canvas, width: usize, sensor: &Sensor, rng: &mut
     }
 }
 
-/// The mean along the camera's motion.
+/// Averages the light along the camera's motion.
 fn motion(source: &[[f32; 3]], light: &mut [[f32; 3]], width: usize, way: [f32; 2]) {
     let height = light.len() / width;
     let taps = (way[0].hypot(way[1]).ceil() as usize + 1).clamp(2, 24);
@@ -100,7 +100,7 @@ fn motion(source: &[[f32; 3]], light: &mut [[f32; 3]], width: usize, way: [f32; 
     }
 }
 
-/// The tone curve, noise, and rounding to 8 bits.
+/// Applies the tone curve and noise, and rounds to 8 bits.
 fn expose(light: &[[f32; 3]], width: usize, sensor: &Sensor, rng: &mut Pcg64Mcg) -> RgbImage {
     // As a function of the square root of light, because the curve is steep near black.
     let curve: [f32; CURVE] = std::array::from_fn(|k| {

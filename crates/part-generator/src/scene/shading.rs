@@ -11,7 +11,7 @@ use super::view::{Sight, View};
 /// Spacing, in pixels, of computed reflections in a smooth table; values in between are interpolated linearly.
 const GLOSS_STEP_PX: usize = 4;
 
-/// The same for a table with grain.
+/// Spacing, in pixels, of computed reflections in a table with grain.
 const RIPPLE_STEP_PX: usize = 2;
 
 /// Slopes by which scratches tilt the reflected directions of a brushed surface.
@@ -40,7 +40,7 @@ struct Surface {
     brushing: Option<Scratches>,
 }
 
-/// Directions of scratches.
+/// Direction of scratches.
 enum Scratches {
     /// Across a direction of the table.
     Across([f32; 2]),

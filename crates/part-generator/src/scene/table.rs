@@ -8,7 +8,7 @@ use crate::tiles::{Tile, Tiles};
 
 mod color;
 
-/// Share of the tables with sheets on them: brightness varies more within a photograph than on one table top.
+/// Probability of sheets on a table: brightness varies more within a photograph than on one table top.
 const SHEETS_PROBABILITY: f32 = 0.4;
 
 /// A layer of noise over the base colour.
@@ -67,7 +67,7 @@ enum Pattern {
 
 /// A half-plane of another colour: a sheet of paper, a mat, the floor beside the table.
 struct Sheet {
-    /// From the table top to the sheet, a unit vector.
+    /// Unit vector from the table top to the sheet.
     normal: [f32; 2],
     /// Distance in millimetres from the picture's centre to the sheet's edge.
     distance: f32,
@@ -82,7 +82,7 @@ pub(crate) struct Table {
     sheets: Vec<Sheet>,
     sin_cos: [f32; 2],
     shift: [f32; 2],
-    /// Share of mirrored light: 0 for matt tops.
+    /// Fraction of mirrored light: 0 for matt tops.
     pub gloss: f32,
     /// Index of the reflection map for a glossy top.
     pub gloss_level: usize,
@@ -101,7 +101,7 @@ pub(crate) enum TableStyle {
 }
 
 impl Table {
-    /// Draws a table top.
+    /// Samples a table top.
     pub fn draw(style: TableStyle, rng: &mut Pcg64Mcg) -> Self {
         let tiles = Tiles::get();
         let (sin, cos) = rng.angle().sin_cos();
@@ -233,7 +233,7 @@ impl Table {
         }
     }
 
-    /// A layer that lightens and darkens by a share.
+    /// Adds a layer that lightens and darkens the colour by the fraction `strength`.
     fn add(&mut self, tile: &'static Tile, scale: [f32; 2], strength: f32, rng: &mut Pcg64Mcg) {
         let tint = [rng.uniform(0.9, 1.1), 1.0, rng.uniform(0.9, 1.1)];
         let color = [0, 1, 2].map(|k| strength * tint[k] * (0.8 * self.base[k] + 0.02));

@@ -1,4 +1,4 @@
-//! The camera over the table.
+//! The camera above the table.
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, UnitQuaternion, Vector3};
 use sdg_geometry::{PinholeCamera, PosedCamera};
@@ -30,7 +30,7 @@ pub(crate) struct SightRow {
 
 impl SightRow {
     /// The same lines in another frame, in which [`Sight::foot`] is at height `base`: `turned` converts directions,
-    /// `origin` is the centre of rotation, and `min` is the point at the new frame's origin.
+    /// `origin` is the centre of rotation, and `min` is the origin of the new frame.
     #[inline]
     pub fn in_frame(&self, turned: impl Fn([f32; 2]) -> [f32; 2], origin: [f32; 2], min: [f32; 2], base: f32) -> Self {
         let direction = |v: [f32; 3]| {
@@ -169,7 +169,7 @@ mod tests {
             let seen = view.project([x, y, z]).unwrap();
             assert!((seen[0] - px).abs() < 0.01 && (seen[1] - py).abs() < 0.01, "{seen:?}");
         }
-        // The camera as used by other crates: the same point in metres, y up.
+        // The camera in the form for other crates gives the same point, in metres, y up.
         let seen = view.camera().project(&nalgebra::Point3::new(0.031, 0.012, 0.02)).unwrap();
         let expected = view.project([31.0, -12.0, 20.0]).unwrap().map(f64::from);
         assert!((seen - nalgebra::Point2::from(expected)).norm() < 1e-3, "{seen} {expected:?}");

@@ -1,4 +1,4 @@
-//! Pictures of the repository, turned, scaled and relit by a known amount.
+//! Pictures of the repository, rotated, scaled and relit by a known amount.
 
 use std::path::PathBuf;
 
@@ -7,7 +7,7 @@ use nalgebra::Point2;
 use sdg_geometry::{Mask, PlanarSimilarity, Polygon};
 use sdg_sift::{Plane, SiftConfig};
 
-/// The default with a change.
+/// The default settings with a change.
 pub fn with(change: impl FnOnce(&mut SiftConfig)) -> SiftConfig {
     let mut config = SiftConfig::default();
     change(&mut config);
@@ -52,7 +52,7 @@ pub fn warped(source: &Plane, image_from_source: &PlanarSimilarity, width: u32, 
     })
 }
 
-/// Keys' cubic convolution with a = -1/2.
+/// Interpolates by Keys' cubic convolution with a = -1/2.
 fn bicubic(source: &Plane, x: f64, y: f64) -> f32 {
     let weights = |t: f64| {
         let near = |d: f64| 1.5 * d.powi(3) - 2.5 * d.powi(2) + 1.0;
@@ -75,7 +75,7 @@ fn bicubic(source: &Plane, x: f64, y: f64) -> f32 {
     sum as f32
 }
 
-/// Each intensity changed by `light(intensity, x, y)`, with x and y from 0 to 1.
+/// Changes each intensity by `light(intensity, x, y)`, with x and y from 0 to 1.
 pub fn relit(source: &Plane, light: impl Fn(f32, f32, f32) -> f32) -> Plane {
     let (width, height) = (source.width(), source.height());
     Plane::from_fn(width as u32, height as u32, |x, y| {

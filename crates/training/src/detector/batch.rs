@@ -1,4 +1,4 @@
-//! The batches of a detector: samples resized for the network, with their truth.
+//! The batches of a detector: samples resized for the network, with ground truth.
 
 use sdg_demonstration::{Sample, SampleObject};
 use sdg_detection::config::{ImageTransformConfig, ResizeRule};
@@ -8,7 +8,7 @@ use sdg_geometry::Polygon;
 use crate::error::TrainingError;
 use crate::prefetch::BatchRequest;
 
-/// The source of samples: each a function of its index alone.
+/// The source of samples; each depends only on its index.
 #[derive(Clone, Copy)]
 pub struct SampleSource<'a> {
     /// Whole frames, as in detection.
@@ -31,7 +31,7 @@ pub(crate) struct BatchKind {
     pub(crate) size: usize,
 }
 
-/// The images of one step and their truth.
+/// The images of one step and their targets.
 pub(crate) struct Batch {
     pub(crate) images: Vec<TransformedImage>,
     pub(crate) targets: Vec<Target>,
@@ -64,10 +64,10 @@ pub(super) fn prepare(
     Ok(batch)
 }
 
-/// The first windows of a source and their truth.
+/// The first windows of a source and their targets.
 ///
 /// # Errors
-/// A window that the network refuses.
+/// A window that the network rejects.
 pub fn first_windows(
     count: usize,
     transform: &ImageTransformConfig,
@@ -78,7 +78,7 @@ pub fn first_windows(
     Ok((images, targets))
 }
 
-/// The truth of a sample, in pixels of its image; one class.
+/// The ground truth of a sample, in pixels of its image, with a single class.
 fn target(sample: &Sample) -> Target {
     Target {
         boxes: sample.objects.iter().map(|object| object.bbox).collect(),

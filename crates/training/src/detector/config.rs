@@ -39,26 +39,26 @@ pub struct TrainingConfig {
 
 /// The part of a run that learns from windows: small pictures around the part, at the scale of whole frames.
 ///
-/// The detector is convolutional, so that features learnt in a window are valid in the frame, and a window takes a
-/// fraction of a frame's time: in the same time it sees several times as many turns, lights and tables. The frames at
-/// the end teach the areas far from any part. (Rod end, 120 steps: 21 of 35 held-back parts found with windows, none
-/// with frames.)
+/// The detector is convolutional, so features learnt in a window are valid in the frame. A window takes a fraction of
+/// a frame's time, so the network learns several times as many angles, lights and tables in the same time. The frames
+/// at the end teach the areas far from any part. (Rod end, 120 steps: 21 of 35 held-out parts found with windows,
+/// none with frames.)
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct WindowPhase {
-    /// Share of the run, in [0, 1).
+    /// Fraction of the run, in [0, 1).
     pub share: f64,
     /// Windows per step.
     pub batch_size: usize,
 }
 
-/// When and on how many samples to validate.
+/// Times of the validations, and number of their samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ValidationConfig {
     /// Steps between validations.
     pub every: usize,
     /// No validation before this step, because the network's output is not useful yet.
     pub first: usize,
-    /// Held-back samples, with and without the part.
+    /// Held-out samples, with and without the part.
     pub samples: usize,
 }
 
@@ -66,13 +66,14 @@ pub struct ValidationConfig {
 /// and the run ends.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct EarlyStop {
-    /// Share of parts found close enough for a grasp.
+    /// Minimum fraction of parts found close enough for a grasp.
     pub hit_rate: f64,
-    /// Median error, in demonstration pixels.
+    /// Maximum median error, in demonstration pixels.
     pub median_error_px: f64,
-    /// Median error, in degrees.
+    /// Maximum median error, in degrees.
     pub median_error_degrees: f64,
-    /// False alarms over negatives; their number is rounded up, since one of five negatives is weak evidence.
+    /// Maximum ratio of false alarms to negatives; the number of false alarms is rounded up, because one of five
+    /// negatives is weak evidence.
     pub false_alarm_rate: f64,
     /// Steps from the validation that was good enough to the end.
     pub cool_down: usize,
@@ -113,7 +114,7 @@ impl TrainingConfig {
         }
     }
 
-    /// Refuses invalid settings.
+    /// Rejects invalid settings.
     pub(crate) fn check(&self) -> Result<(), TrainingError> {
         let refuse = |setting, expected, found: String| Err(TrainingError::BadSetting { setting, expected, found });
         if self.steps == 0 {

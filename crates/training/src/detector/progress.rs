@@ -8,7 +8,7 @@ use super::validation::Validation;
 use crate::pace::Ending;
 use crate::run::LossFigures;
 
-/// The losses of one step, summed over their weights' batch.
+/// The losses of one step.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct LossValues {
     /// Objectness of anchors.
@@ -27,7 +27,7 @@ pub struct LossValues {
 }
 
 impl LossValues {
-    /// Their sum, which is minimised.
+    /// The sum of the losses, which is minimised.
     pub fn total(&self) -> f64 {
         self.rpn_cls + self.rpn_loc + self.cls + self.box_reg + self.keypoint + self.mask
     }
@@ -59,9 +59,9 @@ impl From<&Losses> for LossValues {
 /// One optimiser step.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct StepRecord {
-    /// From zero.
+    /// Index of the step, from zero.
     pub step: usize,
-    /// Number of its samples.
+    /// Number of samples in the step.
     pub samples: usize,
     /// Learning rate of this step.
     pub learning_rate: f64,
@@ -74,7 +74,7 @@ pub struct StepRecord {
 pub struct ValidationRecord {
     /// Steps done before it.
     pub steps_done: usize,
-    /// Since the start of the run.
+    /// Seconds since the start of the run.
     pub elapsed_secs: f64,
     /// The validation's measurements.
     pub validation: Validation,
@@ -89,7 +89,7 @@ pub enum TrainingEvent {
         record: StepRecord,
         /// Number of steps of the run, as known now.
         planned_steps: usize,
-        /// Since the start of the run.
+        /// Seconds since the start of the run.
         elapsed_secs: f64,
     },
     /// A validation was done.
@@ -105,8 +105,8 @@ pub struct History {
     pub validations: Vec<ValidationRecord>,
     /// The validation of the kept detector.
     pub best: ValidationRecord,
-    /// The reason for its end.
+    /// The reason for the end of the run.
     pub ending: Ending,
-    /// Wall-clock time of the run.
+    /// Wall-clock time of the run, in seconds.
     pub elapsed_secs: f64,
 }

@@ -26,11 +26,11 @@ pub struct Trained {
 
 /// Trains `detector` on the samples that `source` gives by their index.
 ///
-/// `examine` runs the present detector on the held-back samples and returns the outcome of each; `observe` gets
+/// `examine` runs the present detector on the held-out samples and returns the outcome of each; `observe` gets
 /// every step and every validation and may stop the run, which then keeps the best checkpoint so far.
 ///
 /// # Errors
-/// An invalid setting, a loss that is not finite, a batch that the network refuses, or an end before the first
+/// An invalid setting, a loss that is not finite, a batch that the network rejects, or an end before the first
 /// validation.
 pub fn train(
     detector: GeneralizedRcnn,
@@ -110,7 +110,7 @@ impl Task for DetectorTask<'_> {
         let validation = Validation::from_outcomes(&(self.examine)(&detector)?);
         let record = ValidationRecord { steps_done, elapsed_secs: start.elapsed().as_secs_f64(), validation };
         self.validations.push(record);
-        // Of equal validations the later one: its learning rate was lower.
+        // Of equal validations the later one is kept, because its learning rate was lower.
         if self.best.as_ref().is_none_or(|(_, best)| validation.merit() >= best.validation.merit()) {
             self.best = Some((detector, record));
         }

@@ -1,45 +1,45 @@
 //! The accuracy of a detector on samples on which it was not trained, in pixels of the demonstration and degrees.
 //!
-//! A pixel error is ambiguous when the training image is half the photo's size, so that errors are given in pixels
-//! **of the demonstration**: there, the millimetres per pixel depend only on the camera's height.
+//! Errors are given in pixels **of the demonstration**, because pixels of the training image depend on its size: in
+//! the demonstration, the millimetres per pixel depend only on the camera's height.
 
 use sdg_geometry::{Angle, PlanarGrasp, median, percentile};
 use serde::{Deserialize, Serialize};
 
-/// A detection farther from the truth than this is not the part, in demonstration pixels. With the paper's camera (550
-/// px focal length, 0.6 m above the table) that is 10 mm; with other cameras it is another length.
+/// Maximum distance of a hit from the ground truth, in demonstration pixels. With the paper's camera (550 px focal
+/// length, 0.6 m above the table) it corresponds to 10 mm; with other cameras to another length.
 pub const HIT_PX: f64 = 9.2;
-/// Largest error of the angle of a hit, in degrees.
+/// Maximum angle error of a hit, in degrees.
 pub const HIT_DEGREES: f64 = 10.0;
-/// False alarms are counted at the score that this percentage of the hits do not exceed: a score has no meaning before
-/// it is calibrated, and the calibrated threshold refuses about as many.
+/// False alarms are counted from the score that this percentage of the hits do not exceed: a score has no meaning
+/// before it is calibrated, and the calibrated threshold rejects about as many.
 const REFUSED_PERCENT: f64 = 10.0;
-/// The score from which they are counted if there was no hit.
+/// The score from which false alarms are counted if there was no hit.
 const NO_HIT_SCORE: f64 = 0.5;
 
-/// The detector's result for one held-back sample.
+/// The detector's result for one held-out sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Outcome {
     /// The part was present and was detected.
     Found {
-        /// Distance between the grasp's centre and the truth, in demonstration pixels.
+        /// Distance between the grasp's centre and the ground truth, in demonstration pixels.
         error_px: f64,
-        /// Turn between the grasp and the truth, in degrees, `[0, 180]`.
+        /// Angle between the grasp and the ground truth, in degrees, `[0, 180]`.
         error_degrees: f64,
         /// The detector's score.
         score: f64,
     },
     /// The part was present and was not detected.
     Missed,
-    /// The part was absent; the score of the best detection, zero for none.
+    /// The part was absent.
     Absent {
-        /// The detector's score.
+        /// Score of the best detection, zero without one.
         score: f64,
     },
 }
 
 impl Outcome {
-    /// Compares a detected grasp with the truth. `demonstration_px_per_px` converts this image's pixels.
+    /// Compares a detected grasp with the ground truth. `demonstration_px_per_px` converts this image's pixels.
     pub fn found(grasp: &PlanarGrasp, truth: &PlanarGrasp, score: f64, demonstration_px_per_px: f64) -> Self {
         Self::Found {
             error_px: (grasp.center() - truth.center()).norm() * demonstration_px_per_px,
@@ -48,7 +48,7 @@ impl Outcome {
         }
     }
 
-    /// Whether a found part is close enough to the truth for a grasp.
+    /// Whether a found part is close enough to the ground truth for a grasp.
     pub fn is_hit(&self) -> bool {
         matches!(self, Self::Found { error_px, error_degrees, .. }
             if *error_px <= HIT_PX && *error_degrees <= HIT_DEGREES)
@@ -60,15 +60,15 @@ impl Outcome {
 pub struct Validation {
     /// Samples with the part.
     pub positives: usize,
-    /// Number of these found within [`HIT_PX`] and [`HIT_DEGREES`].
+    /// Number of positives found within [`HIT_PX`] and [`HIT_DEGREES`].
     pub hits: usize,
-    /// Median error of all found, in demonstration pixels; infinite when nothing was found.
+    /// Median error of all found parts, in demonstration pixels; infinite if nothing was found.
     pub median_error_px: f64,
-    /// Median error of all found, in degrees; infinite when nothing was found.
+    /// Median error of all found parts, in degrees; infinite if nothing was found.
     pub median_error_degrees: f64,
     /// Samples without the part.
     pub negatives: usize,
-    /// Number of these with a detection scored as high as nine in ten hits.
+    /// Number of negatives with a detection whose score is at least as high as that of nine in ten hits.
     pub false_alarms: usize,
 }
 
@@ -109,14 +109,14 @@ impl Validation {
         made
     }
 
-    /// Share of the parts found close enough for a grasp, in `[0, 1]`; zero without positives.
+    /// Fraction of the parts found close enough for a grasp, in `[0, 1]`; zero without positives.
     pub fn hit_rate(&self) -> f64 {
         if self.positives == 0 { 0.0 } else { self.hits as f64 / self.positives as f64 }
     }
 
     /// One figure for comparing checkpoints, higher is better: hits, minus imprecision, minus a small penalty for
-    /// false alarms, which the demonstration refuses later anyway. (With a larger penalty, networks from a third of
-    /// the run were kept, whose scores were all low.)
+    /// false alarms, which the check against the demonstration rejects later anyway. (A larger penalty selected
+    /// networks from a third of the run, whose scores were all low.)
     pub fn merit(&self) -> f64 {
         let false_alarm_rate = self.false_alarms as f64 / self.negatives.max(1) as f64;
         let imprecision = (self.median_error_px / HIT_PX).min(1.0) + (self.median_error_degrees / HIT_DEGREES).min(1.0);

@@ -9,7 +9,7 @@ use super::config::CropStyle;
 use super::labelled_crop::LabelledCrop;
 use crate::error::TrainingError;
 
-/// Makes crops from augmented scenes: those of scene *i* of a seed are always the same.
+/// Makes crops from augmented scenes: scene *i* of a seed always gives the same crops.
 pub struct AugmentedCrops {
     augmenter: Augmenter,
     style: CropStyle,
@@ -62,7 +62,7 @@ impl AugmentedCrops {
 
     fn crop(&self, sample: &Sample, rng: &mut Pcg64Mcg) -> Option<LabelledCrop> {
         let object = sample.objects.first()?;
-        // A window cannot be turned about a part of which only the box is known.
+        // A window cannot be rotated about a part of which only the box is known.
         let turned = self.style.turned && object.outline.is_some();
         let turn = Angle::from_degrees(if turned { rng.random_range(-180.0..180.0) } else { 0.0 });
         LabelledCrop::of(object, &sample.image, turn, &self.style.jitter, self.size_px, rng)
@@ -77,7 +77,7 @@ mod tests {
     use sdg_demonstration::Annotation;
     use sdg_geometry::{BoundingBox, GraspLine, Polygon};
 
-    /// Tolerance between the marked line and the one measured on a small, noisy crop.
+    /// Tolerance between the marked direction and the direction measured on a small, noisy crop.
     const DIRECTION_TOLERANCE_DEGREES: f64 = 8.0;
 
     /// A bar from red to green on dark grey, its grasp line from the red end to the green one.
@@ -97,7 +97,7 @@ mod tests {
         Demonstration { image, annotation }
     }
 
-    /// From the mean position of the red pixels to that of the green ones.
+    /// The direction from the mean position of the red pixels to that of the green pixels.
     fn measured_direction(crop: &RgbImage) -> Angle {
         let center = |wanted: usize, other: usize| {
             let (mut x_sum, mut y_sum, mut weight_sum) = (0.0, 0.0, 0.0);
@@ -117,7 +117,7 @@ mod tests {
     #[test]
     fn the_label_is_what_the_crop_shows() {
         let mut style = OrientationTraining::edge(1).crops;
-        // Only the part on its own table: no other red or green in the picture.
+        // Only the part on its own table, so that nothing else in the picture is red or green.
         if let sdg_demonstration::AugmentationStyle::Scenes(scenes) = &mut style.augmentation.style {
             scenes.photo_background_share = 1.0;
             scenes.max_distractors = 1;
@@ -130,7 +130,7 @@ mod tests {
             .map(|one| measured_direction(&one.crop).distance(one.angle).to_degrees())
             .collect();
         assert_eq!(errors.len(), 48);
-        // A distractor may be red, too, or a colour cast may hide the colours, but not in most scenes.
+        // A distractor may also be red, or a colour cast may hide the colours, but not in most scenes.
         errors.sort_by(f64::total_cmp);
         assert!(errors[36] < DIRECTION_TOLERANCE_DEGREES, "{errors:?}");
     }

@@ -26,7 +26,7 @@ pub struct OrientationTraining {
     pub labels: Labels,
     /// The source of crops.
     pub crops: CropStyle,
-    /// Number of held-back crops of a validation.
+    /// Number of held-out crops of a validation.
     pub validation_crops: usize,
     /// When a run is good enough to end before its last step.
     pub early_stop: Option<EarlyStop>,
@@ -41,9 +41,9 @@ pub struct OrientationTraining {
 pub struct CropStyle {
     /// The scenes. Every scene must contain the part.
     pub augmentation: AugmentationConfig,
-    /// Crops of each scene; divides the batch size.
+    /// Number of crops of each scene; divides the batch size.
     pub crops_per_scene: usize,
-    /// Whether windows are turned at random. Needs an outline; without one windows are not turned.
+    /// Whether windows are rotated at random. This needs an outline; without one, windows are not rotated.
     pub turned: bool,
     /// The errors of boxes.
     pub jitter: BoxJitter,
@@ -57,9 +57,9 @@ pub struct CropStyle {
 pub struct EarlyStop {
     /// Steps between validations.
     pub every: usize,
-    /// Share within [`HIT_DEGREES`](super::HIT_DEGREES).
+    /// Minimum fraction of crops within [`HIT_DEGREES`](super::HIT_DEGREES).
     pub hit_rate: f64,
-    /// Median error, in degrees.
+    /// Maximum median error, in degrees.
     pub median_degrees: f64,
     /// Steps from the validation that was good enough to the end.
     pub cool_down: usize,
@@ -98,10 +98,10 @@ impl OrientationTraining {
         }
     }
 
-    /// The paper's: 5000 crops, batch 32, 15 epochs, categorical cross-entropy on whole degrees.
+    /// The paper's settings: 5000 crops, batch 32, 15 epochs, categorical cross-entropy on whole degrees.
     ///
     /// # Source
-    /// Paper, section IV-A and Table II; optimiser and learning rate are not given there and are our choice.
+    /// Paper, section IV-A and Table II. It does not give the optimiser and the learning rate; they are our choice.
     pub fn paper(seed: u64) -> Self {
         const CROPS: usize = 5000;
         const EPOCHS: usize = 15;
@@ -123,7 +123,7 @@ impl OrientationTraining {
         }
     }
 
-    /// Refuses invalid settings.
+    /// Rejects invalid settings.
     pub(super) fn validate(&self) -> Result<(), OrientationError> {
         check_setting(self.steps > 0, "steps", "at least 1", self.steps)?;
         check_setting(

@@ -6,20 +6,20 @@ use sdg_orientation::{OrientationError, check_setting};
 
 /// The error range of a box, uniformly distributed for each axis.
 ///
-/// With 6 % of position and 12 % of size on both axes, the overlap with the truth is at least 0.65.
+/// With 6 % of position and 12 % of size on both axes, the IoU with the true box is at least 0.65.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BoxJitter {
-    /// Largest shift of the centre, as a share of the box's width and height.
+    /// Maximum shift of the centre, as a fraction of the box's width and height.
     pub position: f64,
-    /// Largest change of width and height: factors between e^-size and e^size.
+    /// Maximum change of width and height: factors between e^-size and e^size.
     pub size: f64,
 }
 
 impl BoxJitter {
-    /// True boxes.
+    /// No errors.
     pub const NONE: Self = Self { position: 0.0, size: 0.0 };
 
-    /// Draws a box near `bbox`.
+    /// Samples a box near `bbox`.
     pub fn apply(&self, bbox: &BoundingBox, rng: &mut impl Rng) -> BoundingBox {
         let mut within = |most: f64| most * (2.0 * rng.random::<f64>() - 1.0);
         let center = bbox.center();

@@ -19,8 +19,8 @@ pub struct LabelledCrop {
 }
 
 impl LabelledCrop {
-    /// The crop of an object by a window turned by `turn`, around a box with a small error; `None` if the object is not
-    /// visible. Windows are turned only about objects with an outline.
+    /// The crop of an object by a window rotated by `turn`, around a box with a small error; `None` if the object is
+    /// not visible. Windows are rotated only about objects with an outline.
     pub fn of(
         object: &SampleObject,
         image: &RgbImage,
@@ -38,12 +38,12 @@ impl LabelledCrop {
     }
 }
 
-/// From the frame of a window turned by `turn`, with the image's origin, to the image.
+/// Rotation from the frame of a window rotated by `turn`, with the image's origin, to the image.
 fn image_from_turned(turn: Angle) -> Rotation2<f64> {
     Rotation2::new(turn.radians())
 }
 
-/// The part's tight box in the image turned back by `turn`; `None` without extent.
+/// The part's tight box in the image rotated back by `turn`; `None` if it has no extent.
 fn box_in_turned_frame(object: &SampleObject, turn: Angle, image: &RgbImage) -> Option<BoundingBox> {
     let Some(outline) = object.outline.as_ref().filter(|_| turn != Angle::ZERO) else {
         return Some(object.bbox);

@@ -5,7 +5,7 @@ use sdg_orientation::{OrientationCnn, OrientationError};
 
 use super::labelled_crop::LabelledCrop;
 
-/// Largest angle error of a good grasp.
+/// Maximum angle error of a good grasp, in degrees.
 pub const HIT_DEGREES: f64 = 10.0;
 
 /// Errors of a network on some crops, in degrees, within the part's symmetry.
@@ -15,16 +15,16 @@ pub struct AngleErrors {
 }
 
 impl AngleErrors {
-    /// From errors in degrees, in any order.
+    /// Collects errors in degrees, given in any order.
     pub fn new(mut degrees: Vec<f64>) -> Self {
         degrees.sort_by(f64::total_cmp);
         Self { sorted: degrees }
     }
 
-    /// Evaluates the network on crops with known truth.
+    /// Evaluates the network on crops with known angles.
     ///
     /// # Errors
-    /// A crop of another size than the network's input.
+    /// A crop whose size differs from the network's input.
     pub fn measure<'a>(
         network: &OrientationCnn,
         crops: impl IntoIterator<Item = &'a LabelledCrop>,
@@ -41,7 +41,7 @@ impl AngleErrors {
         self.sorted.len()
     }
 
-    /// Share within [`HIT_DEGREES`]; zero without crops.
+    /// Fraction within [`HIT_DEGREES`]; zero without crops.
     pub fn hit_rate(&self) -> f64 {
         let hits = self.sorted.iter().filter(|error| **error <= HIT_DEGREES).count();
         hits as f64 / self.sorted.len().max(1) as f64
@@ -52,7 +52,8 @@ impl AngleErrors {
         median(self.sorted.iter().copied()).unwrap_or(f64::INFINITY)
     }
 
-    /// The error that `share` of the crops stay below, in degrees; infinite without crops.
+    /// The error that a fraction `share` of the crops does not exceed, in degrees;
+    /// infinite without crops.
     pub fn quantile_degrees(&self, share: f64) -> f64 {
         let last = self.sorted.len().saturating_sub(1);
         self.sorted.get((share * last as f64).round() as usize).copied().unwrap_or(f64::INFINITY)

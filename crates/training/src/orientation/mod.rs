@@ -1,21 +1,21 @@
 //! Training the orientation CNN from demonstrations.
 //!
 //! ```text
-//! Demonstration ─ Augmenter ─ scene ─ a few windows on it, each turned, its box a little off ─ crops (another thread)
+//! Demonstration ─ Augmenter ─ scene ─ a few windows, each rotated, with a small box error ─ crops (another thread)
 //!   ─ logits ─ cross-entropy with a bell around the true angle ─ AdamW on one cycle ─ validation in degrees
 //! ```
 //!
-//! A composed scene costs more than crops of it, so that each gives several. Each window is turned at random, which
-//! turns the part in the crop: the same scene teaches several angles. The box of a turned window is computed anew
-//! from the part's outline, as a detector would see it.
+//! A composed scene costs more than its crops, so each gives several. Each window is rotated at random, which rotates
+//! the part in the crop: the same scene teaches several angles. The box of a rotated window is recomputed from the
+//! part's outline, like the box of a detector.
 //!
 //! # Measured
 //!
 //! `cargo run --release -p sdg-cli --example try_orientation -- pendulum,fuel_line 20 9000 edge,steps=60 edge,steps=120
-//! edge edge,labels=hard,window=0`: 96 held-back scenes, 20 rendered pictures with three boxes each (12 in the row of
+//! edge edge,labels=hard,window=0`: 96 held-out scenes, 20 rendered pictures with three boxes each (12 in the row of
 //! 120 steps of the pendulum), box errors of up to 6 % in position and 12 % in size.
 //!
-//! | part | settings | held back: within 10°, median | rendered: within 10°, median, worst |
+//! | part | settings | held-out: within 10°, median | rendered: within 10°, median, worst |
 //! |---|---|---|---|
 //! | pendulum | 60 steps | 88.5 %, 2.3° | 100 %, 1.2°, 6.2° |
 //! | pendulum | 120 steps | 91.7 %, 1.2° | 100 %, 0.9°, 2.3° |
@@ -23,9 +23,9 @@
 //! | pendulum | 240 steps, hard labels | 80.2 %, 4.9° | 96.7 %, 3.7°, 11.3° |
 //! | fuel line | 120 steps | 83.3 %, 2.7° | 95 %, 1.5°, 179° |
 //!
-//! Two Zen 4 cores under a load of twenty, so that only processor time is meaningful: 25 s for 120 steps, 6.4 ms per
-//! reading in four quarter turns. The fuel line looks almost the same after half a turn, which causes its worst error.
-//! Not measured: 240 steps of it, the rod end, other input sizes, times on an idle machine.
+//! Two Zen 4 cores under a load of twenty, so only processor time is meaningful: 25 s for 120 steps, 6.4 ms per
+//! evaluation in four quarter turns. The fuel line looks almost the same after half a turn, which causes its worst
+//! error. Not measured: 240 steps of the fuel line, the rod end, other input sizes, times on an idle machine.
 
 mod augmented;
 mod config;

@@ -23,7 +23,7 @@ const BATCH: usize = 64;
 /// Parameters by their names.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct OrientationStart {
-    /// The network's, except its classes.
+    /// The parameters of the network, except its classes.
     pub parameters: StateDict,
     /// Parameters of the [`ClassImprint`], by their names.
     pub imprint: StateDict,

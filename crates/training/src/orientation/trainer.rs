@@ -26,22 +26,22 @@ use crate::run::{LossFigures, RunSettings, Step, Task, Validated, ValidationStep
 pub enum OrientationEvent {
     /// A step was made.
     Step {
-        /// From zero.
+        /// Index of the step, from zero.
         step: usize,
         /// Number of steps of the run, as known now.
         planned_steps: usize,
         /// Cross-entropy before the update, in nats per crop.
         loss: f64,
-        /// Since the start of the run.
+        /// Seconds since the start of the run.
         elapsed_secs: f64,
     },
-    /// The network was evaluated on the held-back crops.
+    /// The network was evaluated on the held-out crops.
     Validated {
         /// Steps done before.
         steps_done: usize,
-        /// Errors of the angle on the held-back crops, in degrees.
+        /// Errors of the angle on the held-out crops, in degrees.
         errors: AngleErrors,
-        /// Since the start of the run.
+        /// Seconds since the start of the run.
         elapsed_secs: f64,
     },
 }
@@ -51,13 +51,13 @@ pub enum OrientationEvent {
 pub struct TrainedOrientation {
     /// The network after the last step.
     pub network: OrientationCnn,
-    /// Its errors on held-back crops.
+    /// The network's errors on held-out crops.
     pub errors: AngleErrors,
-    /// Steps made.
+    /// Number of steps done.
     pub steps: usize,
     /// The reason for the run's end.
     pub ending: Ending,
-    /// Its duration, validation included.
+    /// Seconds of the run, including validation.
     pub elapsed_secs: f64,
 }
 
@@ -94,10 +94,10 @@ pub fn teach(
     train(untaught, training, &|scene_idx| crops.scene(scene_idx), &held_out, observe)
 }
 
-/// Trains `network`, whose device carries autodiff, on the crops that `scene` gives by the scene's index.
+/// Trains `network`, whose device carries autodiff, on the crops that `scene` returns for each scene index.
 ///
 /// # Errors
-/// As [`teach`], and a crop of another size than the network's input.
+/// The errors of [`teach`], and a crop whose size differs from the network's input.
 pub fn train(
     network: OrientationCnn,
     training: &OrientationTraining,
@@ -114,7 +114,7 @@ pub fn train(
         schedule: training.schedule,
         validations: training.early_stop.map(|stop| ValidationSteps { first: stop.every, every: stop.every }),
     };
-    // The number of crops of a scene depends on the part's visibility, so that a batch depends on those before.
+    // The number of crops of a scene depends on the part's visibility, so a batch depends on the batches before it.
     let mut crops = (0..).flat_map(scene);
     let prepare = |_: BatchRequest<()>| Ok(crops.by_ref().take(training.batch_size).collect());
     with_batches(prepare, |batches| {
@@ -122,7 +122,7 @@ pub fn train(
         let ended = run(&mut task, network, optimizer, &settings, start)?;
         let errors = match task.last.take() {
             Some((steps_done, errors)) if steps_done == ended.steps => errors,
-            // Interrupted: whether the network is useful is not known yet.
+            // The run was interrupted, so the network was not measured yet.
             _ => task.measure(&ended.network, ended.steps, start)?.0,
         };
         let elapsed_secs = start.elapsed().as_secs_f64();

@@ -1,4 +1,5 @@
-//! Errors are shown on the page with the texts of the command line, and nothing else happens.
+//! Tests that errors are shown on the page with the texts of the command line, and that
+//! nothing else happens.
 
 use std::path::PathBuf;
 
@@ -57,7 +58,7 @@ fn wrong_files_are_told_apart() {
         assert!(text[idx].as_str().unwrap().contains(part), "{text}");
     }
     let stage = browser.run("return document.getElementById('empty').textContent", &[]).unwrap();
-    assert_eq!(stage, text[0], "the stage shows what is wrong with the chosen picture");
+    assert_eq!(stage, text[0], "expected the error of the chosen picture on the stage");
     assert_quiet(&browser);
 }
 

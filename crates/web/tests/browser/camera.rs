@@ -1,4 +1,4 @@
-//! The camera: Chromium's fake device, which plays the demonstration's photo.
+//! Tests the camera with Chromium's fake device, which plays the demonstration's photo.
 
 use crate::taught::{Made, demonstration};
 use crate::{assert_quiet, complaint, open_model, open_page, screenshots, site};
@@ -9,7 +9,7 @@ fn a_grasp_is_found_in_the_camera_s_frames() {
     let made = Made::new();
     let model = made.model("S");
     let film = made.path("camera.mjpeg");
-    // Motion JPEG: concatenated JPEGs. Played in a loop.
+    // Motion JPEG: concatenated JPEGs, played in a loop.
     let jpeg = made.path("frame.jpg");
     image::open(demonstration()).unwrap().to_rgb8().save(&jpeg).unwrap();
     let frame = std::fs::read(&jpeg).unwrap();

@@ -1,4 +1,4 @@
-//! The page compared with the command line, and its speed.
+//! Compares the page with the command line, and measures its speed.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -12,10 +12,11 @@ use crate::{assert_quiet, choose, open_model, open_page, repository, screenshots
 /// Maximum differences between page and command line.
 const MAX_PX: f64 = 0.5;
 const MAX_DEGREES: f64 = 0.5;
-/// Scores are sums of products, which each instruction set rounds in its own order.
+/// Maximum difference of scores, which are sums of products that each instruction set rounds in its own order.
 const MAX_SCORE: f64 = 0.01;
-/// Which of two proposals with nearly equal scores is kept depends on the last bit, and so does the network's score
-/// (0.036 apart in one of the pictures). The grasp does not depend on it: the demonstration decides.
+/// Maximum difference of the network's scores. The last bit decides which of two proposals with nearly equal scores is
+/// kept, and so does the network's score (a difference of 0.036 in one of the pictures). The grasp does not depend on
+/// it, because the demonstration decides.
 const MAX_NETWORK_SCORE: f64 = 0.05;
 /// Maximum time of the fastest search of a frame with an `edge` model on one core, without WebGPU. The target is five
 /// per second (200 ms): measured 172 to 184 ms on an idle machine with two cores, and 245 ms on a shared one, for which
@@ -25,7 +26,8 @@ const MAX_MILLISECONDS: f64 = 300.0;
 const LOOKS: usize = 7;
 /// Maximum gap between two frames of the page; longer ones are visible as freezing.
 const MAX_PAGE_GAP_MS: f64 = 150.0;
-/// A page that freezes through its own fault does so every time; one that another process keeps from its core does not.
+/// Number of trials: a page that freezes through its own fault does so every time, unlike a page whose core another
+/// process uses.
 const GAP_TRIALS: usize = 3;
 const MAX_DOWNLOAD_BYTES: usize = 4_000_000;
 /// Maximum additional download for the graphics card: shader compilers, and the weights again.
@@ -162,7 +164,7 @@ fn the_graphics_card_finds_what_the_command_line_finds() {
     assert_same_grasps(&results, &expected, pictures, "on the graphics card");
     let times: Vec<f64> = results.iter().map(|result| number(result, "/milliseconds")).collect();
     println!("on SwiftShader: milliseconds a frame {times:.0?}");
-    // The page itself switches, and shows the same.
+    // The page itself uses the graphics card and shows the same.
     browser
         .run("document.querySelectorAll('#pictures small').forEach((small) => (small.textContent = ''))", &[])
         .unwrap();

@@ -8,9 +8,10 @@ use tempfile::TempDir;
 
 use crate::{repository, target};
 
-/// Enough to detect the pendulum; what matters is that both sides detect the same.
+/// Number of training steps, enough to detect the pendulum; the test compares detections,
+/// not their quality.
 const STEPS: &str = "120";
-/// Augmented pictures beside the demonstration itself.
+/// Number of augmented pictures, in addition to the demonstration itself.
 const SAMPLES: usize = 6;
 
 /// A folder with files made by `sdg`.
@@ -62,7 +63,8 @@ pub fn demonstration() -> PathBuf {
     repository().join("datasets/demonstrations/pendulum/image.png")
 }
 
-/// The output of `sdg detect --json --all` for pictures, best first each.
+/// The output of `sdg detect --json --all` for pictures, each with the best detection
+/// first.
 pub fn detect(model: &Path, pictures: &[PathBuf]) -> Vec<Vec<Value>> {
     let mut args = vec!["detect", "--json", "--all", "--grasp-model", model.to_str().unwrap()];
     args.extend(pictures.iter().map(|picture| picture.to_str().unwrap()));
@@ -79,7 +81,7 @@ fn sdg(args: &[&str]) -> String {
     let binary = target().join("release/sdg");
     assert!(binary.is_file(), "make build writes {}", binary.display());
     let output = Command::new(binary).args(args).output().unwrap();
-    // 3: nothing to grasp, which is a valid answer too.
+    // Exit code 3 means nothing to grasp, which is also a valid answer.
     let answered = matches!(output.status.code(), Some(0 | 3));
     assert!(answered, "sdg {}: {}", args.join(" "), String::from_utf8_lossy(&output.stderr));
     String::from_utf8(output.stdout).unwrap()

@@ -7,7 +7,7 @@ fn main() -> anyhow::Result<()> {
 
 #[cfg(not(all(target_os = "linux", target_arch = "x86_64")))]
 fn main() {
-    eprintln!("endurance: expected Linux on x86-64, whose system calls it follows");
+    eprintln!("endurance: expected Linux on x86-64, because it traces system calls");
     std::process::exit(1);
 }
 
@@ -22,10 +22,10 @@ mod sections {
     use sdg_endurance::soak::FrameRun;
     use sdg_endurance::{crash, refusals, soak};
 
-    /// Commands killed while the disk loses what was not synced.
+    /// Tests of `sdg` under killed commands, full disks and long runs.
     #[derive(Parser)]
     struct Arguments {
-        /// The program that is tried.
+        /// The program under test.
         #[arg(long, default_value = "target/release/sdg")]
         sdg: PathBuf,
         #[command(subcommand)]
@@ -34,20 +34,21 @@ mod sections {
 
     #[derive(Subcommand)]
     enum Section {
-        /// Kills commands at seeded moments; goes on where it ended.
+        /// Kills commands at random moments of a seed, with a simulated power cut; resumes an earlier run.
         Crash {
-            /// Kills of each command.
+            /// Number of kills of each command.
             #[arg(long, default_value_t = 200)]
             kills: u64,
             #[arg(long, default_value_t = 1)]
             seed: u64,
-            /// Without it, all commands.
+            /// Commands to test; all by default.
             #[arg(value_enum)]
             commands: Vec<Scenario>,
         },
-        /// Tries commands on a full disk, a read-only one, without descriptors and while the clock is set back (root).
+        /// Runs commands on a full disk, on a read-only disk, without free descriptors and while the clock is set back
+        /// (needs root).
         Refusals {
-            /// Without it, all commands.
+            /// Commands to test; all by default.
             #[arg(value_enum)]
             commands: Vec<Scenario>,
         },
@@ -58,13 +59,13 @@ mod sections {
             model: String,
             #[arg(long, default_value_t = 100_000)]
             frames: usize,
-            /// Search every frame on its own.
+            /// Search every frame on its own instead of tracking parts.
             #[arg(long)]
             every_frame: bool,
-            /// The camera closes its connection after so many frames.
+            /// Number of frames after which the camera closes its connection.
             #[arg(long, default_value_t = usize::MAX)]
             frames_a_connection: usize,
-            /// End after so long, with what was done.
+            /// Stop after this many seconds and report the finished part.
             #[arg(long, default_value_t = 600)]
             max_secs: u64,
         },
@@ -72,13 +73,13 @@ mod sections {
         Page {
             #[arg(long, default_value_t = 500)]
             sessions: usize,
-            /// End after so long, with what was done.
+            /// Stop after this many seconds and report the finished part.
             #[arg(long, default_value_t = 600)]
             max_secs: u64,
         },
     }
 
-    /// One command that fails does not keep the others from being tried.
+    /// Runs all commands, also after one has failed.
     fn each(commands: &[Scenario], run: impl Fn(Scenario) -> Result<()>) -> Result<()> {
         let commands = if commands.is_empty() { Scenario::value_variants() } else { commands };
         let failed: Vec<String> =

@@ -1,4 +1,5 @@
-//! Winograd's transforms of weights, on sixteen filters at a time, down the columns of a kernel and then along its rows.
+//! Winograd's transforms of weights, on sixteen filters at a time, down the columns of a kernel and then along
+//! its rows.
 //!
 //! ```text
 //! G: u₀ = g₀, u₁,₂ = −⅔ (g₀ ± a g₁ + a² g₂), u₃,₄ = ⅙ (g₀ ± b g₁ + b² g₂), u₅ = g₂
@@ -15,7 +16,7 @@ use crate::simd::{Isa, lanes_kernel};
 const NA: f32 = -2.0 / 3.0;
 const NB: f32 = 1.0 / 6.0;
 
-/// G g.
+/// Computes G g.
 #[inline(always)]
 unsafe fn filter_line<L: Lanes>(g: [L; 3]) -> [L; 6] {
     // SAFETY: registers only.
@@ -28,7 +29,7 @@ unsafe fn filter_line<L: Lanes>(g: [L; 3]) -> [L; 6] {
     }
 }
 
-/// Gᵀ u, the adjoint of [`filter_line`].
+/// Computes Gᵀ u, the adjoint of [`filter_line`].
 #[inline(always)]
 unsafe fn filter_line_adjoint<L: Lanes>(u: [L; 6]) -> [L; 3] {
     // SAFETY: registers only.

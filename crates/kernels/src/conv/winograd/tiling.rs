@@ -7,7 +7,7 @@ use crate::simd::lanes::LANES;
 pub(super) const OUTPUT_TILE: usize = 4;
 /// Side of an input tile.
 pub(super) const INPUT_TILE: usize = 6;
-/// Products of a tile and channel.
+/// Number of products of a tile and a channel.
 pub(super) const FREQUENCIES: usize = INPUT_TILE * INPUT_TILE;
 
 /// The tiles of all output maps in sequence: tile t covers pixels from (4·ty, 4·tx) of image n.
@@ -27,7 +27,7 @@ impl Tiling {
         self.num_images * self.tiles[0] * self.tiles[1]
     }
 
-    /// Image, and pixel of the first output.
+    /// Image of a tile, and the pixel of its first output.
     #[inline(always)]
     pub(super) fn place(&self, tile: usize) -> (usize, [usize; 2]) {
         let [down, across] = self.tiles;

@@ -28,7 +28,7 @@ pub(super) const B: f32 = std::f32::consts::SQRT_2;
 pub(super) const B2: f32 = 2.0;
 const B3: f32 = B * B2;
 
-/// Bᵀ d.
+/// Computes Bᵀ d.
 #[inline(always)]
 unsafe fn input_transform_1d<L: Lanes>(d: [L; 6]) -> [L; 6] {
     // SAFETY: registers only.
@@ -53,7 +53,7 @@ unsafe fn input_transform_1d<L: Lanes>(d: [L; 6]) -> [L; 6] {
     }
 }
 
-/// Aᵀ m.
+/// Computes Aᵀ m.
 #[inline(always)]
 unsafe fn output_transform_1d<L: Lanes>(m: [L; 6]) -> [L; 4] {
     // SAFETY: registers only.
@@ -69,7 +69,7 @@ unsafe fn output_transform_1d<L: Lanes>(m: [L; 6]) -> [L; 4] {
     }
 }
 
-/// A y, the adjoint of [`output_transform_1d`].
+/// Computes A y, the adjoint of [`output_transform_1d`].
 #[inline(always)]
 unsafe fn output_transform_adjoint_1d<L: Lanes>(y: [L; 4]) -> [L; 6] {
     // SAFETY: registers only.
@@ -244,7 +244,7 @@ fn point_at_pixels<const SIDE: usize>(
     }
 }
 
-/// [`input_transform_1d`] along the rows, to every frequency.
+/// Applies [`input_transform_1d`] along the rows and stores the result at every frequency.
 #[inline(always)]
 unsafe fn store_frequencies<L: Lanes>(middle: [[L; INPUT_TILE]; INPUT_TILE], target: *mut f32, step: usize) {
     for row in 0..INPUT_TILE {
@@ -315,7 +315,7 @@ unsafe fn output_transform_lanes<L: Lanes>(
     let epilogue = place.epilogue;
     // SAFETY: elements of the products, of the output and of the epilogue's vectors, by the caller's assertions.
     unsafe {
-        // Stays 0 as long as every sum is finite: 0 · ∞ and 0 · NaN are NaN.
+        // The value stays 0 as long as every sum is finite: 0 · ∞ and 0 · NaN are NaN.
         let mut watch = L::splat(0.0);
         let (zero, one) = (L::splat(0.0), L::splat(1.0));
         for (slot, tile) in tiles.enumerate() {

@@ -11,8 +11,8 @@ use crate::scratch::Scratch;
 use crate::simd::lanes::LANES;
 use crate::simd::{Isa, transpose};
 
-/// Maximum size of a gradient in the frequency domain for which every chunk of tiles has its own sums, 36 · 64 · 64
-/// floats and some.
+/// Maximum size of a gradient in the frequency domain for which every chunk of tiles has its own sums: somewhat
+/// more than 36 · 64 · 64 floats.
 const OWN_GRADIENT: usize = 160 << 10;
 /// Chunks of tiles, each summed separately.
 const CHUNKS: usize = 8;
@@ -21,7 +21,8 @@ const BLOCK_TILES: usize = 96;
 /// Floats of the transformed values of a block, if all threads work on it together: 12 MB.
 const BLOCK_FLOATS: usize = 3 << 20;
 
-/// The gradient with respect to the weight, `[Co, Ci, 3, 3]`, from channels-last maps; none if a sum is not finite.
+/// The gradient with respect to the weight, `[Co, Ci, 3, 3]`, from channels-last maps; `None` if a sum is not
+/// finite.
 pub(in crate::conv) fn weight_gradient(
     isa: Isa,
     x: Maps<'_>,
@@ -56,7 +57,7 @@ pub(in crate::conv) fn weight_gradient(
         });
     } else {
         let block = BLOCK_FLOATS / (FREQUENCIES * (x.channels + output_grad.channels));
-        // SAFETY: nothing else has the sums.
+        // SAFETY: nothing else accesses the sums.
         unsafe { sums.add(0..num_tiles, block.max(24), 0, raw, true) };
     }
 

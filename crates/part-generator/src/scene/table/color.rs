@@ -36,7 +36,7 @@ impl Table {
     #[inline(always)]
     fn print(&self, x: f32, y: f32, mm_per_px: f32, color: &mut [f32; 4]) {
         let per_px = 1.0 / mm_per_px;
-        // Share of a pixel within `half` of a line at distance `d`.
+        // Fraction of a pixel within `half` of a line at distance `d`.
         let inside = |d: f32, half: f32| ((half - d) * per_px + 0.5).clamp(0.0, 1.0) * (2.0 * half * per_px).min(1.0);
         let to_line = |v: f32, pitch: f32| (v - pitch * floor(v / pitch + 0.5) as f32).abs();
         match &self.pattern {
@@ -151,7 +151,7 @@ impl Layer {
     }
 }
 
-/// Mixes a colour with another.
+/// Mixes a colour with another colour.
 #[inline(always)]
 fn mix(color: &mut [f32; 4], other: &[f32; 3], share: f32) {
     for k in 0..3 {
