@@ -124,7 +124,7 @@ fn ctrl_c_on_the_way_down_stops_the_arm_and_what_makes_no_sense_is_refused() {
     assert_eq!(robot.latched(), None);
 
     let error = robot.touch_down(&TouchDown::default()).unwrap_err();
-    assert_eq!(error.to_string(), "the arm was stopped: a person asked for it");
+    assert_eq!(error.to_string(), "the arm was stopped: a person requested it");
     assert!(matches!(robot.touch_down(&TouchDown::default()), Err(RobotError::Latched(_))));
     let before = robot.arm().state().unwrap();
     robot.arm().wait(0.3, &mut Watch::default()).unwrap();

@@ -210,7 +210,7 @@ fn a_person_stops_the_arm_on_the_network() {
     let mut robot = Robot::new(&mut arm, Workcell::safety_limits(), watch);
     let motion = some_motion(robot.arm());
     let error = robot.follow(motion.clone()).unwrap_err();
-    assert_eq!(error.to_string(), "the arm was stopped: a person asked for it");
+    assert_eq!(error.to_string(), "the arm was stopped: a person requested it");
     // It ended by itself, at rest and without an error of the robot.
     let state = robot.arm().state().unwrap();
     assert_eq!(state.mode, ArmMode::Idle);

@@ -158,7 +158,7 @@ fn a_person_stops_the_arm_on_its_path() {
     }));
     let mut robot = Robot::new(&mut cell, Workcell::safety_limits(), watch);
     let error = run(&mut robot).unwrap_err();
-    assert_eq!(error.to_string(), "the arm was stopped: a person asked for it");
+    assert_eq!(error.to_string(), "the arm was stopped: a person requested it");
     let state = robot.arm().state().unwrap();
     assert!(state.dq.amax() < 0.02, "{}", state.dq);
     assert_stands_still(&mut robot);

@@ -143,7 +143,7 @@ def main(program):
     failed = 0
     for name, expected in [
         ("first", "arrived"), ("second", "path tolerance violated joint 7 was held"), ("third", "refused the trajectory"),
-        ("fourth", "a person asked for it"), ("open", "80 mm, holds nothing"), ("grasp", "30 mm, holds"),
+        ("fourth", "a person requested it"), ("open", "80 mm, holds nothing"), ("grasp", "30 mm, holds"),
         ("silent", "no joint states on /joint_states"),
     ]:
         good = expected in told.get(name, "")
