@@ -3,7 +3,7 @@
 /// Why a model could not be taught, read or used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "the messages say what the fields are")]
+#[allow(missing_docs, reason = "the messages explain the fields")]
 pub enum GraspError {
     /// A letter or name of no model.
     #[error(transparent)]

@@ -31,7 +31,7 @@ pub struct SearchRegion {
 /// The reason why a region cannot be searched.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "the messages say what the fields are")]
+#[allow(missing_docs, reason = "the messages explain the fields")]
 pub enum RegionError {
     /// It has no pixel.
     #[error("expected a region of at least 1 × 1 pixels, found {region}")]

@@ -11,7 +11,7 @@ use crate::watch::StopReason;
 /// Errors of this crate.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "the messages say what the fields are")]
+#[allow(missing_docs, reason = "the messages explain the fields")]
 pub enum RobotError {
     /// A motion violates a limit; it was not started.
     #[error("the motion was not started: {0}")]

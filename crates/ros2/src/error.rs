@@ -5,7 +5,7 @@ use crate::cdr::CdrError;
 /// Errors of this crate.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "the messages say what the fields are")]
+#[allow(missing_docs, reason = "the messages explain the fields")]
 pub enum RosError {
     /// Text that is not a valid name.
     #[error("a name of ROS: expected {expected}, found \"{found}\"")]

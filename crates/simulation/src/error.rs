@@ -7,7 +7,7 @@ use sdg_robot::RobotError;
 /// An error of the simulation; a failed grasp is not one (see `sdg_robot::GraspOutcome`).
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "the messages say what the fields are")]
+#[allow(missing_docs, reason = "the messages explain the fields")]
 pub enum SimulationError {
     /// libmujoco is missing, or its version differs from that of the bindings.
     #[error(transparent)]

@@ -1,6 +1,7 @@
-//! Packed little-endian fields, read and written through one list of fields.
+//! Packed little-endian fields: one list of fields serves for reading and writing.
 //!
-//! A message names its fields once, in a function generic over [`Codec`]; an [`Encoder`] writes them, a [`Decoder`] fills them.
+//! A message lists its fields once, in a function generic over [`Codec`]; an [`Encoder`] writes the fields, a
+//! [`Decoder`] reads them.
 
 use crate::wire_error::WireError;
 
@@ -15,7 +16,7 @@ pub enum Real {
 
 /// One direction of a message: each call writes or reads the next field.
 pub trait Codec {
-    /// The next bytes, in order.
+    /// Writes or reads the next bytes, in order.
     ///
     /// # Errors
     /// [`WireError::Short`] if a message ends too early.
@@ -24,7 +25,7 @@ pub trait Codec {
     /// Precision of [`Codec::reals`].
     fn real(&self) -> Real;
 
-    /// One byte.
+    /// Writes or reads one byte.
     ///
     /// # Errors
     /// As [`Codec::bytes`].
@@ -35,7 +36,7 @@ pub trait Codec {
         Ok(())
     }
 
-    /// Two bytes.
+    /// Writes or reads two bytes.
     ///
     /// # Errors
     /// As [`Codec::bytes`].
@@ -46,7 +47,7 @@ pub trait Codec {
         Ok(())
     }
 
-    /// Four bytes.
+    /// Writes or reads four bytes.
     ///
     /// # Errors
     /// As [`Codec::bytes`].
@@ -57,7 +58,7 @@ pub trait Codec {
         Ok(())
     }
 
-    /// Eight bytes.
+    /// Writes or reads eight bytes.
     ///
     /// # Errors
     /// As [`Codec::bytes`].
@@ -68,7 +69,7 @@ pub trait Codec {
         Ok(())
     }
 
-    /// A byte that is zero for false; any other is read as true, as C++ does.
+    /// Writes or reads a boolean as one byte; every byte except zero is true, as in C++.
     ///
     /// # Errors
     /// As [`Codec::bytes`].
@@ -79,7 +80,7 @@ pub trait Codec {
         Ok(())
     }
 
-    /// One double.
+    /// Writes or reads one double.
     ///
     /// # Errors
     /// As [`Codec::bytes`].
@@ -90,7 +91,7 @@ pub trait Codec {
         Ok(())
     }
 
-    /// Doubles, in order.
+    /// Writes or reads doubles, in order.
     ///
     /// # Errors
     /// As [`Codec::bytes`].
@@ -98,7 +99,7 @@ pub trait Codec {
         values.iter_mut().try_for_each(|value| self.f64(value))
     }
 
-    /// Numbers of the precision of [`Codec::real`], in order.
+    /// Writes or reads numbers with the precision of [`Codec::real`], in order.
     ///
     /// # Errors
     /// As [`Codec::bytes`].
@@ -155,12 +156,12 @@ pub struct Decoder<'a> {
 }
 
 impl<'a> Decoder<'a> {
-    /// From the first byte on; `message` names it in errors.
+    /// Starts at the first byte; `message` is the name in errors.
     pub fn new(message: &'static str, bytes: &'a [u8], real: Real) -> Self {
         Self { message, bytes, position: 0, real }
     }
 
-    /// Ends the reading.
+    /// Checks that no bytes remain.
     ///
     /// # Errors
     /// [`WireError::Long`] if bytes remain.

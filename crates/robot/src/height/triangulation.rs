@@ -55,7 +55,7 @@ impl MeasuredHeight {
 /// The reason why two pictures give no height.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "the messages say what the fields are")]
+#[allow(missing_docs, reason = "the messages explain the fields")]
 pub enum HeightError {
     /// The camera did not move far enough.
     #[error(
