@@ -1,5 +1,5 @@
-//! MuJoCo's own collisions of every shape of the arm with itself and with obstacles: the reference for the
-//! collision model of `sdg-kinematics`.
+//! MuJoCo's collisions of all shapes of the arm with each other and with obstacles, as a reference for the collision
+//! model of `sdg-kinematics`.
 
 use std::sync::Arc;
 
@@ -21,10 +21,10 @@ pub struct Overlap {
     pub depth_m: f64,
 }
 
-/// The simulated Panda among obstacles, without time.
+/// The simulated Panda among obstacles, without dynamics.
 ///
-/// All visible shapes of the arm collide with each other and with the obstacles; the simpler collision shapes of
-/// attempts collide with the obstacles.
+/// All visible shapes of the arm collide with each other and with the obstacles; the simpler collision shapes of grasp
+/// attempts collide with the obstacles only.
 pub struct CollisionWorld {
     data: Data,
     ids: PandaIds,
@@ -42,7 +42,7 @@ impl CollisionWorld {
     /// # Errors
     /// As [`Model::from_xml`].
     pub fn new(obstacles: &[Obstacle], opening_m: f64) -> Result<Self> {
-        // Bits: obstacles 1, visible shapes of the arm 2.
+        // Collision bits: 1 for obstacles, 2 for visible shapes of the arm.
         let text = String::from_utf8_lossy(&panda_asset().bytes)
             .replace("contype=\"2\" conaffinity=\"1\"", "contype=\"0\" conaffinity=\"1\"")
             .replace("contype=\"0\" conaffinity=\"0\"", "contype=\"2\" conaffinity=\"3\"");
