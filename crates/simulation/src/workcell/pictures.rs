@@ -1,4 +1,4 @@
-//! The workcell's pictures: through its camera and from outside, at one instant or over time.
+//! The workcell's pictures by its own camera and by an outside camera, at one instant or over time.
 
 use image::RgbImage;
 use nalgebra::Isometry3;
@@ -39,8 +39,8 @@ impl Workcell {
         self.wrist_renderer.segmentation(&mut self.data, self.camera)
     }
 
-    /// Moves the arm, without advancing time, so that its wrist camera is at a pose, and takes a
-    /// picture: for demonstrations and test images.
+    /// Moves the arm, without advancing time, until its wrist camera is at a pose, and takes a picture, for
+    /// demonstrations and test images.
     ///
     /// # Errors
     /// [`SimulationError::Configuration`] for a pose that the arm cannot reach.
@@ -64,7 +64,7 @@ impl Workcell {
         self.data.forward()
     }
 
-    /// A picture of the whole workcell from outside, in its present state.
+    /// A picture of the whole workcell by the outside camera, in its present state.
     ///
     /// # Errors
     /// As [`Renderer::new`].
@@ -73,8 +73,8 @@ impl Workcell {
         renderer.image(&mut self.data, self.scene_camera)
     }
 
-    /// A picture of the whole workcell from outside with the arm in another configuration, fingers at an opening (m):
-    /// for plans.
+    /// A picture of the whole workcell by the outside camera with the arm in another configuration and the fingers at
+    /// an opening (m), for showing plans.
     ///
     /// # Errors
     /// As [`Workcell::scene_image`].
@@ -90,7 +90,7 @@ impl Workcell {
         renderer.image(&mut self.data, self.scene_camera)
     }
 
-    /// Starts a recording from outside over time.
+    /// Starts to record pictures of the outside camera over time.
     ///
     /// # Errors
     /// As [`Renderer::new`].
