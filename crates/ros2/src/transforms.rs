@@ -215,7 +215,7 @@ mod tests {
         assert!(error.contains("no transform of \"lidar\" was received"), "{error}");
         let mut apart = known();
         apart.add(&transform("map", "odom", 0.0, along(0.0, 0.0)), true);
-        assert!(apart.lookup("odom", "hand", at(10.0)).unwrap_err().to_string().contains("the frames are not connected"));
+        assert!(apart.lookup("odom", "hand", at(10.0)).unwrap_err().to_string().contains("frames are not connected"));
     }
 
     #[test]
