@@ -21,7 +21,7 @@ use crate::error::{GraspError, Result};
 /// omitted by mistake would silently start from random values.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BaseWeights {
-    /// SHA-256 of the weights' file, in hexadecimal digits; the taught model's file keeps it.
+    /// SHA-256 of the weights' file, in hexadecimal digits; stored in the taught model's file.
     pub sha256: String,
     /// Values by the parameters' names.
     pub parameters: StateDict,

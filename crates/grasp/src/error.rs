@@ -66,7 +66,7 @@ pub enum GraspError {
     /// No plan view can be made.
     #[error(transparent)]
     PlanView(#[from] sdg_geometry::PlanViewError),
-    /// A model that knows no lengths.
+    /// A model without lengths.
     #[error("expected a model taught with a camera, found one without")]
     NoLengths,
     /// A part that is too wide for the gripper.

@@ -1,4 +1,4 @@
-//! The facts about the teaching that a model file contains.
+//! The facts about teaching in a model file.
 
 pub use sdg_demonstration::ModelKind;
 use sdg_geometry::RotationalSymmetry;
@@ -45,7 +45,7 @@ pub struct TeachingFacts {
     /// The part's symmetry, as given at teaching.
     #[serde(default, skip_serializing_if = "is_without_symmetry")]
     pub symmetry: RotationalSymmetry,
-    /// Smallest and largest size over the nominal one within which the part is searched.
+    /// Smallest and largest size, relative to the nominal one, at which the part is searched.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub size_tolerance: Option<[f64; 2]>,
     /// The model's lengths; `None` for a model taught without a camera.
@@ -69,7 +69,7 @@ pub struct TeachingFacts {
     /// The result on pictures without the part; `None` if none were given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub negatives: Option<NegativeFacts>,
-    /// SHA-256 of the weights that teaching started from; `None` if it started from random values.
+    /// SHA-256 of the initial weights; `None` for random values.
     pub base_weights_sha256: Option<String>,
 }
 

@@ -19,7 +19,7 @@
 //! | photo | the demonstration's picture, in its pixels |
 //! | cut-out | the crop of the photo around the part that the model stores, in its pixels |
 //! | view, working | image and cut-out halved or resized for one range of sizes; the search runs in these |
-//! | `a_from_b` | a transform that takes coordinates of frame b to frame a; poses are `image_from_cutout`, a similarity |
+//! | `a_from_b` | a transform of coordinates from frame b to frame a; poses are `image_from_cutout`, a similarity |
 //! | candidate | a box of the network converted to a pose, not yet verified |
 //! | evidence | measurements at a pose (edges, surface, hue, visible fraction, size …), each of which adds log-odds to the score |
 //! | score | logistic function of the sum of log-odds, in (0, 1); a detection of at least 0.5 is accepted |
@@ -28,8 +28,8 @@
 //! | x, y, angle, width | a planar grasp: centre in pixels, angle of the grasp line from x towards y, opening in pixels |
 //! | tcp, flange, base | frames of the arm; metres, z of the tcp along the approach |
 //!
-//! This crate deliberately has no files and no threads, so that the same code runs in a browser, no clock in detection,
-//! no robot and no simulator. Without the feature `teach` no autodiff, optimiser or augmentation is compiled.
+//! This crate deliberately has no files, threads, robot or simulator, and no clock in detection: the same code runs in
+//! a browser. Without the feature `teach` no autodiff, optimiser or augmentation is compiled.
 //!
 //! From the bytes of a model and of an image to a grasp:
 //!

@@ -19,7 +19,7 @@ use crate::network_calibration::{NetworkCalibration, log_odds};
 #[cfg(any(feature = "teach", test))]
 const PICTURES_SCORE_LOWER_BY: f64 = 2.0;
 
-/// Counts of the network's outputs (silent, unsure, sure) on the part and on other objects.
+/// Counts of the network's outputs (no proposal, unsure, sure) on the part and on other objects.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct NetworkEvidence {
     on_part: [u32; 3],

@@ -135,7 +135,7 @@ fn half_of_a_part_and_its_grasp_point_decide() {
         turn_source: TurnSource::Search,
         light: 1.0,
     };
-    // Its box extends from x − 20 to x + 20; the grasp is 5 to the right of the centre.
+    // The detection's box extends from x − 20 to x + 20; the grasp is 5 to the right of the centre.
     assert!(detection(120.0, 70.0).lies_in(&region));
     assert!(detection(100.0, 70.0).lies_in(&region), "half");
     assert!(!detection(99.0, 70.0).lies_in(&region), "less than half");

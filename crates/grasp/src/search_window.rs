@@ -49,7 +49,7 @@ pub(crate) struct SearchWindow {
 }
 
 impl SearchWindow {
-    /// The image itself.
+    /// The whole image as a window.
     pub(crate) fn whole([width, height]: [u32; 2]) -> Self {
         Self { rect: PixelRect { left: 0, top: 0, width, height }, whole: [width, height] }
     }

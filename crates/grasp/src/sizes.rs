@@ -44,7 +44,7 @@ impl SizeRange {
         vec![same_pixels, Self { scales: about(same_frame), nominal: vec![same_frame] }]
     }
 
-    /// Of several ranges the one that contains a scale or is nearest to it.
+    /// The range that contains a scale or is nearest to it.
     pub(crate) fn nearest(ranges: &[Self], scale: f64) -> Option<&Self> {
         ranges.iter().min_by(|a, b| a.distance(scale).total_cmp(&b.distance(scale)))
     }

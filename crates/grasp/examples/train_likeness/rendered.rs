@@ -70,7 +70,7 @@ impl Rendered {
         let part = self.training.choose(rng).expect("some part is trained on");
         let mut is_right = part.wrong.is_empty() || rng.random_bool(RIGHT_SHARE);
         let of_it = if is_right { &part.right } else { &part.wrong };
-        let mut pair = of_it.choose(rng).expect("parts without right ones are left out").clone();
+        let mut pair = of_it.choose(rng).expect("parts without correct examples are left out").clone();
         if !part.clear.is_empty() && rng.random_bool(OTHER_PHOTO_SHARE) {
             let other = &part.right[*part.clear.choose(rng).expect("it is not empty")];
             pair.photo.clone_from(&other.picture);

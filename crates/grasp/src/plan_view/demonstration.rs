@@ -19,7 +19,7 @@ use crate::taught::TaughtDemonstration;
 /// Heights are in metres above the table.
 ///
 /// # Errors
-/// A camera that does not see the plane, and marks outside its view of it.
+/// A camera whose pictures do not show the plane, and marks outside the visible part of the plane.
 pub fn seen_from_above(
     demonstrations: &[Demonstration],
     over_table: &CameraOverTable,
@@ -51,7 +51,7 @@ pub fn seen_from_above(
 /// Pictures without the part in the same plan view.
 ///
 /// # Errors
-/// A camera that does not see the plane.
+/// A camera whose pictures do not show the plane.
 pub fn pictures_from_above(
     pictures: &[RgbImage],
     over_table: &CameraOverTable,
@@ -61,7 +61,8 @@ pub fn pictures_from_above(
     Ok(pictures.iter().map(|picture| map.resample(picture)).collect())
 }
 
-/// Whether a region of a camera's pictures can be searched for the part of demonstrations that [`super::seen_from_above`] made.
+/// Whether a region of a camera's pictures can be searched for the part of demonstrations made by
+/// [`super::seen_from_above`].
 ///
 /// # Errors
 /// A region that extends beyond the pictures or belongs to pictures of another size, that does not show the plane, or

@@ -37,7 +37,7 @@ pub struct TeachOptions {
     pub fine_tuning: Option<FineTuning>,
     /// The part's symmetry: its rotations are neither taught nor counted as errors.
     pub symmetry: RotationalSymmetry,
-    /// Range of sizes relative to the nominal size within which the part is searched.
+    /// Range of sizes, relative to the nominal one, at which the part is searched.
     pub size_tolerance: RangeInclusive<f64>,
     /// The region of pictures that the model searches; teaching itself does not use it.
     pub region: Option<SearchRegion>,

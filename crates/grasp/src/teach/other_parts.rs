@@ -1,6 +1,6 @@
 //! Generated parts as negatives in the scenes of teaching.
 //!
-//! Their seeds are separate from those of the shipped parts and of the parts for all measurements.
+//! The seeds of these parts are separate from those of the shipped parts and of the parts for all measurements.
 
 use sdg_demonstration::{AugmentationConfig, AugmentationStyle, Augmenter, Demonstration, SceneStyle};
 use sdg_part_generator::{Part, PhotoConfig, demonstration};

@@ -99,7 +99,7 @@ struct Refined {
 }
 
 impl Tracker {
-    /// A tracker that knows no part yet.
+    /// A tracker without parts.
     pub fn new(detector: PartDetector, config: TrackerConfig) -> Self {
         Self {
             detector: Arc::new(detector),
@@ -452,7 +452,7 @@ impl Tracker {
         }
     }
 
-    /// Of two tracks on one part the older one is kept.
+    /// Keeps the older of two tracks on one part.
     fn drop_doubled(&mut self) {
         let mut idx = 1;
         while idx < self.tracks.len() {

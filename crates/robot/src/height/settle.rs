@@ -10,7 +10,7 @@ const MAX_SIGMAS: f64 = 3.0;
 pub struct GivenHeight {
     /// Height, m.
     pub height_m: f64,
-    /// Its standard deviation, m.
+    /// Standard deviation of the height, m.
     pub sigma_m: f64,
 }
 
@@ -38,9 +38,9 @@ impl HeightSource {
 pub struct SettledHeight {
     /// Height, m.
     pub height_m: f64,
-    /// Its standard deviation, m.
+    /// Standard deviation of the height, m.
     pub sigma_m: f64,
-    /// Its source.
+    /// Source of the height.
     pub source: HeightSource,
 }
 

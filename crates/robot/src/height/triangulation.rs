@@ -33,7 +33,7 @@ pub const RELIEF_M: f64 = 2.3e-3;
 pub struct MeasuredHeight {
     /// Height, m.
     pub height_m: f64,
-    /// Its standard deviation, m.
+    /// Standard deviation of the height, m.
     pub sigma_m: f64,
 }
 

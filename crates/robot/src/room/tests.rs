@@ -25,7 +25,7 @@ fn bar() -> PartShape {
 }
 
 fn check(pitch_mm: [f64; 2], part: &PartShape, symmetry: RotationalSymmetry) -> Result<()> {
-    // A cell in the middle of a rotated tray: the tray's own axes count.
+    // A cell in the centre of a rotated tray: the tray's own axes count.
     tray(pitch_mm, 0.7).goal(6).unwrap().check_room(part, symmetry, MARGIN_M)
 }
 

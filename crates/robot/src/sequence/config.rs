@@ -22,7 +22,7 @@ pub const LOOK_HEIGHT_M: f64 = 0.58;
 /// A pose of the arm for finding the part.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum LookOut {
-    /// The camera on the hand looks vertically down.
+    /// The camera on the hand points vertically down.
     CameraAt {
         /// x and y of the camera in the base frame, m.
         at_m: [f64; 2],
@@ -135,7 +135,7 @@ impl LookOut {
     }
 }
 
-/// The pose of a camera at (x, y, `height_m`) in the base frame that looks straight down. At yaw 0 the picture's up
+/// The pose of a camera at (x, y, `height_m`) in the base frame that points straight down. At yaw 0 the picture's up
 /// direction is the base's x and its right direction is -y; a positive yaw rotates it counter-clockwise as seen from
 /// above.
 pub fn camera_looking_down(x: f64, y: f64, height_m: f64, yaw_rad: f64) -> Isometry3<f64> {

@@ -36,7 +36,8 @@ impl<Q: Cdr + 'static, A: Cdr + 'static> Server<Q, A> {
         &self.name
     }
 
-    /// The next request, or the reason why it is invalid; `None` if none arrives in time. Both must be answered.
+    /// The next request, or the reason why it is invalid; `None` if none arrives in time. An invalid request must also
+    /// be answered.
     ///
     /// # Errors
     /// Errors reported by the network.

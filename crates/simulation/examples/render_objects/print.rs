@@ -50,7 +50,7 @@ const LETTERS: [(char, [u8; 7]); 40] = [
 /// A texture of a square of `span` metres about the origin, seen from above; `color` returns the colour at a point in
 /// metres.
 ///
-/// It fits a mesh with `centred_texture(mesh, span)`. Each texel is the mean of nine samples.
+/// For meshes with `centred_texture(mesh, span)`. Each texel is the mean of nine samples.
 pub fn plan_texture(size: u32, span: f64, mut color: impl FnMut(Point2<f64>) -> Color) -> Texture {
     let texel = span / f64::from(size);
     Texture::paint(size, |u, v| {

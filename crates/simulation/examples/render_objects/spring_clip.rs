@@ -28,7 +28,7 @@ const SPAN: f64 = 0.10;
 pub fn spring_clip() -> Part {
     let corner = |x: f64, z: f64| Point3::new(x, 0.0, z);
     let flat = |path: Vec<Point3<f64>>| -> Vec<Point2<f64>> { path.iter().map(|p| Point2::new(p.x, p.z)).collect() };
-    // The back is round, because the arcs of its corners meet in its middle.
+    // The back is round, because the arcs of its corners meet at its centre.
     let back = flat(rounded_path(
         &[
             corner(TAB_START, SHEET / 2.0),
@@ -138,7 +138,7 @@ fn leaf_slope() -> f64 {
     (NIP.1 - BACK_HEIGHT) / (NIP.0 - BACK)
 }
 
-/// Height of the upper leaf's middle at a place along it.
+/// Height of the upper leaf's centre line at a place along it.
 fn leaf_height(x: f64) -> f64 {
     NIP.1 + leaf_slope() * (x - NIP.0)
 }

@@ -53,7 +53,7 @@ impl fmt::Display for LookAlikeKind {
 /// A part that resembles another one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LookAlike {
-    /// Its difference from the part.
+    /// The difference from the part.
     pub kind: LookAlikeKind,
     /// The look-alike as a part of its own.
     pub spec: ObjectSpec,

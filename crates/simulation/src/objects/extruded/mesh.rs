@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 
 use nalgebra::{Point2, Point3, Vector2};
 
-/// A piece of the part between two values of x, and one interval along y at each of them, in the object frame, in
-/// metres.
+/// A piece of the part between two values of x, with one interval along y at each of them; in metres in the object
+/// frame.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Strip {
     pub(super) x: [f64; 2],
@@ -57,7 +57,7 @@ pub(super) fn mesh(
         let [a, b, c, d] = quad;
         obj.quad([a, d, c, b].map(|p| (Point3::new(p.x, p.y, 0.0), texcoord(p))), [0.0, 0.0, -1.0]);
     }
-    // Counter-clockwise from above, so that walls face outwards.
+    // Walls face outwards if the corners are counter-clockwise from above.
     let doubled_area: f64 =
         (0..corners.len()).map(|i| corners[i].coords.perp(&corners[(i + 1) % corners.len()].coords)).sum();
     for i in 0..corners.len() {

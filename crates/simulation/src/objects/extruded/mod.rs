@@ -38,7 +38,7 @@ const MAX_TEXTURE_PX: u32 = 1024;
 /// the colour is that of the table.
 const WALL_INSET_PX: f64 = 2.0;
 
-/// The data of an extruded part; positions in pixels of `photo`, which looks vertically down.
+/// The data of an extruded part; positions in pixels of `photo`, which is taken vertically from above.
 #[derive(Debug, Clone)]
 pub struct Extrusion<'a> {
     /// Name at the command line.
