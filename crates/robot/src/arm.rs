@@ -31,7 +31,7 @@ pub trait Arm {
     /// Stands still for `duration_secs`; `watch` receives every state.
     ///
     /// # Errors
-    /// As [`Arm::follow`].
+    /// As for [`Arm::follow`].
     fn wait(&mut self, duration_secs: f64, watch: &mut Watch) -> Result<(), RobotError>;
 
     /// The present state of the hand.
@@ -73,7 +73,7 @@ pub trait Arm {
     /// Recovers from a reflex or another error, without moving the arm.
     ///
     /// # Errors
-    /// If the error persists.
+    /// The error, if it persists.
     fn recover(&mut self) -> Result<(), RobotError>;
 }
 
@@ -83,6 +83,6 @@ pub trait CompliantArm: Arm {
     /// receives every state.
     ///
     /// # Errors
-    /// As [`Arm::follow`].
+    /// As for [`Arm::follow`].
     fn touch_down(&mut self, touch_down: &TouchDown, watch: &mut Watch) -> Result<Touched, RobotError>;
 }

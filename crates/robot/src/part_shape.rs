@@ -16,7 +16,7 @@ const DISC_SHARE: f64 = 0.9;
 /// The grasp's frame is the tcp's frame while the part is held as marked: x along the marked line, y across it, z down.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PartShape {
-    /// Convex, m.
+    /// The convex outline, m.
     outline: Polygon,
     jaw_width_m: f64,
     top_m: f64,
@@ -24,8 +24,8 @@ pub struct PartShape {
 }
 
 impl PartShape {
-    /// A part with these points of its outline (m, in the grasp's frame; their convex hull is used), this width between
-    /// the fingers (m), and these heights of its top and its grasp above the surface under it, m.
+    /// A part from points of its outline in the grasp's frame, whose convex hull is used, the width between the
+    /// fingers, and the heights of top and grasp above the surface under the part; all in m.
     ///
     /// # Errors
     /// [`RobotError::Configuration`] for numbers that are not finite, for an outline without an area, and for one that

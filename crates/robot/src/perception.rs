@@ -15,7 +15,7 @@ pub trait PartFinder<A: Arm> {
     /// Takes a picture and returns its best grasp, at any score; `None` if there is no detection.
     ///
     /// # Errors
-    /// If no picture can be taken or perception itself fails; the sequence is aborted with this error.
+    /// A picture that cannot be taken, and a failure of perception; the sequence is aborted with this error.
     fn find(&mut self, arm: &mut A) -> Result<Option<GraspTarget>>;
 
     /// As [`PartFinder::find`], but of several detections it returns the nearest one to the grasp `base_from_tcp`.

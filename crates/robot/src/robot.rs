@@ -231,7 +231,7 @@ impl<'a, A: Arm> Robot<'a, A> {
     /// Recovers the arm and allows motions again, after a person has checked it.
     ///
     /// # Errors
-    /// If the error persists; then nothing moves.
+    /// The error, if it persists; nothing moves then.
     pub fn recover(&mut self) -> Result<()> {
         self.arm.recover()?;
         self.latched = None;

@@ -30,7 +30,7 @@ impl CameraView {
     /// Takes a picture with a camera of the model, in the present state of `data`.
     ///
     /// # Errors
-    /// As [`Renderer::image`].
+    /// As for [`Renderer::image`].
     pub fn capture(renderer: &mut Renderer, data: &mut Data, camera: Id<Camera>) -> Result<Self> {
         let image = renderer.image(data, camera)?;
         Ok(Self { image, camera: posed_camera(renderer, data, camera) })

@@ -40,7 +40,7 @@ impl CollisionWorld {
     /// The arm with its fingers at an opening (m), among obstacles.
     ///
     /// # Errors
-    /// As [`Model::from_xml`].
+    /// As for [`Model::from_xml`].
     pub fn new(obstacles: &[Obstacle], opening_m: f64) -> Result<Self> {
         // Collision bits: 1 for obstacles, 2 for visible shapes of the arm.
         let text = String::from_utf8_lossy(&panda_asset().bytes)
@@ -84,7 +84,7 @@ impl CollisionWorld {
     /// The deepest overlap at a configuration, if there is any.
     ///
     /// # Errors
-    /// As [`CollisionWorld::overlaps`].
+    /// As for [`CollisionWorld::overlaps`].
     pub fn deepest(&mut self, q: &JointVector) -> Result<Option<Overlap>> {
         Ok(self.overlaps(q)?.into_iter().max_by(|a, b| a.depth_m.total_cmp(&b.depth_m)))
     }

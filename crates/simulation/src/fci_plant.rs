@@ -65,7 +65,7 @@ impl PandaPlant {
     /// at rest.
     ///
     /// # Errors
-    /// As [`PandaPlant::new`].
+    /// As for [`PandaPlant::new`].
     pub fn with_positions(config: &WorkcellConfig, qpos: &[f64]) -> Result<Self> {
         let model = build_model(config, "")?;
         let ids = PandaIds::find(&model)?;

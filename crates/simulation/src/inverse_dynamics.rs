@@ -17,7 +17,7 @@ impl InverseDynamics {
     /// The arm with its fingers at an opening (m).
     ///
     /// # Errors
-    /// As [`Model::from_xml`].
+    /// As for [`Model::from_xml`].
     pub fn new(opening_m: f64) -> Result<Self> {
         Self::with_load(opening_m, 0.0, [0.0; 3])
     }
@@ -25,7 +25,7 @@ impl InverseDynamics {
     /// The arm with a point load: its mass (kg) and its position in the flange's frame (m).
     ///
     /// # Errors
-    /// As [`Model::from_xml`].
+    /// As for [`Model::from_xml`].
     pub fn with_load(opening_m: f64, mass_kg: f64, center_in_flange_m: [f64; 3]) -> Result<Self> {
         let mut text = String::from_utf8_lossy(&panda_asset().bytes).into_owned();
         if mass_kg > 0.0 {

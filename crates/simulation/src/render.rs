@@ -186,7 +186,7 @@ impl Renderer {
     /// The geom that each pixel of the camera's picture shows.
     ///
     /// # Errors
-    /// As [`Renderer::image`].
+    /// As for [`Renderer::image`].
     pub fn segmentation(&mut self, data: &mut Data, camera: Id<Camera>) -> Result<Segmentation> {
         let flags = self.scene.flags;
         self.scene.flags[mj::mjRND_SEGMENT as usize] = 1;

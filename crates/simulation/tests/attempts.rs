@@ -77,7 +77,7 @@ fn unlit_cell(scene: SceneVariation) -> Workcell {
     Workcell::new(&WorkcellConfig { wrist_render, ..WorkcellConfig::new(scene) }).unwrap()
 }
 
-/// The step and the reason of a failure.
+/// The step of a failure and the reason.
 fn failure(report: AttemptReport) -> (GraspStep, String) {
     match report.outcome {
         GraspOutcome::Failed { step, why } => (step, why),

@@ -60,7 +60,7 @@ impl Robot {
     /// Commands joint velocities (rad/s); see [`Robot::control_joint_positions`].
     ///
     /// # Errors
-    /// As [`Robot::control_joint_positions`].
+    /// As for [`Robot::control_joint_positions`].
     pub fn control_joint_velocities(
         &mut self,
         controller: InternalController,
@@ -75,7 +75,7 @@ impl Robot {
     /// [`Robot::control_joint_positions`].
     ///
     /// # Errors
-    /// As [`Robot::control_joint_positions`], and [`FciError::Command`] for a matrix that is not a pose.
+    /// As for [`Robot::control_joint_positions`], and [`FciError::Command`] for a matrix that is not a pose.
     pub fn control_poses(
         &mut self,
         controller: InternalController,
@@ -91,7 +91,7 @@ impl Robot {
     /// Commands twists of the end effector in the base frame (m/s, rad/s); see [`Robot::control_joint_positions`].
     ///
     /// # Errors
-    /// As [`Robot::control_joint_positions`].
+    /// As for [`Robot::control_joint_positions`].
     pub fn control_twists(
         &mut self,
         controller: InternalController,
@@ -105,7 +105,7 @@ impl Robot {
     /// Commands torques (N·m), to which the robot adds gravity compensation; see [`Robot::control_joint_positions`].
     ///
     /// # Errors
-    /// As [`Robot::control_joint_positions`].
+    /// As for [`Robot::control_joint_positions`].
     pub fn control_torques(
         &mut self,
         mut controller: impl FnMut(&RobotState, Duration) -> Answer<[f64; 7]>,
@@ -124,7 +124,7 @@ impl Robot {
     /// `message_id` and the flags that end the motion.
     ///
     /// # Errors
-    /// As [`Robot::control_joint_positions`].
+    /// As for [`Robot::control_joint_positions`].
     pub fn control(
         &mut self,
         controller: ControllerMode,

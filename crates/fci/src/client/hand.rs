@@ -91,7 +91,7 @@ impl Hand {
     /// Moves the fingers to a width (m) at a speed (m/s).
     ///
     /// # Errors
-    /// As [`Hand::homing`].
+    /// As for [`Hand::homing`].
     pub fn move_to(&mut self, width: f64, speed: f64) -> Result<bool> {
         self.execute(&HandRequest::Move { width, speed })
     }
@@ -100,7 +100,7 @@ impl Hand {
     /// then press on an object at a width between `width - epsilon_inner` and `width + epsilon_outer`.
     ///
     /// # Errors
-    /// As [`Hand::homing`].
+    /// As for [`Hand::homing`].
     pub fn grasp(
         &mut self,
         width: f64,
@@ -115,7 +115,7 @@ impl Hand {
     /// Stops the fingers and releases the part.
     ///
     /// # Errors
-    /// As [`Hand::homing`].
+    /// As for [`Hand::homing`].
     pub fn stop(&mut self) -> Result<bool> {
         self.execute(&HandRequest::Stop)
     }

@@ -28,7 +28,7 @@ pub trait Codec {
     /// Writes or reads one byte.
     ///
     /// # Errors
-    /// As [`Codec::bytes`].
+    /// As for [`Codec::bytes`].
     fn u8(&mut self, value: &mut u8) -> Result<(), WireError> {
         let mut bytes = [*value];
         self.bytes(&mut bytes)?;
@@ -39,7 +39,7 @@ pub trait Codec {
     /// Writes or reads two bytes.
     ///
     /// # Errors
-    /// As [`Codec::bytes`].
+    /// As for [`Codec::bytes`].
     fn u16(&mut self, value: &mut u16) -> Result<(), WireError> {
         let mut bytes = value.to_le_bytes();
         self.bytes(&mut bytes)?;
@@ -50,7 +50,7 @@ pub trait Codec {
     /// Writes or reads four bytes.
     ///
     /// # Errors
-    /// As [`Codec::bytes`].
+    /// As for [`Codec::bytes`].
     fn u32(&mut self, value: &mut u32) -> Result<(), WireError> {
         let mut bytes = value.to_le_bytes();
         self.bytes(&mut bytes)?;
@@ -61,7 +61,7 @@ pub trait Codec {
     /// Writes or reads eight bytes.
     ///
     /// # Errors
-    /// As [`Codec::bytes`].
+    /// As for [`Codec::bytes`].
     fn u64(&mut self, value: &mut u64) -> Result<(), WireError> {
         let mut bytes = value.to_le_bytes();
         self.bytes(&mut bytes)?;
@@ -72,7 +72,7 @@ pub trait Codec {
     /// Writes or reads a boolean as one byte; every byte except zero is true, as in C++.
     ///
     /// # Errors
-    /// As [`Codec::bytes`].
+    /// As for [`Codec::bytes`].
     fn bool(&mut self, value: &mut bool) -> Result<(), WireError> {
         let mut byte = u8::from(*value);
         self.u8(&mut byte)?;
@@ -83,7 +83,7 @@ pub trait Codec {
     /// Writes or reads one double.
     ///
     /// # Errors
-    /// As [`Codec::bytes`].
+    /// As for [`Codec::bytes`].
     fn f64(&mut self, value: &mut f64) -> Result<(), WireError> {
         let mut bytes = value.to_le_bytes();
         self.bytes(&mut bytes)?;
@@ -94,7 +94,7 @@ pub trait Codec {
     /// Writes or reads doubles, in order.
     ///
     /// # Errors
-    /// As [`Codec::bytes`].
+    /// As for [`Codec::bytes`].
     fn f64s(&mut self, values: &mut [f64]) -> Result<(), WireError> {
         values.iter_mut().try_for_each(|value| self.f64(value))
     }
@@ -102,7 +102,7 @@ pub trait Codec {
     /// Writes or reads numbers with the precision of [`Codec::real`], in order.
     ///
     /// # Errors
-    /// As [`Codec::bytes`].
+    /// As for [`Codec::bytes`].
     fn reals(&mut self, values: &mut [f64]) -> Result<(), WireError> {
         match self.real() {
             Real::F64 => self.f64s(values),

@@ -65,7 +65,7 @@ pub struct Tracker {
     arriving: Vec<Track>,
     /// The frame that is being searched.
     searching: Option<u64>,
-    /// When the last search began.
+    /// The time at which the last search began.
     searched_at: Option<Duration>,
     /// The newest frame at low resolution; `None` before the first.
     coarse: Option<CoarseView>,

@@ -86,8 +86,8 @@ pub struct GraspReport {
 /// Grasps the part once.
 ///
 /// # Errors
-/// Errors that end the sequence: perception that could not work, and every error after which nothing moves until a
-/// person allows it. A failed grasp is not an error, even if the part stopped the arm.
+/// Errors that end the sequence: a failure of perception, and every error after which nothing moves until a person
+/// allows it. A failed grasp is not an error, even if the part stopped the arm.
 pub fn grasp<A: Arm>(
     robot: &mut Robot<'_, A>,
     finder: &mut dyn PartFinder<A>,
@@ -256,7 +256,7 @@ impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
         self.take(&target)
     }
 
-    /// From above a found part to the lifted part.
+    /// Grasps and lifts a found part, starting above it.
     fn take(&mut self, target: &GraspTarget) -> Steps<()> {
         self.known.lying.take(&target.base_from_tcp);
         let approach = self.go_above(target)?;

@@ -107,7 +107,7 @@ pub struct PlacingReport {
 /// given, otherwise after the part was found.
 ///
 /// # Errors
-/// As [`super::grasp`]; [`crate::RobotError::Configuration`] if [`GraspConfig::part`] has no room.
+/// As for [`super::grasp`]; [`crate::RobotError::Configuration`] if [`GraspConfig::part`] has no room.
 pub fn grasp_and_place<A: CompliantArm>(
     robot: &mut Robot<'_, A>,
     finder: &mut dyn PartFinder<A>,

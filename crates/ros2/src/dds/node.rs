@@ -139,7 +139,7 @@ impl Node {
         Ok(Self { node: Some(node), naming, rmw, spinner: Some(spinner) })
     }
 
-    /// The node's names, for resolving others.
+    /// The naming of the node, for the resolution of names.
     pub fn naming(&self) -> &Naming {
         &self.naming
     }

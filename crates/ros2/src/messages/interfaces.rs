@@ -39,7 +39,7 @@ structure! {
         annotation_path: String,
         /// The annotation itself, as COCO or LabelMe JSON, instead of a path.
         annotation: String,
-        /// A to D or S; empty for C.
+        /// Kind of the grasp model: A to D or S; empty for C.
         model: String,
         /// The file for the grasp model.
         out_path: String,
@@ -59,7 +59,7 @@ structure! {
     TeachResponse {
         /// Whether a model was taught.
         success: bool,
-        /// The reason of a failure.
+        /// The reason for a failure.
         message: String,
         /// Path of the grasp model.
         model_path: String,
@@ -83,7 +83,7 @@ structure! {
     GraspResponse {
         /// Whether the part is held; for a dry run, whether it can be grasped.
         success: bool,
-        /// The reason of a failure.
+        /// The reason for a failure.
         message: String,
         /// The last started step: detect, hover, approach, close, lift or hold.
         step: String,

@@ -74,7 +74,7 @@ impl ObjectSpec {
     /// The kinds of look-alikes of this part: all kinds, except the mirror image if it equals the part.
     ///
     /// # Errors
-    /// As [`ObjectSpec::look_alike`].
+    /// As for [`ObjectSpec::look_alike`].
     pub fn look_alike_kinds(&self) -> Result<Vec<LookAlikeKind>> {
         let is_chiral = self.mirror_difference()? >= MIN_MIRROR_DIFFERENCE;
         Ok(LookAlikeKind::ALL.into_iter().filter(|kind| *kind != LookAlikeKind::Mirrored || is_chiral).collect())
@@ -99,7 +99,7 @@ impl ObjectSpec {
     /// greatest similarity.
     ///
     /// # Errors
-    /// As [`ObjectSpec::look_alike`].
+    /// As for [`ObjectSpec::look_alike`].
     pub fn mirror_difference(&self) -> Result<f64> {
         let (own, mirror) = (self.height_map(CELL_M)?, self.mirrored()?.height_map(CELL_M)?);
         let difference = |turn: f64, shift: Vector2<f64>| {

@@ -26,8 +26,8 @@ pub struct TableCameraConfig {
     pub duration_secs: Option<f64>,
     /// Number of instances of the part, 1 to 4 (`count`).
     pub count: usize,
-    /// Another part beside it (`beside`): the name of a part, or a look-alike of this one: `mirrored`, `feature-moved`,
-    /// or a size such as `0.9`.
+    /// Another part beside the first (`beside`): the name of a part, or a look-alike of the first: `mirrored`,
+    /// `feature-moved`, or a size such as `0.9`.
     pub beside: Option<String>,
     /// Number of distractors (`things`).
     pub num_things: usize,

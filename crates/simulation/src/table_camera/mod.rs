@@ -145,7 +145,7 @@ impl TableCamera {
     /// Opens the camera of an address (without `sim:`); the times of frames start now.
     ///
     /// # Errors
-    /// As [`TableCameraConfig`]'s `from_str` and [`Self::new`].
+    /// As for [`TableCameraConfig`]'s `from_str` and [`Self::new`].
     pub fn open(text: &str) -> Result<Self> {
         let mut made = Self::new(&text.parse()?)?;
         made.address = format!("sim:{text}").into();
@@ -166,7 +166,7 @@ impl TableCamera {
     /// The next frame; `None` at the end of the sequence.
     ///
     /// # Errors
-    /// As [`Renderer::image`].
+    /// As for [`Renderer::image`].
     pub fn next_view(&mut self) -> Result<Option<TableView>> {
         let secs = self.number as f64 / self.config.fps;
         if self.config.duration_secs.is_some_and(|duration| secs >= duration) {

@@ -71,7 +71,7 @@ pub struct TestView {
 /// The picture of one scene from the first pose of an attempt.
 ///
 /// # Errors
-/// As [`Workcell::new`] and [`Workcell::view_from`].
+/// As for [`Workcell::new`] and [`Workcell::view_from`].
 pub fn test_view(scene: SceneVariation) -> Result<TestView> {
     test_view_drawn(WorkcellConfig::new(scene))
 }
@@ -118,7 +118,7 @@ pub struct DemonstrationView {
 /// Takes the demonstration picture of a part.
 ///
 /// # Errors
-/// As [`Workcell::new`]; [`SimulationError::Configuration`] if the part is not in the camera's view.
+/// As for [`Workcell::new`]; [`SimulationError::Configuration`] if the part is not in the camera's view.
 pub fn demonstration_view(spec: &ObjectSpec) -> Result<DemonstrationView> {
     demonstration_view_drawn(&WorkcellConfig::new(demonstration_scene(spec)))
 }

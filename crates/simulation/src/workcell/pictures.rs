@@ -17,7 +17,7 @@ impl Workcell {
     /// The wrist camera's present picture.
     ///
     /// # Errors
-    /// As [`Renderer::image`].
+    /// As for [`Renderer::image`].
     pub fn wrist_view(&mut self) -> Result<CameraView> {
         // After a step, body positions are one period behind the joints.
         self.data.forward()?;
@@ -34,7 +34,7 @@ impl Workcell {
     /// The geom that each pixel of the wrist camera's present picture shows.
     ///
     /// # Errors
-    /// As [`Renderer::segmentation`].
+    /// As for [`Renderer::segmentation`].
     pub fn wrist_segmentation(&mut self) -> Result<Segmentation> {
         self.wrist_renderer.segmentation(&mut self.data, self.camera)
     }
@@ -67,7 +67,7 @@ impl Workcell {
     /// A picture of the whole workcell by the outside camera, in its present state.
     ///
     /// # Errors
-    /// As [`Renderer::new`].
+    /// As for [`Renderer::new`].
     pub fn scene_image(&mut self, render: RenderConfig) -> Result<RgbImage> {
         let mut renderer = Renderer::new(self.data.model(), render)?;
         renderer.image(&mut self.data, self.scene_camera)
@@ -77,7 +77,7 @@ impl Workcell {
     /// an opening (m), for showing plans.
     ///
     /// # Errors
-    /// As [`Workcell::scene_image`].
+    /// As for [`Workcell::scene_image`].
     pub fn scene_image_at(
         &mut self,
         renderer: &mut Renderer,
@@ -93,7 +93,7 @@ impl Workcell {
     /// Starts to record pictures of the outside camera over time.
     ///
     /// # Errors
-    /// As [`Renderer::new`].
+    /// As for [`Renderer::new`].
     pub fn start_recording(&mut self, config: &RecordConfig) -> Result<()> {
         self.recorder = Some(Recorder::new(self.data.model(), self.scene_camera, config)?);
         Ok(())
