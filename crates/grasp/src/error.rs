@@ -1,6 +1,6 @@
 //! Errors of a grasp model, its file or its grasps.
 
-/// Why a model could not be taught, read or used.
+/// The reason why a model could not be taught, read or used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages explain the fields")]

@@ -58,7 +58,7 @@ impl Impedance {
         null_stiffness: 10.0,
         max_torque_step_nm: 0.9,
     };
-    /// Soft along z, stiff sideways and in rotation: for pressing on something.
+    /// Soft along z, stiff sideways and in rotation: for pressing on a surface.
     pub const SOFT_DOWN: Self = Self {
         stiffness: Vector6::new(1000.0, 1000.0, 150.0, 50.0, 50.0, 50.0),
         mass: Vector6::new(5.0, 5.0, 1.0, 1.0, 1.0, 1.0),

@@ -226,7 +226,7 @@ mod tests {
                 _ => None,
             })
             .collect();
-        // To the look-out pose, above the part, down, and up.
+        // Motions to the look-out pose, above the part, down, and up.
         assert_eq!(motions.len(), 4);
         assert!(motions.windows(2).all(|pair| (pair[0].end() - pair[1].start()).amax() < 1e-9));
         let tcp = ArmGeometry::panda().forward(motions[2].end()).translation.vector;

@@ -120,7 +120,7 @@ impl Robot {
         })
     }
 
-    /// Commands any generator with any controller; the closure fills the fields that they read. This function sets
+    /// Commands any generator with any controller; the closure sets the fields that both use. This function sets
     /// `message_id` and the flags that end the motion.
     ///
     /// # Errors

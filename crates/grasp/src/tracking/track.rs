@@ -30,7 +30,7 @@ const MAX_FORWARD_SECS: f64 = 0.1;
 /// If the agreement is below this fraction of its running mean, refinement is repeated with more effort. Chosen by
 /// hand.
 const POOR_SHARE: f64 = 0.85;
-/// Maximum difference between a search's pose and the pose by edges that is a correction; larger differences are
+/// Maximum difference between a search's pose and the pose by edges that is a correction; larger differences indicate
 /// another place. In pixels of the cut-out; chosen by hand.
 const MAX_CORRECTION_PX: f64 = 3.0;
 /// This difference in radians. Chosen by hand.

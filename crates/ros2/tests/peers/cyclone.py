@@ -37,7 +37,7 @@ def transient_local(depth):
 
 
 def raw_type(type_name):
-    """A type with this name whose samples are the bytes on the network, without the four that name the encoding."""
+    """A type with this name whose samples are the bytes on the network, without the four bytes of the encoding."""
 
     @dataclasses.dataclass
     class Raw(IdlStruct, typename=type_name):

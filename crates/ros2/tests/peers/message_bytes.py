@@ -47,7 +47,7 @@ DEFINITIONS = {
 
 
 def definitions():
-    """The types above, and the requests and responses of our services, from the files that a user builds."""
+    """The types above, and the requests and responses of this project's services, from the files that a user builds."""
     all_of_them = dict(DEFINITIONS)
     for name in ("Detect", "Teach", "Grasp"):
         request, response = (INTERFACES / f"{name}.srv").read_text().split("---\n")
@@ -116,7 +116,7 @@ def main(program):
     sent = []
     for name in names:
         for _ in range(ROUNDS):
-            # The first four bytes name the encoding.
+            # The first four bytes identify the encoding.
             sent.append((name, bytes(store.serialize_cdr(message_of(store, name, dice), name))[4:]))
     lines = "\n".join(f"{name} {data.hex()}" for name, data in sent)
     answers = subprocess.run([program], input=lines, capture_output=True, text=True, check=True).stdout.splitlines()
