@@ -101,7 +101,7 @@ fn an_answer_to_another_request_is_none() {
     drop(robot.join().unwrap());
 }
 
-/// A client that waits for no answer stores a bounded number of them; the rest waits in the network.
+/// A client that waits for no answer stores a bounded number of answers; the others wait in the network.
 #[test]
 fn a_robot_that_floods_its_client_takes_no_memory() {
     const ANSWER_BYTES: usize = 64 << 10;

@@ -58,7 +58,7 @@ pub struct ArmState {
 pub struct HandState {
     /// Distance between the fingers, m.
     pub opening_m: f64,
-    /// Whether the hand presses on something with the commanded force, at a width near the commanded one.
+    /// Whether the hand presses on an object with the commanded force, at a width near the commanded one.
     pub is_grasping: bool,
     /// Force of each finger, N, if the hand measures it.
     pub force_n: Option<f64>,

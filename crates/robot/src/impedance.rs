@@ -27,7 +27,7 @@ const DAMPING: f64 = 1e-2;
 /// Stiffness of the tcp.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Impedance {
-    /// Along x, y and z of the base, N/m, and about them, N·m/rad.
+    /// Stiffness along x, y and z of the base, N/m, and about them, N·m/rad.
     pub stiffness: Vector6<f64>,
     /// Mass of the tcp assumed by the damper, kg along and kg·m² about each direction: libfranka's example has 1 for
     /// all.

@@ -3,7 +3,7 @@
 //! ```text
 //!        ┌──────┐  part in the next cell along y
 //!        └──────┘
-//!    room   ┌─┐    finger, open to let go, with the part's own place between it and the other
+//!    room   ┌─┐    finger, open for the release, with the part's place between it and the other
 //!        ┌──┴─┴─┐
 //!        │ part │  rotated by an angle of the part's symmetry, the hand may have room elsewhere
 //!        └──┬─┬─┘

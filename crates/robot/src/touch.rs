@@ -69,7 +69,7 @@ impl TouchDown {
     /// # Errors
     /// [`RobotError::Configuration`].
     pub(crate) fn validate(&self) -> Result<()> {
-        /// At higher speeds a contact is an impact.
+        /// Maximum speed: at higher speeds a contact is an impact.
         const MAX_SPEED_M_S: f64 = 0.05;
         const MAX_WAY_M: f64 = 0.2;
         const MAX_FORCE_N: f64 = 15.0;

@@ -63,7 +63,7 @@ impl fmt::Debug for Watch {
 }
 
 impl Default for Watch {
-    /// Without a stop request.
+    /// A watch without a stop request.
     fn default() -> Self {
         Self::new(Box::new(|| None))
     }

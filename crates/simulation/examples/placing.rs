@@ -31,7 +31,7 @@ const MAX_MOVED_M: f64 = 0.5e-3;
 const MAX_OVER_REST_M: f64 = 0.005;
 const MAX_STATIC_N: f64 = 10.0;
 const MAX_PEAK_N: f64 = 25.0;
-/// The paper's parts that a hand can still hold 5 mm too high.
+/// The paper's parts that the hand still holds if it grasps 5 mm too high.
 const PARTS: [&str; 4] = ["pendulum", "fuel_line", "rod_end", "common_line"];
 
 fn main() -> Result<(), Box<dyn Error>> {

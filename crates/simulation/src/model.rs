@@ -134,8 +134,7 @@ impl Model {
         let mut message: [c_char; 1024] = [0; 1024];
         let _one_at_a_time = XML_LOCK.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
         let ptr = guarded("mj_loadXML", || {
-            // SAFETY: the name ends in NUL, the file system is initialised, and the buffer is as
-            // long as we say.
+            // SAFETY: the name ends in NUL, the file system is initialised, and the buffer has the given length.
             unsafe { mj::mj_loadXML(name.as_ptr(), files.as_ptr(), message.as_mut_ptr(), message.len() as c_int) }
         })
         .map_err(|error| match error {
@@ -311,8 +310,8 @@ impl VirtualFiles {
             code => return Err(problem(format!("mj_makeEmptyFileVFS returned {code}"))),
         }
         let slot = self.vfs.nfile as usize - 1;
-        // SAFETY: MuJoCo appended the file in the last slot, with a buffer of `size` bytes of its
-        // own, which cannot overlap ours.
+        // SAFETY: MuJoCo appended the file in the last slot, with a buffer of `size` bytes of its own, which cannot
+        // overlap `bytes`.
         unsafe {
             std::ptr::copy_nonoverlapping(bytes.as_ptr(), self.vfs.filedata[slot].cast::<u8>(), bytes.len());
         }

@@ -232,9 +232,9 @@ impl Renderer {
         let _lock = drawing_lock();
         let _current = self.context.make_current()?;
         guarded("mjr_render", || {
-            // SAFETY: model, data, scene and context are live and were made for this model
-            // (asserted above); our OpenGL context is current; the buffer holds three
-            // bytes a pixel of the viewport, which is the framebuffer's own size.
+            // SAFETY: model, data, scene and context are live and were made for this model (asserted above); this
+            // renderer's OpenGL context is current; the buffer holds three bytes a pixel of the viewport, which is the
+            // framebuffer's own size.
             unsafe {
                 mj::mjv_updateScene(
                     self.model.as_ptr(),

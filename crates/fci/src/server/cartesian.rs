@@ -29,15 +29,15 @@ const DAMPING: f64 = 1e-3;
 pub struct CartesianReference {
     /// `base_from_ee`.
     pub pose: Isometry3<f64>,
-    /// m/s and rad/s in the base frame.
+    /// Twist in the base frame, m/s and rad/s.
     pub twist: Vector6<f64>,
-    /// m/s² and rad/s² in the base frame.
+    /// Derivative of the twist, m/s² and rad/s².
     pub twist_rate: Vector6<f64>,
     /// Position of joint 3 and sign of joint 4.
     pub elbow: [f64; 2],
-    /// rad/s, of joint 3.
+    /// Velocity of joint 3, rad/s.
     pub elbow_velocity: f64,
-    /// rad/s², of joint 3.
+    /// Acceleration of joint 3, rad/s².
     pub elbow_acceleration: f64,
 }
 

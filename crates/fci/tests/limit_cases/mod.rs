@@ -278,7 +278,7 @@ pub fn joints_of_cartesian_motions(limits: &Limits) -> Vec<Case> {
 }
 
 /// Folds the arm from `home`, rad, until the robot stops it before a self-collision, then moves it to just before that
-/// pose. Returns the results of the motion just inside and of the one outside.
+/// pose. Returns the results of the motion just inside and of the motion outside.
 ///
 /// # Errors
 /// Errors of the connection.

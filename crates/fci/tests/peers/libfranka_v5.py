@@ -100,7 +100,7 @@ def main():
 
     shape = swing(2.0)
 
-    # Joint positions, with each internal controller; the measured end is compared with the commanded one.
+    # Joint positions, with each internal controller; the arm must follow within 0.01 rad.
     for label, mode in [("joint impedance", STIFF), ("Cartesian impedance", SOFT)]:
         start = robot.read_once().q_d
         largest = [0.0]

@@ -21,11 +21,11 @@ const NUM_SAMPLES: u32 = 20;
 /// computes them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Deviation {
-    /// rad.
+    /// Positions, rad.
     pub(super) q: JointVector,
-    /// rad/s.
+    /// Velocities, rad/s.
     pub(super) dq: JointVector,
-    /// rad/s².
+    /// Accelerations, rad/s².
     pub(super) ddq: JointVector,
 }
 

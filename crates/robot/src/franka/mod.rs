@@ -45,7 +45,7 @@ const CONTACT_FACTOR: f64 = 2.0;
 /// Radius of the ball that determines a load's inertia, m.
 const LOAD_RADIUS_M: f64 = 0.03;
 
-/// A Franka arm, connected.
+/// A connected Franka arm.
 #[derive(Debug)]
 pub struct FrankaArm {
     geometry: ArmGeometry,
@@ -311,7 +311,7 @@ fn collision_behavior(sensitivity: ContactSensitivity) -> CollisionBehavior {
 mod tests {
     use super::*;
 
-    /// The thresholds are doubled where contact is wanted, and are never larger.
+    /// The thresholds are doubled where contact is intended, and are never larger.
     #[test]
     fn a_franka_stops_at_20_n_in_free_motion_and_at_40_n_where_it_may_touch() {
         for (sensitivity, max_n, max_nm) in

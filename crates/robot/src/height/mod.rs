@@ -52,8 +52,8 @@ impl HeightMeasurement {
         }
     }
 
-    /// Combines the height of the marks by the part itself with the one by the surface beside it. If they contradict
-    /// each other, the height by the part is used.
+    /// Combines the height of the marks measured by the part itself with that measured by the surface beside it. If
+    /// they contradict each other, the height by the part is used.
     pub fn combined(&self, by_part: &MeasuredHeight, surface: &MeasuredHeight) -> MeasuredHeight {
         let on_surface = MeasuredHeight { height_m: surface.height_m + self.mark_height_m, ..*surface };
         on_surface.mean(by_part).unwrap_or(*by_part)

@@ -14,8 +14,8 @@ use super::sighting::Sighting;
 
 /// Minimum sideways distance of the camera, m.
 pub const MIN_BASELINE_M: f64 = 0.080;
-/// Minimum difference of the slopes of two lines of sight; with less they count as parallel. It is that of 80 mm at
-/// 0.8 m.
+/// Minimum difference of the slopes of two lines of sight; with less they count as parallel. The value corresponds to
+/// 80 mm at 0.8 m.
 const MIN_SLOPE_DIFFERENCE: f64 = 0.1;
 /// Largest distance between two lines of sight to one part, in standard deviations. At least [`MIN_MISS_ALLOWED_M`] is
 /// allowed, the error of a hand-eye calibration.
@@ -25,7 +25,7 @@ const MIN_MISS_ALLOWED_M: f64 = 0.004;
 const MIN_DISTANCE_M: f64 = 0.05;
 
 /// Standard deviation of the height of the visible edges above the marks, m: fitted on the twelve shipped parts, which
-/// by their lines of sight lie 3.2 mm below to 3.9 mm above their marks (`heights raw 4 101`).
+/// the lines of sight place 3.2 mm below to 3.9 mm above their marks (`heights raw 4 101`).
 pub const RELIEF_M: f64 = 2.3e-3;
 
 /// The height of a part's marks, z of the base frame.

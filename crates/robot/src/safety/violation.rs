@@ -45,7 +45,7 @@ pub enum Violation {
         quantity: &'static str,
         found: f64,
         max: f64,
-        /// m or rad, and their derivatives.
+        /// Unit of the values: m or rad, or a derivative of them.
         unit: &'static str,
     },
     /// The hand leaves the workspace.

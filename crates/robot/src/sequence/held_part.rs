@@ -25,7 +25,7 @@ pub(super) struct HeldPart {
 /// Minimum extent of a part below the tcp, m.
 const MIN_HANG_M: f64 = 0.010;
 
-/// The configured shape of a detected part, else the one by its width between the fingers.
+/// The configured shape of a detected part; without one, the shape assumed from the width between the fingers.
 pub(super) fn shape_of(target: &GraspTarget, table_height_m: f64, config: &GraspConfig) -> Option<PartShape> {
     let height_m = target.base_from_tcp.translation.z - table_height_m;
     config.part.clone().or_else(|| PartShape::between_fingers(target.jaw_width_m, height_m.max(MIN_HANG_M)).ok())

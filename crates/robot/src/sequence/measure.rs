@@ -44,7 +44,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         self.known.surface_m = Some(settled.height_m - measurement.mark_height_m);
         let target = match (settled.source, &sightings[..]) {
             (HeightSource::Measured, [..]) => between(&sightings, settled.height_m),
-            // A single picture was still taken from closer to the part than the one before.
+            // Even a single picture was taken from closer to the part than the picture of its detection.
             (HeightSource::Told, [nearer]) => Some(nearer.at_height(settled.height_m).target),
             (HeightSource::Told, []) => None,
             (HeightSource::Told, several) => between(several, settled.height_m),

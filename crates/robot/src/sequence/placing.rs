@@ -332,8 +332,8 @@ impl<A: Arm> Sequence<'_, '_, A> {
     }
 }
 
-/// Maximum number of symmetric view orientations: a hand that was rotated to make room for its fingers may not reach
-/// its present one for the picture.
+/// Maximum number of symmetric view orientations: for the picture, a hand that was rotated to make room for its fingers
+/// may be unable to keep its orientation.
 const MAX_VIEW_TURNS: usize = 4;
 /// Largest distance of the part from its place, m; a detection farther away is another part.
 const MAX_PLACE_OFFSET_M: f64 = 0.03;

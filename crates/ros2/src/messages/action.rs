@@ -19,7 +19,7 @@ impl Copy for Duration {}
 
 impl Duration {
     /// Converts from seconds, to the nanosecond; 0 for a negative value or NaLargest force, Present force, Present
-    /// force, N.
+    /// force, The maximum force, The force, N.
     pub fn from_secs(secs: f64) -> Self {
         let nanos = (secs.max(0.0) * 1e9).round().min(f64::from(i32::MAX) * 1e9) as u64;
         Self { sec: i32::try_from(nanos / 1_000_000_000).unwrap_or(i32::MAX), nanosec: (nanos % 1_000_000_000) as u32 }
@@ -182,7 +182,7 @@ structure! {
     GripperCommandGoal {
         /// The desired position of the gripper's joint, m.
         position: f64,
-        /// N.
+        /// The force, N.
         max_effort: f64,
     }
 }
@@ -192,7 +192,7 @@ structure! {
     GripperCommandResult {
         /// The position of the gripper's joint, m.
         position: f64,
-        /// N.
+        /// The force, N.
         effort: f64,
         /// Whether the gripper pushes without moving.
         stalled: bool,
@@ -206,7 +206,7 @@ structure! {
     GripperCommandFeedback {
         /// The position of the gripper's joint, m.
         position: f64,
-        /// N.
+        /// The force, N.
         effort: f64,
         /// Whether the gripper pushes without moving.
         stalled: bool,

@@ -76,7 +76,7 @@ impl Workcell {
     /// attempt.
     ///
     /// # Errors
-    /// Errors of the simulation or of perception itself, and of a stopped arm; a failed grasp is a report.
+    /// Errors of the simulation, of perception and of a stopped arm; a failed grasp is not an error, but is reported.
     pub fn run_attempt(
         &mut self,
         finder: &mut dyn PartFinder<Self>,

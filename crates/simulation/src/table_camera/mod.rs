@@ -90,7 +90,7 @@ impl TableCamera {
     /// Builds the scene.
     ///
     /// # Errors
-    /// [`crate::SimulationError::UnknownName`] for a part that does not exist; as [`Renderer::new`].
+    /// [`crate::SimulationError::UnknownName`] for a part that does not exist, and as for [`Renderer::new`].
     pub fn new(config: &TableCameraConfig) -> Result<Self> {
         let spec = ObjectSpec::by_name(&config.part)?;
         let beside = config.part_beside(&spec)?;

@@ -111,7 +111,7 @@ pub struct DemonstrationView {
     pub truth: GraspTruth,
     /// The pixels that show the part.
     pub mask: Mask,
-    /// The outer outline as a person clicks it.
+    /// The outer outline as marked by a person.
     pub outline: Polygon,
 }
 
