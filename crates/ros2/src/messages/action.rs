@@ -18,8 +18,7 @@ structure! {
 impl Copy for Duration {}
 
 impl Duration {
-    /// Converts from seconds, to the nanosecond; 0 for a negative value or NaLargest force, Present force, Present
-    /// force, The maximum force, The force, N.
+    /// Converts from seconds, to the nanosecond; 0 for a negative value or NaN.
     pub fn from_secs(secs: f64) -> Self {
         let nanos = (secs.max(0.0) * 1e9).round().min(f64::from(i32::MAX) * 1e9) as u64;
         Self { sec: i32::try_from(nanos / 1_000_000_000).unwrap_or(i32::MAX), nanosec: (nanos % 1_000_000_000) as u32 }
@@ -182,7 +181,7 @@ structure! {
     GripperCommandGoal {
         /// The desired position of the gripper's joint, m.
         position: f64,
-        /// The force, N.
+        /// The maximum force, N.
         max_effort: f64,
     }
 }
