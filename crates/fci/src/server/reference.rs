@@ -7,17 +7,17 @@ use crate::wire::robot_error::{RobotError, RobotErrors};
 
 /// One cycle in seconds.
 pub const PERIOD_SECS: f64 = 1e-3;
-/// Factor on every limit: rounding differences of doubles are not violations.
+/// Rounding differences of doubles are not violations.
 pub(super) const ROUNDING: f64 = 1.0 + 1e-6;
 
 /// The controller's reference of the joints: `q_d`, `dq_d`, `ddq_d`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointReference {
-    /// rad.
+    /// Positions, rad.
     pub q: JointVector,
-    /// rad/s.
+    /// Velocities, rad/s.
     pub dq: JointVector,
-    /// rad/s².
+    /// Accelerations, rad/s².
     pub ddq: JointVector,
 }
 
