@@ -23,7 +23,7 @@ pub(crate) fn best_agreement<'s, 'a>(sightings: &'s [Sighting<'a>]) -> Option<&'
     sightings.iter().max_by(|a, b| a.placed.agreement.total_cmp(&b.placed.agreement))
 }
 
-/// All sightings in an image: first the network's proposals, then the matches of the search. A place may occur twice.
+/// All such places in an image: first the network's proposals, then the matches of the search. A place may occur twice.
 pub(crate) fn sightings<'a>(proposals: &Proposals, image: &SearchedImage<'a>) -> Vec<Sighting<'a>> {
     let found = search(image);
     let proposed = parallel::map(&proposals.candidates, |candidate| proposed(candidate, &found, image));
