@@ -245,7 +245,7 @@ fn a_robot_of_another_model_than_the_workcells_is_refused() {
     fs::write(&workcell, whole.replace("\"panda\"", "\"fr3\"")).unwrap();
     let simulated = Simulated::start(&[]);
     let arguments = ["robot", "home", "--robot", &simulated.address, "--workcell", text(&workcell), "--no-realtime"];
-    let expected = "model of the robot: expected \"fr3\", as the workcell's file says, found a robot that speaks the protocol of \"panda\"";
+    let expected = "model of the robot: expected \"fr3\", as the workcell file says, found a robot that speaks the protocol of \"panda\"";
     assert_refused(&arguments, 1, &[expected]);
 }
 

@@ -153,7 +153,7 @@ fn ctrl_c_stops_the_arm_on_its_path_and_keeps_the_last_second() {
     });
     assert_eq!(code, Some(1), "{stderr}");
     let expected =
-        format!("the arm's last second: {}\nsdg: the arm was stopped: a person asked for it\n", states.display());
+        format!("the arm's last second: {}\nsdg: the arm was stopped: a person requested it\n", states.display());
     assert_eq!(stderr, expected);
     assert!((600..=1002).contains(&num_states(&states)), "{}", num_states(&states));
     assert_stands(&simulated);

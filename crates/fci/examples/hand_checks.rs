@@ -1,16 +1,16 @@
-//! Checks whether a hand obeys its commands and reports correctly: `hand_checks HOST[:PORT] [WIDTH_MM]`; with WIDTH_MM,
-//! an object of that width is between its fingers.
+//! Checks whether a hand follows its commands and reports its state correctly: `hand_checks HOST[:PORT] [WIDTH_MM]`.
+//! With WIDTH_MM, an object of that width must be between the fingers.
 //!
-//! Prints a line for each check and ends with an error if one of them fails.
+//! Prints a line for each check and ends with an error if any check fails.
 
 use sdg_fci::client::{Hand, HandConfig};
 
 /// Tolerance of the fingers' commanded position, m.
 const TOLERANCE_M: f64 = 1.5e-3;
-/// Relative speed of the fingers, m/s, and their force, N.
+/// Speed of the fingers relative to each other, m/s.
 const SPEED_M_S: f64 = 0.1;
 const FORCE_N: f64 = 20.0;
-/// Tolerance of a part's width below and above the commanded width, m.
+/// Tolerance of a grasp below and above the commanded width, m.
 const EPSILON_M: f64 = 0.005;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -46,7 +46,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     hand.move_to(max_width_m, SPEED_M_S)?;
     let other_m = if told_m > 0.04 { told_m - 0.02 } else { told_m + 0.02 };
     let grasped = hand.grasp(other_m, SPEED_M_S, FORCE_N, EPSILON_M, EPSILON_M)?;
-    check(!grasped, &format!("grasp of {:.0} mm, which is not there", other_m * 1e3), grasped.to_string());
+    check(!grasped, &format!("grasp of {:.0} mm without such an object", other_m * 1e3), grasped.to_string());
 
     let stopped = hand.stop()?;
     check(stopped, "stop", stopped.to_string());

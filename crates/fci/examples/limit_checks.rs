@@ -1,9 +1,10 @@
-//! Checks whether a robot stops for every limit, and only then: `limit_checks HOST panda|fr3 [TRIES [joints]]`.
+//! Checks that a robot stops for every limit and not before it: `limit_checks HOST panda|fr3 [TRIES [joints]]`.
 //!
-//! Runs one motion just inside and one just outside of every limit and prints a line for each; ends with an error if a
-//! motion inside was stopped, or if one outside was not stopped, or for another reason. With a robot in real time, each
-//! motion has TRIES (1), because a lost command may look like a violated limit. If the robot's own joint limits apply
-//! in Cartesian motions, and are not widened, `joints` tests only those, and folds the arm until it would touch itself.
+//! Runs one motion just inside and one just outside of every limit and prints a line for each. It ends with an error if
+//! a motion inside was stopped, or if a motion outside was not stopped or was stopped for another reason. For a robot
+//! in real time, TRIES (default 1) is the maximum number of attempts at each motion, because a lost command may look
+//! like a violated limit. `joints` is for a robot that applies its joint limits to Cartesian motions: it tests only
+//! those limits, and folds the arm until it would touch itself.
 
 #[path = "../tests/limit_cases/mod.rs"]
 mod limit_cases;
@@ -50,9 +51,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             let (found, is_right) = loop {
                 tries += 1;
                 let found = match case.run(&mut robot, &home, is_inside) {
-                    // On the path to the start of the motion.
+                    // The robot stopped on the path to the start of the motion.
                     Err(FciError::Motion { errors, .. }) if tries < num_tries => {
-                        println!("     on the way to {}: {errors}", case.name);
+                        println!("     on the path to {}: {errors}", case.name);
                         robot.automatic_error_recovery()?;
                         continue;
                     }
@@ -67,7 +68,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
     }
     if num_wrong > 0 {
-        return Err(format!("{num_wrong} motions were judged wrongly").into());
+        return Err(format!("{num_wrong} motions did not end as expected").into());
     }
     Ok(())
 }

@@ -11,9 +11,9 @@ use crate::wire_error::WireError;
 /// Errors that end a call of the client or a server.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "the messages say what the fields are")]
+#[allow(missing_docs, reason = "the messages explain the fields")]
 pub enum FciError {
-    /// The system refused a socket.
+    /// An operation on a socket failed.
     #[error("{action} {address}: {source}")]
     Socket { action: &'static str, address: String, source: io::Error },
     /// The peer closed the connection.
@@ -22,11 +22,11 @@ pub enum FciError {
     /// The peer did not answer.
     #[error("no {what} from {address} within {} ms", waited.as_millis())]
     Timeout { what: &'static str, address: SocketAddr, waited: Duration },
-    /// The robot speaks another version of the protocol.
+    /// The peer uses an unsupported version of the protocol.
     #[error("the {peer} speaks version {found} of the protocol, expected {expected}")]
     Version {
         peer: &'static str,
-        /// The protocol versions of this client, in words.
+        /// The protocol versions that this client supports, as text.
         expected: String,
         found: u16,
     },
@@ -36,14 +36,14 @@ pub enum FciError {
     /// The robot refused a command.
     #[error("{command}: {status}")]
     Refused { command: &'static str, status: Status },
-    /// A motion ended before its end.
+    /// The robot ended a motion early.
     #[error("the motion was ended: {status}; errors: {errors}; {:.0} % of the last commands arrived in time", 100.0 * success_rate)]
     Motion {
         /// The robot's answer to the Move.
         status: Status,
         /// The errors for which the robot stopped.
         errors: RobotErrors,
-        /// Share of the last 100 commands that the robot had received in time.
+        /// Fraction of the last 100 commands that the robot received in time.
         success_rate: f64,
     },
     /// A command that must not be sent.

@@ -7,8 +7,8 @@
 //!  client::Hand  ──requests, TCP 1338──>  hand
 //! ```
 //!
-//! Version 5 of the protocol is the Panda's (libfranka 0.9), version 10 the FR3's (libfranka 0.18 and later). The
-//! server speaks 5, the client both. This crate knows kinematics only through a [`server::Plant`], and uses threads
+//! A Panda uses version 5 of the protocol (libfranka 0.9), an FR3 version 10 (libfranka 0.18 and later). The server
+//! supports version 5, the client both. This crate gets all kinematics from a [`server::Plant`], and uses threads
 //! instead of an asynchronous runtime.
 //!
 //! ```no_run

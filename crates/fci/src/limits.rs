@@ -2,7 +2,7 @@
 
 use crate::wire::Version;
 
-/// Velocity, acceleration and jerk of one kind of motion.
+/// Velocity, acceleration and jerk limits of one kind of motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RateLimits {
     /// Velocity, m/s or rad/s.
@@ -18,12 +18,12 @@ pub struct RateLimits {
 pub struct VelocityNearEnd {
     /// Subtracted from the root, rad/s.
     pub offset: f64,
-    /// Factor on the distance, rad/s².
+    /// Factor of the distance, rad/s².
     pub slope: f64,
 }
 
 impl VelocityNearEnd {
-    /// The largest velocity (rad/s) towards an end at `distance` (rad).
+    /// The largest velocity (rad/s) towards an end of the range at a distance of `distance` (rad).
     fn at(self, distance: f64) -> f64 {
         ((self.slope * distance).max(0.0).sqrt() - self.offset).max(0.0)
     }
@@ -57,8 +57,8 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// The Panda's, as in the rate limits of libfranka 0.9.2 (`rate_limiting.h`); ranges and torques as published by
-    /// Franka.
+    /// Limits of a Panda: the rate limits of libfranka 0.9.2 (`rate_limiting.h`), and ranges and torques as published
+    /// by Franka.
     pub const PANDA: Limits = Limits {
         q_min: [-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8973],
         q_max: [2.8973, 1.7628, 2.8973, -0.0698, 2.8973, 3.7525, 2.8973],
@@ -72,8 +72,8 @@ impl Limits {
         rotation: RateLimits { velocity: 2.5, acceleration: 25.0, jerk: 12500.0 },
         elbow: RateLimits { velocity: 2.175, acceleration: 10.0, jerk: 5000.0 },
     };
-    /// The FR3's, as in the rate limits of libfranka 0.21 (`rate_limiting.h`, whose position-dependent functions also
-    /// give the ranges); torques as published by Franka.
+    /// Limits of an FR3: the rate limits of libfranka 0.21 (`rate_limiting.h`, whose position-dependent functions also
+    /// give the ranges), and torques as published by Franka.
     pub const FR3: Limits = Limits {
         q_min: [-2.7501, -1.7918, -2.9065, -3.0481, -2.8101, 0.54092, -3.0196],
         q_max: [2.7501, 1.7918, 2.9065, -0.1458, 2.8101, 4.5205, 3.0196],
@@ -96,7 +96,7 @@ impl Limits {
         elbow: RateLimits { velocity: 1.5, acceleration: 10.0, jerk: 5000.0 },
     };
 
-    /// The limits of the robot that speaks a version of the protocol.
+    /// The limits of the robot model that uses a version of the protocol.
     pub fn of(version: Version) -> &'static Limits {
         match version {
             Version::V5 => &Self::PANDA,
@@ -125,7 +125,7 @@ mod tests {
     fn an_fr3_slows_down_before_the_ends_of_its_joints_and_a_panda_does_not() {
         assert_eq!(Limits::PANDA.velocity_range(0, 2.89), [-2.175, 2.175]);
         assert_eq!(Limits::FR3.velocity_range(0, 0.0), [-2.62, 2.62]);
-        // A tenth of a radian before the end: sqrt(12 * 0.1) - 0.3 towards it, the full velocity away from it.
+        // 0.1 rad before the end of the range: sqrt(12 * 0.1) - 0.3 towards it, the full velocity away from it.
         let [away, towards] = Limits::FR3.velocity_range(0, 2.6501);
         assert!((towards - 0.795_445).abs() < 1e-6 && away == -2.62, "{away} {towards}");
         assert_eq!(Limits::FR3.velocity_range(5, 0.54092)[0], 0.0);

@@ -1,20 +1,20 @@
-//! Whole messages from a stream.
+//! Reads whole messages from a stream.
 
 use std::io::{self, Read};
 
 use crate::wire::{Header, HeaderKind};
 use crate::wire_error::WireError;
 
-/// Memory for a message is allocated in steps of this size as its bytes arrive, so that a header that announces a large
-/// message costs little.
+/// Step in which memory for a message is allocated while its bytes arrive: a header that announces a large message
+/// costs little memory.
 const STEP: usize = 8192;
 
 /// Reads the next message; the inner error is an invalid header.
 ///
-/// Memory is allocated as bytes arrive, and never more than the message needs.
+/// Memory is allocated while bytes arrive, and never more than the message needs.
 ///
 /// # Errors
-/// The stream's end or its error.
+/// An error of the stream, or its end before the end of the message.
 pub fn read_message(
     stream: &mut impl Read,
     kind: HeaderKind,

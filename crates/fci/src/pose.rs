@@ -1,4 +1,4 @@
-//! Poses in the protocol's form, and twists between them.
+//! Conversion between poses and the protocol's transforms, and twists between poses.
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3, Vector6};
 
@@ -7,8 +7,8 @@ use crate::wire::Transform;
 /// Largest deviation from 1 of the lengths of a commanded rotation's columns and rows (libfranka's bound).
 const LENGTH_TOLERANCE: f64 = 1e-5;
 
-/// Whether a matrix is a rotation and a translation, all finite, with the last row 0 0 0 1; as libfranka accepts, but
-/// without mirrored ones.
+/// Whether a matrix consists of a rotation and a translation, all finite, with the last row 0 0 0 1. Unlike libfranka,
+/// this rejects mirrored frames.
 pub fn is_rigid(transform: &Transform) -> bool {
     if !transform.iter().all(|value| value.is_finite()) {
         return false;
@@ -64,7 +64,7 @@ mod tests {
     fn columns_stand_behind_each_other() {
         let pose = Isometry3::new(Vector3::new(1.0, 2.0, 3.0), Vector3::z() * std::f64::consts::FRAC_PI_2);
         let values = transform(&pose);
-        // x turns to y: the first column is 0 1 0 0.
+        // The rotation maps x to y: the first column is 0 1 0 0.
         for (found, expected) in values[..4].iter().zip([0.0, 1.0, 0.0, 0.0]) {
             assert!((found - expected).abs() < 1e-12);
         }
@@ -82,7 +82,7 @@ mod tests {
         assert!(!is_rigid(&values), "a mirror");
         values[0] = f64::NAN;
         assert!(!is_rigid(&values));
-        // Row by row instead of column by column: the translation is in the bottom row.
+        // Row-major instead of column-major: the translation is in the bottom row.
         let mut transposed = transform(&Isometry3::identity());
         transposed[3] = 0.5;
         assert!(!is_rigid(&transposed));

@@ -1,4 +1,4 @@
-//! What is checked of the order and origin of messages, on both sides, over TCP and UDP on this computer.
+//! Checks of the order and origin of messages by client and server, over TCP and UDP on this computer.
 
 use std::io::Write;
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream, UdpSocket};
@@ -19,7 +19,8 @@ use sdg_fci::{FciError, RobotError, RobotErrors, read_message};
 
 const TIMEOUT: Duration = Duration::from_millis(300);
 
-/// A robot that welcomes one client: its answers' number is that of the request and `beside` more. Gives the stream and where states go to.
+/// Plays a robot that accepts one client and answers with the request's number plus `beside`. Returns the stream and
+/// the address for states.
 fn welcome(listener: &TcpListener, beside: u32) -> (TcpStream, SocketAddr) {
     let (mut stream, client) = listener.accept().unwrap();
     let (header, payload) = read_message(&mut stream, HeaderKind::Robot).unwrap().unwrap();
@@ -40,7 +41,8 @@ fn connect(listener: &TcpListener) -> Result<Robot, FciError> {
     Robot::connect(&listener.local_addr().unwrap().to_string(), &config)
 }
 
-/// Reads states while a played robot sends those of `numbers`, again and again; the first from `from`.
+/// Reads a state while a played robot sends state `first`, then the states `numbers` repeatedly, from the address
+/// `from`.
 fn read_while_sent(first: u64, numbers: &'static [u64], from: Ipv4Addr) -> Result<u64, FciError> {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let is_done = Arc::new(AtomicBool::new(false));
@@ -51,7 +53,7 @@ fn read_while_sent(first: u64, numbers: &'static [u64], from: Ipv4Addr) -> Resul
         let own = UdpSocket::bind("127.0.0.1:0").unwrap();
         let other = UdpSocket::bind((from, 0)).unwrap();
         own.send_to(&state(first), client).unwrap();
-        // The client has the first one before others come.
+        // The client receives the first state before the others.
         thread::sleep(Duration::from_millis(100));
         for number in numbers.iter().cycle() {
             if is_over.load(Ordering::SeqCst) {
@@ -80,7 +82,7 @@ fn a_state_that_comes_late_or_again_is_none() {
 #[cfg(target_os = "linux")]
 #[test]
 fn a_state_of_another_computer_is_none() {
-    // All of 127.0.0.0/8 is this computer; its addresses are others all the same.
+    // All of 127.0.0.0/8 is this computer, but the addresses differ.
     let error = read_while_sent(12, &[13, 14, 15], Ipv4Addr::new(127, 0, 0, 2)).unwrap_err();
     assert!(matches!(error, FciError::Timeout { .. }), "{error}");
 }
@@ -99,11 +101,11 @@ fn an_answer_to_another_request_is_none() {
     drop(robot.join().unwrap());
 }
 
-/// A client that waits for nothing takes a bounded number of answers; the rest waits in the network.
+/// A client that waits for no answer stores a bounded number of answers; the others wait in the network.
 #[test]
 fn a_robot_that_floods_its_client_takes_no_memory() {
     const ANSWER_BYTES: usize = 64 << 10;
-    // 16 answers and one that is being read are 1.1 MB; both sides of a connection hold some 6 MB.
+    // 16 stored answers and one that is being read are 1.1 MB; the buffers of a connection hold about 6 MB.
     const MAX_TAKEN: usize = 32 << 20;
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let played = listener.try_clone().unwrap();
@@ -113,7 +115,7 @@ fn a_robot_that_floods_its_client_takes_no_memory() {
         stream.set_write_timeout(Some(TIMEOUT)).unwrap();
         let answer = Header::message(HeaderKind::Robot, 0, 999, &[0; ANSWER_BYTES]);
         let mut num_sent = 0;
-        // Ends where the client takes no more.
+        // The loop ends when the client accepts no more data.
         while num_sent < 4 * MAX_TAKEN && stream.write_all(&answer).is_ok() {
             num_sent += answer.len();
         }
@@ -122,7 +124,7 @@ fn a_robot_that_floods_its_client_takes_no_memory() {
     let client = connect(&listener).unwrap();
     let taken = robot.join().unwrap();
     assert!(taken < MAX_TAKEN, "{taken} bytes of at most {MAX_TAKEN}");
-    // Its reading thread waits for room, and ends all the same.
+    // The client's reading thread waits for room in its queue, and must still end.
     drop(client);
 }
 
@@ -178,7 +180,7 @@ impl Plant for FreeArm {
 
 /// A client of bare sockets, in a motion of joint positions.
 struct Client {
-    /// Kept open, or the robot would stop.
+    /// Kept open, because otherwise the robot would stop.
     _stream: TcpStream,
     udp: UdpSocket,
 }
@@ -208,7 +210,7 @@ impl Client {
         client
     }
 
-    /// The newest state, and where it came from.
+    /// Receives a state and the address of its sender.
     fn state(&self) -> (RobotState, SocketAddr) {
         let mut buffer = [0; STATE_SIZE_V5];
         let (_, from) = self.udp.recv_from(&mut buffer).unwrap();
@@ -242,7 +244,7 @@ fn the_server_takes_the_answer_to_its_present_state_alone() {
     client.udp.send_to(&Client::command(state.message_id - 1, READY), from).unwrap();
     wait_until("a late command is counted", || server.statistics().num_late > 0);
     assert_eq!(server.statistics().num_commands, 0);
-    // Of another program of this computer.
+    // Commands from another program of this computer.
     let other = UdpSocket::bind("127.0.0.1:0").unwrap();
     for ahead in 0..20 {
         other.send_to(&Client::command(state.message_id + ahead, READY), from).unwrap();
@@ -255,7 +257,7 @@ fn the_server_takes_the_answer_to_its_present_state_alone() {
 fn a_position_that_is_no_number_stops_the_robot() {
     let server = serve();
     let client = Client::in_motion(&server);
-    // States go on until one is answered in its own cycle; then the number that is none comes.
+    // A state is answered repeatedly until a command arrives in its own cycle, first with READY, then with NaN.
     for q in [READY, [f64::NAN; 7]] {
         let begin = server.statistics().num_commands;
         while server.statistics().num_commands == begin {
@@ -268,7 +270,7 @@ fn a_position_that_is_no_number_stops_the_robot() {
     let reflex = (0..1000).map(|_| client.state().0).find(|state| state.robot_mode == RobotMode::Reflex);
     let reflex = reflex.expect("a robot in reflex");
     assert!(reflex.q_desired.iter().all(|q| q.is_finite()), "{:?}", reflex.q_desired);
-    // Of that alone: where a number that is none got further, other limits would be told as well.
+    // There is no other error: if the NaN were processed further, other limits would be reported as well.
     assert_eq!(reflex.errors, RobotErrors::from(RobotError::JointMotionGeneratorPositionLimitsViolation));
     drop(client);
 }

@@ -1,4 +1,4 @@
-//! Messages: their sizes and bytes, there and back. fuzz/ makes mistakes in them.
+//! Sizes and bytes of messages, encoded and decoded. fuzz/ tests invalid messages.
 
 use sdg_fci::wire::{
     COMMAND_SIZE_V5, COMMAND_SIZE_V10, CollisionBehavior, Command, ControllerMode, Deviation, HAND_HEADER_SIZE,
@@ -50,7 +50,7 @@ fn state() -> RobotState {
     let blank = RobotState::default().encode(Version::V5);
     let mut bytes = vec![0; blank.len()];
     for (index, number) in bytes[8..8 + 284 * 8].chunks_exact_mut(8).enumerate() {
-        // Whole numbers survive version 10's single precision.
+        // Whole numbers keep their value in version 10's single precision.
         number.copy_from_slice(&(index as f64 + 1.0).to_le_bytes());
     }
     bytes[..8].copy_from_slice(&77_u64.to_le_bytes());
@@ -98,7 +98,7 @@ fn states_and_commands_have_the_published_sizes_and_survive() {
 
 #[test]
 fn fields_stand_where_libfranka_reads_them() {
-    // Offsets counted from the published structs: the message's number, then six transforms, and so on.
+    // The offsets follow from the published structs: the message's number, then six transforms, and so on.
     let bytes = state().encode(Version::V5);
     let number = |offset: usize| f64::from_le_bytes(bytes[offset..offset + 8].try_into().unwrap());
     let state = state();
@@ -118,10 +118,10 @@ fn fields_stand_where_libfranka_reads_them() {
     assert_eq!(bytes[..8], [8, 7, 6, 5, 4, 3, 2, 1]);
     assert_eq!(bytes[8 + 8 * 38..8 + 8 * 38 + 2], [1, 1], "elbow and end");
 
-    // A Move has four bytes for its modes, and numbers its generators from joint positions.
+    // A Move has four bytes for each mode, and its generator 0 is joint positions.
     let bytes = requests()[1].encode(9, Version::V5).unwrap();
     assert_eq!(bytes[..20], [1, 0, 0, 0, 9, 0, 0, 0, 68, 0, 0, 0, 2, 0, 0, 0, 3, 0, 0, 0]);
-    // The hand's commands have two bytes.
+    // The numbers of the hand's commands have two bytes.
     let bytes = hand_requests()[0].encode(9);
     assert_eq!(bytes, [0, 0, 9, 0, 0, 0, 14, 0, 0, 0, 3, 0, 7, 0]);
 }
@@ -174,13 +174,13 @@ fn a_message_that_ends_early_or_late_says_by_how_much() {
     let short = RobotState::decode(&bytes[..100], Version::V5).unwrap_err();
     assert!(matches!(short, WireError::Short { found: 100, .. }), "{short}");
     let long = RobotState::decode(&[&bytes[..], &[0]].concat(), Version::V5).unwrap_err();
-    assert_eq!(long.to_string(), "a state of 2373 bytes was expected, 2374 were found");
+    assert_eq!(long.to_string(), "expected a state of 2373 bytes, found 2374");
 }
 
 #[test]
 fn a_header_announces_no_less_than_itself_and_no_more_than_a_message_has() {
     for (kind, min) in [(HeaderKind::Robot, HEADER_SIZE as u32), (HeaderKind::Hand, HAND_HEADER_SIZE as u32)] {
-        // The size is the last number of either header.
+        // In both headers the size is the last number.
         let header = |size: u32| {
             let mut bytes = Header::message(kind, 1, 1, &[]);
             bytes[kind.size() - 4..].copy_from_slice(&size.to_le_bytes());
@@ -195,7 +195,7 @@ fn a_header_announces_no_less_than_itself_and_no_more_than_a_message_has() {
     }
 }
 
-/// What a message announces is taken as it arrives, in steps.
+/// The memory for a message is allocated in steps, while its bytes arrive.
 #[test]
 fn a_header_that_announces_much_takes_little_memory() {
     struct Stream<'a> {
@@ -213,6 +213,6 @@ fn a_header_that_announces_much_takes_little_memory() {
     let mut stream = Stream { bytes: &bytes, largest_buffer: 0 };
     let error = read_message(&mut stream, HeaderKind::Robot).unwrap_err();
     assert_eq!(error.kind(), std::io::ErrorKind::UnexpectedEof);
-    // Of the 4 MB that were announced.
+    // The header announced 4 MB.
     assert!(stream.largest_buffer <= 8192, "{}", stream.largest_buffer);
 }

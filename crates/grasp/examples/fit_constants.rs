@@ -1,10 +1,10 @@
-//! Fits the constants of the verification again on generated parts, and prints the differences. It changes nothing.
+//! Refits the constants of the verification on generated parts, and prints the differences. Changes no file.
 //!
 //! `cargo run --release -p sdg-grasp --example fit_constants -- [--parts N] [--rounds N] [--size WxH[,WxH]] [--seed S]
 //! [--only NAME[,NAME]]`; `--only score` fits the weights of the score alone, which takes minutes instead of hours.
 //!
-//! Draws N parts (40), equally many of each picture size (320x240), half of them for fitting, half held out. Each part
-//! has one demonstration and, per round (1 round), one picture under each of the generator's conditions and four
+//! Generates N parts (40), equally many for each picture size (320x240), half of them for fitting, half held out. Each
+//! part has one demonstration and, per round (1 round), one picture under each of the generator's conditions and four
 //! without the part: two with look-alikes, two cluttered. The objective and the intervals are those of
 //! [`sdg_grasp::fitting`]. The same arguments give the same output.
 

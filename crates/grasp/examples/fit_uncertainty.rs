@@ -1,12 +1,12 @@
-//! Fits the standard errors of a grasp in the plan view on generated parts, and prints the differences. It changes
-//! nothing.
+//! Fits the standard errors of a grasp in the plan view on generated parts, and prints the differences. Changes no
+//! file.
 //!
 //! `cargo run --release -p sdg-grasp --example fit_uncertainty -- [PARTS [SEED]]`
 //!
-//! Draws PARTS parts (240), half of them for fitting and half held out, teaches model S on each in the plan view of its
-//! photo's camera, and searches for it in one picture of each of the generator's conditions with the part, at 640x480
-//! and at 320x240. The constants minimise the pinball loss at 68 % of the logarithm of the errors, with equal weight to
-//! each condition.
+//! Generates PARTS parts (240), half of them for fitting and half held out, teaches model S on each in the plan view of
+//! its photo's camera, and searches for it in one picture of each of the generator's conditions with the part, at
+//! 640x480 and at 320x240. The constants minimise the pinball loss at 68 % of the logarithm of the errors, with equal
+//! weight to each condition.
 
 use std::ops::ControlFlow;
 
@@ -30,7 +30,7 @@ struct Row {
     condition: Condition,
     is_held_out: bool,
     position_m: f64,
-    /// `None` where the turn is not visible.
+    /// Error of the rotation about the vertical; `None` if the rotation is not visible.
     yaw_rad: Option<f64>,
     circumstances: Circumstances,
 }
@@ -70,7 +70,8 @@ fn rows(part_seed: u64, is_held_out: bool, size: [u32; 2]) -> Result<Vec<Row>> {
         let scenes = Scenes::new(std::slice::from_ref(&part), config, part_seed.wrapping_mul(100) + idx as u64)?;
         if detector.is_none() {
             let shown = scenes.photo(0);
-            // The generator's marks are at half the part's height there; a user measures the surface of the marks.
+            // The generator puts the marks at half the part's height; a user measures the height of the surface under
+            // the marks.
             let surface_m = 2e-3 * f64::from(part.grasp().height_mm);
             let demonstration = marked_on_surface(shown, 0.5 * surface_m, surface_m)?;
             let (seen, lengths) =

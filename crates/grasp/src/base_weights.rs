@@ -21,32 +21,32 @@ use crate::error::{GraspError, Result};
 /// omitted by mistake would silently start from random values.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BaseWeights {
-    /// SHA-256 of the weights' file, in hexadecimal digits; the taught model's file keeps it.
+    /// SHA-256 of the weights' file, in hexadecimal digits; stored in the taught model's file.
     pub sha256: String,
     /// Values by the parameters' names.
     pub parameters: StateDict,
     /// Parameters that keep their random initial values, such as predictors for other classes.
     pub reinitialized: BTreeSet<String>,
-    /// Computes last layers from a part's own views; empty for weights without it.
+    /// Weights that compute last layers from a part's views; empty if there are none.
     pub imprint: StateDict,
-    /// The comparison network, which is not taught; empty for weights without it.
+    /// The comparison network, which is not taught; empty if there is none.
     pub comparison: StateDict,
-    /// The initial weights of model A's orientation CNN; `None` for weights without them.
+    /// The initial weights of model A's orientation CNN; `None` if there are none.
     pub orientation: Option<OrientationStart>,
 }
 
 impl BaseWeights {
-    /// Whether they have a keypoint head, which preset `edge` also uses for teaching models without keypoints.
+    /// Whether the weights have a keypoint head, which preset `edge` also uses for teaching models without keypoints.
     pub(crate) fn has_keypoint_head(&self) -> bool {
         self.parameters.keys().any(|name| name.starts_with("roi_heads.keypoint_head."))
     }
 
-    /// Whether they come from our own pretraining, which computes last layers from a part's views.
+    /// Whether the weights come from this project's pretraining, which computes last layers from a part's views.
     pub(crate) fn is_ours(&self) -> bool {
         !self.imprint.is_empty()
     }
 
-    /// The network that compares places of pictures with the demonstration; `None` for weights without it.
+    /// The network that compares places of pictures with the demonstration; `None` if the weights contain none.
     ///
     /// # Errors
     /// [`GraspError::BaseWeights`] if the values belong to another network.
@@ -90,8 +90,8 @@ impl BaseWeights {
     /// zero.
     ///
     /// # Errors
-    /// [`GraspError::BaseWeights`] if a parameter has no value and is not listed as randomly initialised, if a value
-    /// has another shape, or if it belongs to no parameter.
+    /// [`GraspError::BaseWeights`] if a parameter has no value and is not listed as randomly initialised, or if a value
+    /// has another shape or belongs to no parameter.
     pub(crate) fn apply(&self, network: GeneralizedRcnn) -> Result<GeneralizedRcnn> {
         let eps = match network.config().backbone.norm {
             NormKind::FrozenBatch { eps } => Some(eps),

@@ -1,13 +1,13 @@
-//! Base weights of our own as bytes: one safetensors file with every head of preset `edge`.
+//! This project's base weights as bytes: one safetensors file with every head of preset `edge`.
 //!
 //! ```text
 //! metadata   format          "sdg base weights 1"
-//!            preset          the preset that they are for
-//!            reinitialized   names of the parameters that teaching draws anew   (JSON)
+//!            preset          the preset to which they belong
+//!            reinitialized   names of the parameters that teaching initialises randomly   (JSON)
 //!            further information about their creation: commit, seed, steps, parts, licence
 //! tensors    NAME            f16: the detector's parameters
-//!            imprint.*       f16: what makes its last layers of a part's views
-//!            orientation.*, orientation_imprint.*   f16: the same of the orientation CNN
+//!            imprint.*       f16: the weights that compute the detector's last layers from a part's views
+//!            orientation.*, orientation_imprint.*   f16: the same for the orientation CNN
 //!            comparison.*    f16: the comparison network
 //! ```
 
@@ -33,16 +33,16 @@ pub(crate) static SHIPPED: &[u8] = include_bytes!("../weights/edge.safetensors")
 #[cfg(feature = "base-weights")]
 pub(crate) const SHIPPED_SHA256: &str = include_str!("../weights/edge.sha256");
 
-/// Base weights of our own and their provenance.
+/// This project's base weights and their provenance.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BaseWeightsFile {
-    /// The preset for which they are made.
+    /// The preset to which the weights belong.
     pub preset: String,
     /// Parameters that teaching initialises randomly, since they belong to another part.
     pub reinitialized: BTreeSet<String>,
     /// Values by the parameters' names.
     pub parameters: StateDict,
-    /// Their provenance, by keys such as `commit` and `seed`.
+    /// The provenance of the weights, by keys such as `commit` and `seed`.
     pub origin: BTreeMap<String, String>,
 }
 
@@ -99,7 +99,7 @@ impl BaseWeightsFile {
         Ok(Self { preset, reinitialized, parameters, origin })
     }
 
-    /// The weights that a network takes from them; heads that it lacks are left out. `sha256` is that of the file.
+    /// The weights for a network; heads that the network lacks are left out. `sha256` is the hash of the file.
     ///
     /// # Errors
     /// [`GraspError::BaseWeights`] for weights of another preset, and a configuration that contradicts itself.

@@ -1,8 +1,8 @@
 //! Settings of the search, the refinement and the score, with the origin of each value.
 //!
-//! The fitted values are in this file, so that they can be fitted again: `cargo run --release -p sdg-grasp --example
-//! fit_constants` fits them on generated parts. docs/decisions/010-constants.md lists these and all other constants of
-//! this crate with their origin, docs/decisions/007-score.md how the score was found.
+//! `cargo run --release -p sdg-grasp --example fit_constants` refits the fitted values of this file on generated parts.
+//! docs/decisions/010-constants.md lists these and all other constants of this crate with their origin, and
+//! docs/decisions/007-score.md explains the score.
 
 use std::ops::RangeInclusive;
 
@@ -11,12 +11,12 @@ use sdg_shape::SearchConfig;
 use crate::error::{GraspError, Result};
 use crate::evidence_kind::EvidenceKind;
 
-/// How a demonstration is compared with an image, how it is searched for, and how it is accepted or refused.
+/// The settings of the search, of the comparison of demonstration and image, and of the score.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct CheckConfig {
-    /// The settings of the search over a whole image and, in its `shape`, of every comparison of demonstration and
-    /// image. Its scales are the size tolerance.
+    /// The settings of the search over a whole image and, in `search.shape`, of every comparison of demonstration and
+    /// image. `search.scales` is the size tolerance.
     pub search: SearchConfig,
     /// The weights of the evidence.
     pub score: ScoreConfig,
@@ -25,21 +25,21 @@ pub struct CheckConfig {
 }
 
 impl CheckConfig {
-    /// Default range of a part's size relative to the nominal one: it varies from 0.81 to 1.14 in hand-held
-    /// photographs of one part, and from 0.75 to 1.3 for other camera heights. Chosen from that.
+    /// Default range of a part's size relative to the nominal size. The size varies from 0.81 to 1.14 in hand-held
+    /// photographs of one part, and from 0.75 to 1.3 for other camera heights; the range was chosen from these values.
     pub const DEFAULT_SIZE_TOLERANCE: RangeInclusive<f64> = 0.75..=1.35;
-    /// The same for a camera at the same distance as for the photo: that of the simulated workcell. A lever that
-    /// resembles the pendulum agrees with it by 0.66 if its size may shrink to four fifths.
+    /// Size range for a camera at the same distance as for the photo, as in the simulated workcell. If the size may
+    /// shrink to four fifths, a lever that resembles the pendulum reaches an agreement of 0.66.
     pub const FIXED_HEIGHT_TOLERANCE: RangeInclusive<f64> = 0.97..=1.03;
-    /// The same in a plan view, where the size is known; look-alikes of another size are found there so that the size
-    /// refuses them.
+    /// Size range in a plan view, where the size is known; it includes look-alikes of another size, which are found and
+    /// then refused because of the size.
     pub const KNOWN_SIZE_TOLERANCE: RangeInclusive<f64> = 0.9..=1.11;
     /// Default maximum number of detections in one picture. Chosen by hand.
     pub const DEFAULT_MAX_DETECTIONS: usize = 100;
 
     /// The values of [`Default`], as a constant.
     ///
-    /// The search's minimum agreement was chosen by hand: all but one in a hundred right poses agree by more.
+    /// The search's minimum agreement was chosen by hand: all but one in a hundred correct poses exceed it.
     pub const DEFAULT: Self = Self {
         search: {
             let mut search = SearchConfig::DEFAULT;
@@ -82,15 +82,15 @@ impl Default for CheckConfig {
     }
 }
 
-/// Converts one kind of evidence to log-odds: `weight` times the difference of its value, clamped to `range`, from
-/// `neutral`.
+/// Converts one kind of evidence to log-odds: the value is clamped to `range`, and its difference from `neutral` is
+/// multiplied by `weight`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Term {
     /// Log-odds per unit of the value.
     pub weight: f64,
-    /// The value that is neutral: half-way between the medians of right and wrong poses.
+    /// The neutral value: half-way between the medians of correct and wrong poses.
     pub neutral: f64,
-    /// Values are clamped to this range, so that no evidence decides alone.
+    /// The range to which values are clamped, which limits the influence of this evidence.
     pub range: [f64; 2],
 }
 
@@ -98,47 +98,48 @@ pub struct Term {
 ///
 /// Fitted on 160 generated parts, which exclude shipped parts, photographs and the training parts of the likeness:
 /// `fit_constants --parts 160 --size 640x480,320x240 --seed 11 --only score` (docs/decisions/007-score.md). Ranges,
-/// hue, size and bias were set by hand; with these ranges no term rejects alone. The network's weight was fitted on
-/// models C of ten generated parts: only a missing proposal counts, because a network proposes look-alikes as well as
-/// the part.
+/// hue, size and bias were set by hand; with these ranges only table, added and mirror reject a pose alone, regardless
+/// of the other terms. The network's weight was fitted on models C of ten generated parts: only a missing proposal
+/// counts, because a network also proposes look-alikes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct ScoreConfig {
-    /// Whether pictures have known lengths: then the size is compared with the demonstration's, and otherwise with that
-    /// of the best detection in the picture.
+    /// Whether pictures have known lengths. The size is then compared with the demonstration's, and otherwise with the
+    /// size of the best detection in the picture.
     pub is_size_known: bool,
     /// Log-odds if all evidence is neutral.
     pub bias: f64,
-    /// Of [`sdg_shape::Evidence::edges`].
+    /// Term of [`sdg_shape::Evidence::edges`].
     pub edges: Term,
-    /// Of [`sdg_shape::Evidence::surface`].
+    /// Term of [`sdg_shape::Evidence::surface`].
     pub surface: Term,
-    /// Of [`sdg_shape::Evidence::hue_shift`].
+    /// Term of [`sdg_shape::Evidence::hue_shift`].
     pub hue: Term,
-    /// Of [`sdg_shape::Evidence::visible`].
+    /// Term of [`sdg_shape::Evidence::visible`].
     pub visible: Term,
-    /// Of the squared difference of ln sizes between a detection and the best one in the picture.
+    /// Term of the squared difference of ln sizes between a detection and the best one in the picture.
     pub size: Term,
-    /// Of [`sdg_shape::Evidence::outside`].
+    /// Term of [`sdg_shape::Evidence::outside`].
     pub outside: Term,
-    /// Of the mean agreement of other objects with the part.
+    /// Term of the mean agreement of other objects with the part.
     pub resemblance: Term,
-    /// Of [`sdg_shape::CloseLook::likeness`].
+    /// Term of [`sdg_shape::CloseLook::likeness`].
     pub likeness: Term,
-    /// Of [`sdg_shape::CloseLook::details`], against a pose. Fitted on the tuned side of a split
-    /// (docs/decisions/026-details.md), like the next field.
+    /// Term of [`sdg_shape::CloseLook::details`] where the value speaks against a pose. Fitted on the tuned side of a
+    /// split (docs/decisions/026-details.md), like `details_for`.
     pub details: Term,
-    /// Of the same, for a pose. Values between the two count as neutral.
+    /// Term of [`sdg_shape::CloseLook::details`] where the value supports a pose. Values between the ranges of
+    /// `details` and `details_for` are neutral.
     pub details_for: Term,
-    /// Of [`sdg_shape::CloseLook::bare`].
+    /// Term of [`sdg_shape::CloseLook::bare`].
     pub table: Term,
-    /// Of [`sdg_shape::CloseLook::no_rim`].
+    /// Term of [`sdg_shape::CloseLook::no_rim`].
     pub rim: Term,
-    /// Of [`sdg_shape::CloseLook::added`].
+    /// Term of [`sdg_shape::CloseLook::added`].
     pub added: Term,
-    /// Of the difference by which [`sdg_shape::CloseLook::mirrored`] fits better than the photo.
+    /// Term of the difference by which [`sdg_shape::CloseLook::mirrored`] fits better than the photo.
     pub mirror: Term,
-    /// Of ln of the likelihood ratio of the network's score, on the part over elsewhere.
+    /// Term of ln of the likelihood ratio of the network's score: on the part over elsewhere.
     pub network: Term,
 }
 
@@ -146,13 +147,13 @@ impl ScoreConfig {
     /// The values of [`Default`], as a constant.
     pub const DEFAULT: Self = SCORE;
 
-    /// The same where pictures have known lengths. A part of another size is then another part, regardless of other
+    /// The weights for pictures with known lengths, where a part of another size is another part regardless of other
     /// evidence.
     pub(crate) fn of_known_size(self) -> Self {
         Self { is_size_known: true, size: KNOWN_SIZE, ..self }
     }
 
-    /// The same where lengths are known and heights are not: every size within the search range is neutral.
+    /// The weights for pictures with known lengths but unknown heights: every size within the search range is neutral.
     pub(crate) fn of_any_height(self) -> Self {
         Self { is_size_known: true, size: term(0.0, 0.0, 0.0, 0.01), ..self }
     }
@@ -212,7 +213,7 @@ impl Term {
         self.weight * (value.clamp(low, high) - self.neutral)
     }
 
-    /// The largest for any value.
+    /// The largest log-odds of any value.
     fn most(&self) -> f64 {
         self.range.map(|value| self.log_odds(value)).into_iter().fold(f64::MIN, f64::max)
     }
@@ -222,9 +223,9 @@ const fn term(weight: f64, neutral: f64, low: f64, high: f64) -> Term {
     Term { weight, neutral, range: [low, high] }
 }
 
-/// Of the squared ln of a size over the demonstration's. A refined pose has a size error of about 2.5 % if a slanted
-/// view shows a part's walls; the weight is half of the inverse square of that, to 10 %. Chosen by hand from six
-/// rendered pictures.
+/// Term of the squared ln of a size over the demonstration's size. A refined pose has a size error of about 2.5 % if a
+/// slanted view shows a part's walls; the weight is half of the inverse square of that error, to 10 %. Chosen by hand
+/// from six rendered pictures.
 const KNOWN_SIZE: Term = term(-800.0, 0.0, 0.0, 0.01);
 
 const SCORE: ScoreConfig = ScoreConfig {

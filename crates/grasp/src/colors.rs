@@ -1,4 +1,5 @@
-//! Whether a picture has colours; a monochrome camera's has none, and its parts are compared with the photo in grey.
+//! Whether a picture has colours. In a picture without colours, from a monochrome camera, parts are compared with the
+//! photo in grey.
 
 use image::buffer::ConvertBuffer;
 use image::{GrayImage, RgbImage};
@@ -11,7 +12,7 @@ pub(crate) enum Colors {
 }
 
 impl Colors {
-    /// Of a picture: without colours, the three values of a pixel are equal up to rounding.
+    /// Decides by the pixels: without colours, the three values of a pixel are equal up to rounding.
     pub(crate) fn of(image: &RgbImage) -> Self {
         /// The difference that JPEG's colour conversion leaves in a grey pixel.
         const ROUNDING: u8 = 2;

@@ -19,10 +19,10 @@ use crate::verification::PlacedDemonstration;
 pub struct GraspDetection {
     /// Calibrated, in `[0, 1]`: at least 0.5 is accepted.
     pub score: f64,
-    /// The network's own score, in `[0, 1]`; zero without a network's proposal (model S, and parts found by the search
+    /// The network's score, in `[0, 1]`; zero without a proposal of the network (model S, and parts found by the search
     /// only).
     pub network_score: f64,
-    /// Agreement of the demonstration with the image there, in `[0, 1]`; `None` without verification.
+    /// Agreement of demonstration and image at the pose, in `[0, 1]`; `None` without verification.
     pub agreement: Option<f64>,
     /// The contributions to the score; `None` without verification.
     pub evidence: Option<Contributions>,
@@ -34,19 +34,20 @@ pub struct GraspDetection {
     pub outline: Option<Polygon>,
     /// Grasp point, direction and width, in pixels.
     pub grasp: PlanarGrasp,
-    /// The source of the first estimate of the turn.
+    /// The source of the first estimate of the orientation.
     pub turn_source: TurnSource,
-    /// Mean brightness there divided by that of the demonstration; 1 without verification.
+    /// Mean brightness at the detection divided by that of the demonstration; 1 without verification.
     pub light: f64,
 }
 
 impl GraspDetection {
-    /// Whether the score accepts it as the part.
+    /// Whether the score accepts the detection as the part.
     pub fn is_accepted(&self) -> bool {
         self.score >= 0.5
     }
 
-    /// Whether the part lies in a region of the picture: its grasp point, and at least half of its outline's area, do.
+    /// Whether the part lies in a region of the picture: the region contains the grasp point and at least half of the
+    /// outline's area.
     pub fn lies_in(&self, region: &SearchRegion) -> bool {
         let bounds = || Polygon::from_box(&self.bbox);
         region.has(&self.grasp.center(), &self.outline.clone().unwrap_or_else(bounds))
@@ -61,21 +62,21 @@ impl GraspDetection {
         Some(evidence.strongest_objection().map_or("all evidence together is too weak", EvidenceKind::objection))
     }
 
-    /// The further demonstration, or the setting, that would help if this is the part although it was refused.
+    /// The further demonstration, or the setting, that would help if a refused detection is the part after all.
     pub fn advice(&self) -> Option<Advice> {
         let evidence = self.evidence.as_ref().filter(|_| !self.is_accepted())?;
         evidence.advice(self.light)
     }
 }
 
-/// A detection and the data from which it was made.
+/// A detection and its placement.
 pub(crate) struct Found {
     pub(crate) detection: GraspDetection,
     /// `None` without verification.
     pub(crate) placement: Option<Placement>,
 }
 
-/// Where a demonstration lies in an image, and the other data that a later image of the sequence needs.
+/// The pose of a demonstration in an image, and the other data that a later image of the sequence needs.
 #[derive(Debug, Clone)]
 pub(crate) struct Placement {
     pub(crate) demonstration_idx: usize,

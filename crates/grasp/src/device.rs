@@ -1,8 +1,8 @@
-//! The device of a network's computation: the backends of this build, and their devices on this machine.
+//! The device on which a network computes: the backends of this build, and their devices on this machine.
 //!
 //! `flex`, burn's CPU backend with this project's kernels, is always available. The others are optional cargo features,
 //! since each takes minutes to compile: `ndarray` (burn's older CPU backend, slow, a reference), `wgpu` (any graphics
-//! card, through Vulkan, Metal or DirectX 12) and `cuda` (NVIDIA's).
+//! card, through Vulkan, Metal or DirectX 12) and `cuda` (NVIDIA cards).
 
 use std::fmt;
 use std::str::FromStr;
@@ -11,17 +11,17 @@ use burn::tensor::Device;
 
 use crate::error::{GraspError, Result};
 
-/// A backend, by the name that `--device` takes.
+/// A backend, as named by `--device`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum ComputeBackend {
     /// The CPU, with this project's kernels.
     #[default]
     Flex,
-    /// The CPU, by burn's older backend.
+    /// The CPU, with burn's older backend.
     NdArray,
     /// Graphics cards of any maker.
     Wgpu,
-    /// NVIDIA's graphics cards.
+    /// Graphics cards of NVIDIA.
     Cuda,
 }
 
@@ -39,7 +39,7 @@ impl ComputeBackend {
         }
     }
 
-    /// Whether it is compiled into this build.
+    /// Whether the backend is compiled into this build.
     pub fn is_built(self) -> bool {
         match self {
             Self::Flex => true,
@@ -49,7 +49,7 @@ impl ComputeBackend {
         }
     }
 
-    /// The names of the devices that it finds on this machine; empty if the build lacks it.
+    /// The names of the backend's devices on this machine; empty if the build lacks the backend.
     pub fn devices(self) -> Vec<String> {
         let cpu = || format!("CPU, {} threads", std::thread::available_parallelism().map_or(1, usize::from));
         match self {
@@ -63,7 +63,7 @@ impl ComputeBackend {
         }
     }
 
-    /// Its default device, ready to compute.
+    /// The backend's default device, ready to compute.
     ///
     /// # Errors
     /// A backend that this build lacks, or that finds no device on this machine.
@@ -80,7 +80,7 @@ impl ComputeBackend {
             Self::Wgpu => Err(self.not_there("Device::wgpu_options().init_async(), awaited")),
             #[cfg(feature = "cuda")]
             Self::Cuda if self.devices().is_empty() => {
-                Err(self.not_there("a card of NVIDIA's with its driver (libcuda)"))
+                Err(self.not_there("an NVIDIA graphics card with its driver (libcuda)"))
             }
             #[cfg(feature = "cuda")]
             Self::Cuda => Ok(Device::cuda(0)),
@@ -98,7 +98,7 @@ impl ComputeBackend {
     }
 }
 
-/// The names that devices report.
+/// The names of the devices, as reported by their runtime.
 #[cfg(any(feature = "wgpu", feature = "cuda"))]
 fn names(of: burn::tensor::DeviceType) -> Vec<String> {
     let devices = Device::enumerate(of).into_vec();

@@ -43,7 +43,7 @@ pub(crate) fn picture([width, height]: [u32; 2], parts: &[PlanarSimilarity]) -> 
     })
 }
 
-/// The turned part, with its centre there.
+/// The part rotated by `angle_deg`, with its centre at (x, y).
 pub(crate) fn at(x: f64, y: f64, angle_deg: f64) -> PlanarSimilarity {
     PlanarSimilarity::about(MIDDLE, Point2::new(x, y), Angle::from_degrees(angle_deg), 1.0)
 }
@@ -52,7 +52,7 @@ pub(crate) fn line() -> GraspLine {
     GraspLine::new(Point2::new(70.0, 50.0), Point2::new(70.0, 80.0))
 }
 
-/// Its photo, of that size, and the marks.
+/// The part's photo of this size, and the marks.
 pub(crate) fn demonstration(size: [u32; 2]) -> Demonstration {
     let outline = outline();
     let annotation = Annotation {
@@ -65,7 +65,7 @@ pub(crate) fn demonstration(size: [u32; 2]) -> Demonstration {
     Demonstration { image: picture(size, &[PlanarSimilarity::IDENTITY]), annotation }
 }
 
-/// Model S of the photo.
+/// Model S taught from a photo of this size.
 pub(crate) fn model(size: [u32; 2]) -> GraspModel {
     let options = TeachOptions { kind: ModelKind::S, ..TeachOptions::new(1) };
     teach(&[demonstration(size)], &options, &mut |_| ControlFlow::Continue(())).unwrap().model

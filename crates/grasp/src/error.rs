@@ -1,11 +1,11 @@
 //! Errors of a grasp model, its file or its grasps.
 
-/// Why a model could not be taught, read or used.
+/// The reason why a model could not be taught, read or used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "the messages say what the fields are")]
+#[allow(missing_docs, reason = "the messages explain the fields")]
 pub enum GraspError {
-    /// A letter or name of no model.
+    /// A letter or name that belongs to no model.
     #[error(transparent)]
     UnknownModel(#[from] sdg_demonstration::UnknownModel),
     /// A preset that this version lacks.
@@ -34,7 +34,7 @@ pub enum GraspError {
     /// Bytes that are not a grasp model.
     #[error("expected a grasp model file of this project, found {found}")]
     NotAModel {
-        /// The kind of the bytes, as far as their start shows.
+        /// The kind of the file, as far as the first bytes show.
         found: String,
     },
     /// A grasp model file of another version.
@@ -63,13 +63,13 @@ pub enum GraspError {
         /// Height of the plane, in metres.
         height_m: f64,
     },
-    /// No plan view.
+    /// No plan view can be made.
     #[error(transparent)]
     PlanView(#[from] sdg_geometry::PlanViewError),
-    /// A model that knows no lengths.
+    /// A model without lengths.
     #[error("expected a model taught with a camera, found one without")]
     NoLengths,
-    /// A part that the gripper cannot take.
+    /// A part that is too wide for the gripper.
     #[error(
         "the part is {:.0} mm wide at the grasp, and the gripper opens {:.0} mm",
         .width_m * 1e3, .max_opening_m * 1e3
@@ -83,10 +83,10 @@ pub enum GraspError {
     /// No demonstration was given.
     #[error("expected at least one demonstration, found none")]
     NoDemonstration,
-    /// Demonstrations that do not show one part.
+    /// Demonstrations of different parts.
     #[error("expected demonstrations of one part: {expected}; found {found}")]
     ContradictingDemonstrations {
-        /// The value in the earlier ones.
+        /// The value in the earlier demonstrations.
         expected: String,
         found: String,
     },
@@ -105,13 +105,13 @@ pub enum GraspError {
     /// A demonstration that the model cannot be taught from.
     #[error(transparent)]
     Demonstration(#[from] sdg_demonstration::Error),
-    /// A demonstration among the pictures that are to lack the part.
+    /// A demonstration among the pictures that must not show the part.
     #[error("expected pictures without the part, found that picture {number} of them is a demonstration")]
     DemonstrationAsNegative {
-        /// Its number among those pictures, from 1.
+        /// The number among those pictures, from 1.
         number: usize,
     },
-    /// A demonstration in which there is no shape to compare.
+    /// A demonstration without a shape to compare.
     #[error("the demonstration cannot be compared with images: {0}")]
     Shape(#[from] sdg_shape::ShapeError),
     /// A value of a configuration out of its range.
@@ -122,18 +122,18 @@ pub enum GraspError {
         expected: &'static str,
         found: f64,
     },
-    /// A name that no constant has which can be fitted.
+    /// A name that belongs to no constant that can be fitted.
     #[cfg(feature = "teach")]
     #[error("expected a constant out of {}, found \"{found}\"", .known.join(", "))]
     UnknownConstant {
-        /// The constants that there are.
+        /// The constants that can be fitted.
         known: Vec<&'static str>,
         found: String,
     },
-    /// The network refused its input.
+    /// Invalid input of the network.
     #[error(transparent)]
     Detection(#[from] sdg_detection::DetectionError),
-    /// A preset that starts from weights, and none given.
+    /// A preset that needs base weights, without any.
     #[cfg(feature = "teach")]
     #[error(
         "the preset {preset} needs base weights, and this build contains none for it: expected base weights, found none"
@@ -144,13 +144,13 @@ pub enum GraspError {
     #[error("base weights: {fitting} parameters fit the network; found {found}")]
     BaseWeights {
         fitting: usize,
-        /// The first thing that does not.
+        /// The first parameter that does not fit.
         found: String,
     },
-    /// The orientation CNN refused its input or did not learn.
+    /// Invalid input of the orientation CNN, or one that did not learn.
     #[error(transparent)]
     Orientation(#[from] sdg_orientation::OrientationError),
-    /// From the comparison network.
+    /// Error of the comparison network.
     #[error(transparent)]
     Comparison(#[from] sdg_comparison::ComparisonError),
     /// A demonstration that shows neither texture nor an outline, or a mask of another size than its image.
@@ -160,7 +160,7 @@ pub enum GraspError {
     #[cfg(feature = "teach")]
     #[error(transparent)]
     Training(#[from] sdg_training::TrainingError),
-    /// The observer requested a stop before there was a network to keep.
+    /// The observer requested a stop before a network could be kept.
     #[cfg(feature = "teach")]
     #[error("stopped while the orientation CNN was taught: there is no model to keep")]
     StoppedTooEarly,
@@ -171,7 +171,7 @@ pub enum GraspError {
          give it more time, or a demonstration with a clearer outline"
     )]
     NotLearnt {
-        /// Samples in which the demonstration, laid over where the network proposed, came to lie on the part.
+        /// Samples in which the demonstration, laid over the network's proposal, lies on the part.
         hits: usize,
         positives: usize,
         steps: usize,

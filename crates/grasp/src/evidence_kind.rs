@@ -9,19 +9,19 @@ pub enum EvidenceKind {
     Edges,
     /// Correlation of the surface.
     Surface,
-    /// Distance in hue.
+    /// Difference in hue.
     Hue,
-    /// The visible share.
+    /// Visible fraction of the part.
     Visible,
-    /// Distance in size.
+    /// Difference in size.
     Size,
-    /// The share outside the picture.
+    /// Fraction of the part outside the picture.
     Outside,
     /// Resemblance of other objects.
     Resemblance,
-    /// The network that distinguishes parts from background.
+    /// Score of the network that distinguishes parts from background.
     Likeness,
-    /// The network that distinguishes parts from their look-alikes.
+    /// Score of the network that distinguishes parts from their look-alikes.
     Details,
     /// Table where the part should be.
     Table,
@@ -34,7 +34,7 @@ pub enum EvidenceKind {
 }
 
 impl EvidenceKind {
-    /// Its name, as in `evidence` of JSON lines.
+    /// The name, as in `evidence` of JSON lines.
     pub fn name(self) -> &'static str {
         match self {
             Self::Network => "network",
@@ -54,10 +54,10 @@ impl EvidenceKind {
         }
     }
 
-    /// The reason in words if it speaks against a detection.
+    /// The reason, in words, if this evidence speaks against a detection.
     pub fn objection(self) -> &'static str {
         match self {
-            Self::Network => "the network does not see the part there",
+            Self::Network => "the network does not detect the part there",
             Self::Edges => "too few of the part's edges are found",
             Self::Surface => "the surface looks different: another side, print, gloss or light",
             Self::Hue => "it has another colour: another part, or other light",
@@ -74,17 +74,18 @@ impl EvidenceKind {
         }
     }
 
-    /// Whether its places of difference are shown also if it supports the part less than it could.
+    /// Whether the places of difference are shown also if this evidence supports the part, but less than it could.
     pub(crate) fn is_local(self) -> bool {
         !matches!(self, Self::Network | Self::Resemblance | Self::Likeness | Self::Details)
     }
 }
 
-/// The advice for a refused detection that is the part after all; the caller words it with its options or buttons.
+/// The advice for a refused detection that is the part after all; the caller puts it into words, with the names of its
+/// options or buttons.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Advice {
-    /// A wider size tolerance or, with a calibrated camera, a check of its file and of the height of the marks.
+    /// A wider size tolerance or, with a calibrated camera, a check of the camera file and of the height of the marks.
     CheckSize,
     /// A further photo in darker light.
     DarkerPhoto,

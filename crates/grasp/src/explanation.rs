@@ -1,4 +1,5 @@
-//! The explanation of a detection, mainly of a refused one: its size, and where picture and demonstration differ.
+//! The explanation of a detection, mainly of a refused one: the size, and the places where picture and demonstration
+//! differ.
 
 use image::RgbImage;
 use sdg_geometry::PlanarSimilarity;
@@ -16,7 +17,7 @@ use crate::verification::{SearchedImage, differences};
 const MAX_OFF_PX: f64 = 0.5;
 
 impl GraspModel {
-    /// The part's size in the picture over its size in the photo, adjusted for other numbers of pixels: relative to the
+    /// The part's size in the picture relative to that in the photo. If the numbers of pixels differ, relative to the
     /// nearest of the sizes that are then possible. `None` without verification, and in a plan view.
     pub fn size_of(&self, detection: &GraspDetection, [width, height]: [u32; 2]) -> Option<f64> {
         let (demonstration_idx, pose) = self.pose_of(detection)?;
@@ -26,7 +27,8 @@ impl GraspModel {
         Some(SizeRange::nearest(&ranges, pose.scale)?.log_size(pose.scale).exp())
     }
 
-    /// Where the picture differs from the demonstration under each of its detections; `None` as for [`Self::size_of`].
+    /// The places where the picture differs from the demonstration, for each detection; `None` as for
+    /// [`Self::size_of`].
     pub fn differences(&self, image: &RgbImage, detections: &[&GraspDetection]) -> Vec<Option<Differences>> {
         let poses: Vec<_> = detections.iter().map(|detection| self.pose_of(detection)).collect();
         if poses.iter().all(Option::is_none) {

@@ -1,4 +1,4 @@
-//! The facts about the teaching that a model file contains.
+//! The facts about teaching in a model file.
 
 pub use sdg_demonstration::ModelKind;
 use sdg_geometry::RotationalSymmetry;
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::lengths::Lengths;
 use crate::region::SearchRegion;
 
-/// The source of the first estimate of a part's turn, before the demonstration was laid over it.
+/// The source of the first estimate of a part's orientation, before the demonstration is laid over the picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
@@ -18,9 +18,9 @@ pub enum TurnSource {
     Keypoints,
     /// Model D: SIFT keypoints of the part's texture.
     Texture,
-    /// Model D with too little texture: the mask's outline, which may be wrong by half a turn.
+    /// Model D with too little texture: the mask's outline, which may be wrong by 180°.
     Outline,
-    /// Model S and detections found by the search only: every turn was tried.
+    /// Model S, and detections found by the search only: all orientations were tried.
     Search,
 }
 
@@ -45,10 +45,10 @@ pub struct TeachingFacts {
     /// The part's symmetry, as given at teaching.
     #[serde(default, skip_serializing_if = "is_without_symmetry")]
     pub symmetry: RotationalSymmetry,
-    /// Smallest and largest size over the nominal one within which the part is searched.
+    /// Smallest and largest size, relative to the nominal one, at which the part is searched.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub size_tolerance: Option<[f64; 2]>,
-    /// Its lengths; `None` for a model taught without a camera.
+    /// The model's lengths; `None` for a model taught without a camera.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lengths: Option<Lengths>,
     /// The searched region of pictures; `None` for whole pictures. Teaching itself does not use it.
@@ -69,7 +69,7 @@ pub struct TeachingFacts {
     /// The result on pictures without the part; `None` if none were given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub negatives: Option<NegativeFacts>,
-    /// SHA-256 of the weights that teaching started from; `None` if it started from random values.
+    /// SHA-256 of the initial weights; `None` for random values.
     pub base_weights_sha256: Option<String>,
 }
 
@@ -84,15 +84,15 @@ pub struct NegativeFacts {
     pub pictures: usize,
     /// Number of pictures in which the calibrated model accepts nothing.
     pub refused: usize,
-    /// Log-odds that they add to every score; at most 0.
+    /// Log-odds that the calibration adds to every score; at most 0.
     pub log_odds: f64,
 }
 
-/// The quality of a model on held-back samples.
+/// The quality of a model on held-out samples.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ValidationFacts {
-    /// Share of the parts found within 9.2 demonstration pixels (`sdg_training::HIT_PX`) and 10°, in `[0, 1]`, by the
-    /// network alone.
+    /// Fraction of the parts that the network alone finds within 9.2 demonstration pixels (`sdg_training::HIT_PX`) and
+    /// 10°, in `[0, 1]`.
     #[serde(rename = "validation_hit_rate")]
     pub hit_rate: f64,
     /// Median error in pixels of the demonstration, after verification.
@@ -106,13 +106,13 @@ pub struct ValidationFacts {
 /// How model A's orientation CNN was made, and its measured quality.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct OrientationFacts {
-    /// Number of crops that it was trained on.
+    /// Number of crops used for training.
     pub crops: usize,
     /// Optimiser steps.
     pub steps: usize,
-    /// Share of held-back crops with an angle error of at most 10°, in `[0, 1]`.
+    /// Fraction of held-out crops with an angle error of at most 10°, in `[0, 1]`.
     pub hit_rate: f64,
-    /// Median error on them, in degrees.
+    /// Median angle error on the held-out crops, in degrees.
     pub error_degrees: f64,
 }
 

@@ -4,8 +4,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{GraspError, Result};
 
-/// A micrometre per pixel, and a part as high as a person. Chosen by hand.
+/// Maximum resolution: a micrometre per pixel. Chosen by hand.
 const MAX_PIXELS_PER_M: f64 = 1e6;
+/// Maximum height: a part as high as a person. Chosen by hand.
 const MAX_HEIGHT_M: f64 = 2.0;
 
 /// The lengths of a model that was taught with a camera.
@@ -13,11 +14,11 @@ const MAX_HEIGHT_M: f64 = 2.0;
 pub struct Lengths {
     /// Pixels of the demonstrations per metre.
     pub pixels_per_m: f64,
-    /// Height of the marks' plane over the table, in metres.
+    /// Height of the marks' plane above the table, in metres.
     pub mark_height_m: f64,
-    /// Height over the table at which the gripper closes, in metres.
+    /// Height above the table at which the gripper closes, in metres.
     pub grasp_height_m: f64,
-    /// The direction from which the first photo shows the part: see `slant` in plan_view/mod.rs. 0 in models of earlier
+    /// The direction from which the first photo shows the part; see `slant` in plan_view/mod.rs. 0 in models of earlier
     /// versions.
     #[serde(default)]
     pub slant: [f64; 2],

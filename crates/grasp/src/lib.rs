@@ -6,30 +6,30 @@
 //!                    to_bytes / from_bytes: one self-describing file
 //! ```
 //!
-//! Five models, by their letters ([`ModelKind`]): four of the paper, which differ in the output of their network (a box
-//! and its crop, keypoints, a mask), and one without a network, taught in a second. Every detection of a network is read as
-//! a pose of the demonstration, refined by laying the demonstration over the image, and scored ([`Verification`]).
+//! Five models, by their letters ([`ModelKind`]): the paper's four models, which differ in the output of their network
+//! (a box and its crop, keypoints, a mask), and one without a network, taught in a second. Every detection of a network
+//! is converted to a pose of the demonstration, refined by laying the demonstration over the image, and scored
+//! ([`Verification`]).
 //!
 //! # Legend
 //!
 //! | symbol | is |
 //! |---|---|
 //! | image | the picture as given, or the plan view made of it ([`CameraOverTable`]); pixels, y down, the first pixel's centre at (0.5, 0.5) |
-//! | photo | the demonstration's picture, in its own pixels |
-//! | cut-out | the crop of the photo around the part that the model keeps, in its own pixels |
+//! | photo | the demonstration's picture, in its pixels |
+//! | cut-out | the crop of the photo around the part that the model stores, in its pixels |
 //! | view, working | image and cut-out halved or resized for one range of sizes; the search runs in these |
-//! | `a_from_b` | a transform that takes coordinates of frame b to frame a; poses are `image_from_cutout`, a similarity |
-//! | candidate | a box of the network read as a pose, not yet verified |
-//! | evidence | measurements at a pose (edges, surface, hue, visible share, size …), each of which adds log-odds to the score |
-//! | score | logistic of their sum, in (0, 1); a detection of at least 0.5 is accepted |
+//! | `a_from_b` | a transform of coordinates from frame b to frame a; poses are `image_from_cutout`, a similarity |
+//! | candidate | a box of the network converted to a pose, not yet verified |
+//! | evidence | measurements at a pose (edges, surface, hue, visible fraction, size …), each of which adds log-odds to the score |
+//! | score | logistic function of the sum of log-odds, in (0, 1); a detection of at least 0.5 is accepted |
 //! | agreement | edges and surface together, in [0, 1], from `sdg-shape` |
 //! | `log_size` | ln of the size in the image over the nearest size in the search range |
 //! | x, y, angle, width | a planar grasp: centre in pixels, angle of the grasp line from x towards y, opening in pixels |
 //! | tcp, flange, base | frames of the arm; metres, z of the tcp along the approach |
 //!
-//! This crate deliberately has no files, no clock in detection, no threads (bytes in, bytes out, so that the same code
-//! runs in a browser), no robot and no simulator. Without the feature `teach` no autodiff, optimiser or augmentation is
-//! compiled.
+//! This crate deliberately has no files, threads, robot or simulator, and no clock in detection: the same code runs in
+//! a browser. Without the feature `teach` no autodiff, optimiser or augmentation is compiled.
 //!
 //! From the bytes of a model and of an image to a grasp:
 //!

@@ -1,15 +1,15 @@
 //! The position of the marks in a picture if they are higher or lower than the outline.
 //!
-//! A higher point appears shifted away from the point vertically below the camera, by a share of its distance from
-//! there; for a camera that looks vertically down that point is the centre of the picture:
+//! A higher point appears shifted away from the point vertically below the camera, by a fraction of its distance from
+//! that point. For a camera that points vertically down, the point below it is the centre of the picture:
 //! ```text
-//! shift = η · (place in the picture − its middle) − the same in the photo        η = height / (distance − height)
+//! shift = η · (position − centre, in the picture) − the same in the photo        η = height / (distance − height)
 //! ```
-//! η is unknown. The marks' surroundings, edges and colours, are laid over the picture along that line and, since no
-//! camera looks exactly down, some way beside it; a shift is accepted if they agree clearly better there than at the
-//! outline's pose. Fitted on the tuned sets of datasets/split.toml and base-weights/physical/split.toml: the marks of
-//! 304 of 312 parts lie within 4 % of the diagonal, and of 268 without a shift
-//! (docs/decisions/027-heights-and-slants.md).
+//! η is unknown. The marks' surroundings, as edges and colours, are compared with the picture along that line and,
+//! since no camera points exactly down, also at some distance from it. A shift is accepted if its agreement is clearly
+//! better than that of the outline's pose. Fitted on the tuned sets of datasets/split.toml and
+//! base-weights/physical/split.toml: the marks of 304 of 312 parts lie within 4 % of the diagonal, and those of 268
+//! without a shift (docs/decisions/027-heights-and-slants.md).
 
 use image::RgbImage;
 use image::imageops::interpolate_bilinear;
@@ -20,24 +20,27 @@ use sdg_shape::{Picture, ShapeConfig, ShapeTemplate, Surface};
 use crate::taught_marks::TaughtMarks;
 
 /// Radius of the surroundings about the centre of the grasp line, in lengths of the line: points farther away are at
-/// another height. The line counts as at least this share of the diagonal. With 0.8 lengths the edges of 11 of 32
-/// flanges determine the shift, with 0.6 those of 30.
+/// another height. With 0.8 lengths the edges of 11 of 32 flanges determine the shift, with 0.6 those of 30.
 const SURROUNDINGS: f64 = 0.6;
+/// Minimum length of the line for the surroundings, as a fraction of the diagonal.
 const MIN_LINE_SHARE: f64 = 0.2;
 /// Smallest and largest η: a mark 40 mm high under a camera 300 mm above the table has 0.15. Chosen from that.
 const HEIGHT_SHARES: (f64, f64) = (-0.04, 0.18);
-/// Search range beside the line, and along it if the part is near the picture's centre; in diagonals.
+/// Search range across the line, and along it if the part is near the picture's centre; in diagonals.
 const MAX_ASIDE: f64 = 0.04;
-/// First and last step of the search, in diagonals. Chosen for time.
+/// First step of the search, in diagonals. Chosen for time.
 const STEP: f64 = 0.01;
+/// Last step of the search, in diagonals. Chosen for time.
 const LAST_STEP: f64 = 0.0025;
-/// Penalty of a diagonal of shift along the line and across it, in agreement of edges and surface together, in `[0,
-/// 2]`, and the minimum gain of a shift. Fitted (see above); half and double the values change the count by at most 3.
+/// Penalty per diagonal of shift along the line, in agreement of edges and surface together, in `[0, 2]`. Fitted like
+/// the next two (see above); half and double the values change the count by at most 3.
 const COST_ALONG: f64 = 3.0;
+/// Penalty per diagonal of shift across the line.
 const COST_ACROSS: f64 = 5.0;
+/// Minimum gain of agreement by a shift.
 const MIN_GAIN: f64 = 0.2;
-/// Where the raised area meets the outline's plane, in the surroundings' radii. With 2.0 a flange's holes beside its
-/// boss move with it.
+/// Radius at which the raised area meets the outline's plane, in radii of the surroundings. With 2.0 the holes of a
+/// flange beside its boss move with the boss.
 const FOOT: f64 = 1.3;
 /// Extent of the picture kept around the part, in lengths of its box: the range of a close look.
 const MARGIN: f64 = 0.35;
@@ -47,10 +50,11 @@ const MARGIN: f64 = 0.35;
 pub(crate) struct MarksShift {
     edges: ShapeTemplate,
     surface: Surface,
-    /// The centre of the grasp line, the radius of its surroundings, and the centre of the photo, in pixels of the
-    /// cut-out.
+    /// Centre of the grasp line, in pixels of the cut-out.
     middle: Point2<f64>,
+    /// Radius of the surroundings, in pixels of the cut-out.
     reach: f64,
+    /// Centre of the photo, in pixels of the cut-out.
     photo_middle: Point2<f64>,
     /// Diagonal of the outline's box, in pixels of the cut-out.
     diagonal: f64,
@@ -64,7 +68,7 @@ impl MarksShift {
         let middle = marks.grasp.center();
         let reach = SURROUNDINGS * marks.grasp.length().max(MIN_LINE_SHARE * diagonal);
         let surroundings = circle(middle, reach);
-        // No outline has a special weight there.
+        // The outline gets no special weight in the marks' surroundings.
         let mut config = config.clone();
         config.outline_weight = 1.0;
         Some(Self {
@@ -77,7 +81,7 @@ impl MarksShift {
         })
     }
 
-    /// `image_from_cutout`, or the same shifted to the position of the marks' surroundings. Deterministic.
+    /// `image_from_cutout`, shifted to the position of the marks' surroundings if they are displaced. Deterministic.
     ///
     /// # Units and frames
     /// Pixels of the picture; `below_camera` is the point of the table vertically below the camera.
@@ -88,7 +92,7 @@ impl MarksShift {
         image_from_cutout: &PlanarSimilarity,
     ) -> PlanarSimilarity {
         let diagonal = self.diagonal * image_from_cutout.scale;
-        // Both in diagonals.
+        // Distances are in diagonals.
         let away = (image_from_cutout.apply(&self.photo_middle) - below_camera) / diagonal;
         let line = away.try_normalize(f64::EPSILON).unwrap_or(Vector2::x());
         let along_bounds =
@@ -140,8 +144,8 @@ pub(crate) struct Straightened {
 }
 
 impl MarksShift {
-    /// The picture around the part, with the marks' surroundings moved back from their position by `image_from_marks`,
-    /// and the flanks of the raised area moved by less and less from its top to its foot.
+    /// The picture around the part, with the marks' surroundings moved back from their position by `image_from_marks`.
+    /// The flanks of the raised area are moved by a shift that decreases from its top to its foot.
     ///
     /// # Units and frames
     /// Pixels of the picture; the corner lies at multiples of `coarsest_pixel`, so that the pyramids are equal.
@@ -204,8 +208,8 @@ mod tests {
     const SIZE: [u32; 2] = [480, 360];
     const RADIUS: f64 = 50.0;
 
-    /// A disc with six holes about `middle`; on it a boss with a bore that is displaced outwards by `eta` of its
-    /// distance from the picture's centre.
+    /// A disc with six holes about `middle`, and on the disc a boss with a bore. The boss is displaced outwards by
+    /// `eta` times its distance from the picture's centre.
     fn disc(middle: Point2<f64>, eta: f64) -> RgbImage {
         let picture_middle = Point2::new(f64::from(SIZE[0]), f64::from(SIZE[1])) / 2.0;
         let boss = middle + eta * (middle - picture_middle);
@@ -231,7 +235,7 @@ mod tests {
         })
     }
 
-    /// Taught in the centre of a photo, where nothing is shifted.
+    /// The surroundings taught in the centre of a photo, where nothing is shifted.
     fn taught() -> MarksShift {
         let middle = Point2::new(240.0, 180.0);
         let outline = circle(middle, RADIUS);

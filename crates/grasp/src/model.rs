@@ -1,9 +1,9 @@
 //! The grasp model: its taught data, and detection in an image.
 //!
 //! ```text
-//! RgbImage ─┬─ Network: detections, each read as a pose of the demonstration ─ laid over the image, refined ─┐
-//!           └─ search: the demonstration looked for in the whole image ───────────────────────────────────────┤
-//!                                    PlanarGrasp, score ─ of those on one part the best ─ verdict ─ evidence ─┘
+//! RgbImage ─┬─ Network: detections, each a pose of the demonstration ───────── laid over the image, refined ─┐
+//!           └─ search: the demonstration searched in the whole image ─────────────────────────────────────────┤
+//!                                    PlanarGrasp, score ─ the best of those on one part ─ verdict ─ evidence ─┘
 //! ```
 
 use std::ops::RangeInclusive;
@@ -27,8 +27,7 @@ use crate::taught::TaughtDemonstration;
 use crate::verdict::{Clues, Contributions, judge_picture, judge_picture_of_sequence};
 use crate::verification::{PlacedDemonstration, SearchedImage, Shot};
 
-/// Minimum shorter side of an image for recognising a part. Chosen by hand, not measured: a level of the pyramid has 24
-/// pixels.
+/// Minimum length of the shorter side of an image. Chosen by hand, not measured: a level of the pyramid has 24 pixels.
 const MIN_SIDE_PX: u32 = 32;
 
 /// A grasp model: taught from demonstrations, finds planar grasps.
@@ -48,7 +47,7 @@ pub enum Verification {
     /// Every detection is refined and scored with the demonstration.
     #[default]
     ByShape,
-    /// The network alone scores and places. Model S has no network: its search is unchanged.
+    /// Score and pose come from the network alone. The search of model S, which has no network, is unchanged.
     Off,
 }
 
@@ -58,8 +57,8 @@ impl GraspModel {
         self.network.as_ref().map_or(ModelKind::S, Network::kind)
     }
 
-    /// The same network read as another model; `None` if the two are not taught in the same way (see
-    /// [`ModelKind::taught_as`]). The calibration is kept, although it was fitted to the errors of the first reading.
+    /// The model with its network used as that of another kind; `None` if the two kinds are not taught in the same way
+    /// (see [`ModelKind::taught_as`]). The calibration is kept, although it was fitted to the errors of the first kind.
     pub fn read_as(self, kind: ModelKind) -> Option<Self> {
         if self.kind() == kind {
             return Some(self);
@@ -78,7 +77,7 @@ impl GraspModel {
         &self.demonstrations[0].marks.label
     }
 
-    /// How it was taught, and its measured quality.
+    /// How the model was taught, and its measured quality.
     pub fn facts(&self) -> &TeachingFacts {
         &self.facts
     }
@@ -94,8 +93,8 @@ impl GraspModel {
         self
     }
 
-    /// The same model whose search of a whole image compares `num_points` edge points at each pose; taught models use
-    /// 64. The calibration stays.
+    /// The model with `num_points` edge points compared at each pose of a whole image's search; taught models use 64.
+    /// The calibration is unchanged.
     ///
     /// # Errors
     /// A number of points outside 8 to 1024.
@@ -103,7 +102,8 @@ impl GraspModel {
         self.with_check(|check| check.search.num_points = num_points)
     }
 
-    /// The same model with other bounds of a part's size over the nominal one; its file keeps those of its teaching.
+    /// The model with other bounds of a part's size relative to the nominal size; the bounds given at teaching remain
+    /// in the model's file.
     ///
     /// # Errors
     /// Bounds that do not lie within 0.5 to 1 and 1 to 2.
@@ -111,7 +111,7 @@ impl GraspModel {
         self.with_check(|check| check.search.scales = tolerance.clone())
     }
 
-    /// The same model with another maximum number of parts in a picture; the default is 100.
+    /// The model with another maximum number of parts in a picture; the default is 100.
     ///
     /// # Errors
     /// [`GraspError::InvalidConfig`] for 0.
@@ -126,11 +126,12 @@ impl GraspModel {
         })
     }
 
-    /// The same model that searches only this region of pictures; `None` for whole pictures. A model file keeps it.
+    /// The model restricted to this region of pictures; `None` for whole pictures. The region is part of the model's
+    /// file.
     ///
     /// # Errors
-    /// A region without pixels; if it names the size of its pictures, one that extends beyond them, or one that the
-    /// part does not fit in. Other regions are checked with each picture.
+    /// A region without pixels. A region that names the size of its pictures must also lie within them and be large
+    /// enough for the part; other regions are checked with each picture.
     pub fn with_region(self, region: Option<SearchRegion>) -> Result<Self> {
         if self.facts.region == region {
             return Ok(self);
@@ -141,7 +142,7 @@ impl GraspModel {
         }
         let CheckConfig { search, max_detections, .. } = self.demonstrations[0].check();
         let wanted = max_matches(*max_detections, region.is_some());
-        // Another configuration makes a new search, which takes milliseconds.
+        // A changed configuration requires a new search, which takes milliseconds to prepare.
         let mut model = match search.max_matches == wanted {
             true => self,
             false => self.with_check(|check| check.search.max_matches = wanted)?,
@@ -155,7 +156,7 @@ impl GraspModel {
         self.facts.region.as_ref()
     }
 
-    /// The same model for plan views of its demonstrations' resolution.
+    /// The model for plan views of its demonstrations' resolution.
     pub(crate) fn of_known_size(self) -> Result<Self> {
         let mut model = self.with_check(|check| {
             check.search.scales = CheckConfig::KNOWN_SIZE_TOLERANCE;
@@ -166,7 +167,7 @@ impl GraspModel {
         Ok(model)
     }
 
-    /// Bounds of a part's size over the nominal one within which it is searched.
+    /// The bounds of a part's size relative to the nominal size that are searched.
     pub fn size_tolerance(&self) -> RangeInclusive<f64> {
         self.demonstrations[0].check().search.scales.clone()
     }
@@ -181,7 +182,7 @@ impl GraspModel {
         Ok(Self { demonstrations, ..self })
     }
 
-    /// Finds the part in an image, best score first. Detections below 0.5 are listed too, for callers that show
+    /// Finds the part in an image, best score first. Detections below 0.5 are also returned, for callers that show
     /// refused detections and the reasons; see [`GraspDetection::is_accepted`].
     ///
     /// # Errors
@@ -193,13 +194,13 @@ impl GraspModel {
     /// [`Self::detect`], asynchronous; for browsers, which give access to results of a graphics card only in this way.
     ///
     /// # Errors
-    /// As there.
+    /// As for [`Self::detect`].
     pub async fn detect_async(&self, image: &RgbImage, verification: Verification) -> Result<Vec<GraspDetection>> {
         let found = self.find_async(image, verification).await?;
         Ok(found.into_iter().map(|found| found.detection).collect())
     }
 
-    /// [`Self::detect_async`], each detection with the data that tracking needs.
+    /// [`Self::detect_async`], with the data of each detection that tracking needs.
     pub(crate) async fn find_async(&self, image: &RgbImage, verification: Verification) -> Result<Vec<Found>> {
         let size = [image.width(), image.height()];
         let Some(region) = self.region() else {
@@ -210,8 +211,7 @@ impl GraspModel {
         self.find_in(&window.cut(image), &window, verification, |detection| detection.lies_in(region)).await
     }
 
-    /// Detections in an image that is a window of a larger one, in pixels of the whole; only those for which `counts`
-    /// holds.
+    /// Detections in a window of an image, in pixels of the whole image; only those for which `counts` holds.
     pub(crate) async fn find_in(
         &self,
         image: &RgbImage,
@@ -242,7 +242,7 @@ impl GraspModel {
         Ok(found)
     }
 
-    /// As seen by a level camera, or by a slanted one if that explains the picture better.
+    /// Detections as seen by a level camera, or by a slanted camera if that explains the picture better.
     async fn find_at_any_slant(&self, image: &RgbImage, shot: &Shot) -> Result<Vec<Found>> {
         let (level, slant) = self.find_at_slant(image, shot, true).await?;
         let Some(made_level) = slant.and_then(|slant| LevelImage::new(image, shot, &slant)) else { return Ok(level) };
@@ -253,7 +253,7 @@ impl GraspModel {
         Ok(level)
     }
 
-    /// Detections in an image at this slant, and the slant that its best matches suggest, if it is asked for.
+    /// Detections in an image at this slant, and the slant suggested by the best matches if `suggest` is set.
     async fn find_at_slant(&self, image: &RgbImage, shot: &Shot, suggest: bool) -> Result<(Vec<Found>, Option<Slant>)> {
         let searched = SearchedImage::of(image, shot, &self.demonstrations);
         let proposals = match &self.network {
@@ -281,7 +281,7 @@ impl GraspModel {
         }
     }
 
-    /// Scores them, first each alone, then relative to the size of the best among them.
+    /// Scores the sightings, first each alone, then relative to the size of the best one.
     fn judged(&self, sightings: Vec<Sighting<'_>>) -> Vec<Found> {
         let clues: Vec<Clues> = sightings.iter().map(|sighting| self.clues(sighting)).collect();
         let judged = judge_picture(&clues, &self.demonstrations[0].check().score);
@@ -303,7 +303,7 @@ impl GraspModel {
         Clues { evidence, log_size, network, resemblance: self.score_calibration.resemblance }
     }
 
-    /// The scores of all places in one picture of a sequence in which parts had that size before, as in
+    /// The scores of all places in one picture of a sequence in which parts had the given size before, as in
     /// [`Clues::log_size`].
     pub(crate) fn judge_in_sequence(
         &self,
@@ -313,21 +313,21 @@ impl GraspModel {
         judge_picture_of_sequence(clues, earlier_log_size, &self.demonstrations[0].check().score)
     }
 
-    /// Keypoints of a detection of this model.
+    /// Number of keypoints of a detection of this model.
     pub(crate) fn num_keypoints(&self) -> usize {
         if self.kind().has_keypoints() { crate::NUM_KEYPOINTS } else { 0 }
     }
 }
 
-/// Maximum number of matches of a search whose result lists this many detections. If only a region is searched, better
-/// matches outside must not displace matches inside.
+/// Maximum number of matches of a search for this many detections. If only a region is searched, better matches outside
+/// must not displace matches inside.
 fn max_matches(max_detections: usize, is_cut: bool) -> usize {
     if is_cut { max_detections.max(CheckConfig::DEFAULT_MAX_DETECTIONS) } else { max_detections }
 }
 
-/// Keeps the best of several detections of the same part, compared by the overlap of their outlines, or of their boxes
-/// without outlines. Of detections that ended in the same pose the one with the highest network score stays, so that
-/// the result does not depend on the last bit.
+/// Keeps the best of several detections of the same part, which is recognised by the overlap of outlines or, without
+/// outlines, of boxes. Of detections that converged to the same pose, the one with the highest network score is kept,
+/// so that the result does not depend on the last bit.
 fn drop_repeated(found: &mut Vec<Found>) {
     // Chosen by hand: above the rounding of single precision, below any difference that distinguishes poses.
     const SAME_SCORE: f64 = 1e-4;

@@ -2,11 +2,11 @@
 //!
 //! ```text
 //! metadata   format_version, model, preset, object, keypoint_count, input_size, angle_reference_deg, grasp_offset_px
-//!            teaching       seed, samples, steps, seconds, validation figures, base weights' hash   (JSON)
+//!            teaching       seed, samples, steps, seconds, validation results, base weights' hash   (JSON)
 //!            network        the detector's configuration; none in model S                           (JSON)
 //!            orientation    the orientation CNN's configuration; in model A alone                   (JSON)
 //!            comparison     the comparison network's configuration, where there is one        (JSON)
-//!            calibration    of the network's score; how much other things resemble the part         (JSON)
+//!            calibration    of the network's score; resemblance of other objects to the part         (JSON)
 //!            demonstrations marks of each, in pixels of its cut-out                                 (JSON)
 //! tensors    network.NAME              f16
 //!            orientation.NAME          f16
@@ -38,10 +38,10 @@ use crate::safetensors_file::{self, TensorBytes};
 use crate::taught::TaughtDemonstration;
 use crate::taught_marks::TaughtMarks;
 
-/// The version written here. It is increased by any change that an older reader would misread.
+/// The version that this code writes. It is increased by any change that an older reader would misread.
 pub const FORMAT_VERSION: u32 = 3;
 
-/// More demonstrations than any use needs; limits the work on a forged file.
+/// Maximum number of demonstrations in a file, far above practical use; limits the work on a forged file.
 const MAX_DEMONSTRATIONS: usize = 1000;
 
 /// The metadata of a file, without its weights.
@@ -53,7 +53,7 @@ pub struct ModelSummary {
     pub preset: String,
     /// The object's name.
     pub object: String,
-    /// How it was taught.
+    /// How the model was taught.
     pub teaching: TeachingFacts,
 }
 
@@ -270,7 +270,7 @@ impl Metadata {
     }
 }
 
-/// Reads the header and checks that it is a grasp model of this version.
+/// Reads the header and checks that the file is a grasp model of this version.
 fn read_metadata(bytes: &[u8]) -> Result<Metadata> {
     let (header_length, header) =
         SafeTensors::read_metadata(bytes).map_err(|_| GraspError::NotAModel { found: describe(bytes) })?;
@@ -291,7 +291,7 @@ fn read_metadata(bytes: &[u8]) -> Result<Metadata> {
     Ok(Metadata(metadata))
 }
 
-/// The kind of bytes that are not a safetensors file, for the error.
+/// Describes bytes that are not a safetensors file, for the error.
 fn describe(bytes: &[u8]) -> String {
     let known: [(&[u8], &str); 5] = [
         (b"\x89PNG", "a PNG image"),
@@ -308,14 +308,14 @@ fn describe(bytes: &[u8]) -> String {
 }
 
 fn to_json<T: Serialize>(value: &T) -> String {
-    // Plain data of our own; serialisation to a string cannot fail.
+    // Serialisation of plain data to a string cannot fail.
     serde_json::to_string(value).unwrap_or_default()
 }
 
-/// The metadata of a file; reads the header alone.
+/// The metadata of a file, from the header alone.
 ///
 /// # Errors
-/// As [`GraspModel::from_bytes`].
+/// As for [`GraspModel::from_bytes`].
 pub fn summarize(bytes: &[u8]) -> Result<ModelSummary> {
     let metadata = read_metadata(bytes)?;
     Ok(ModelSummary {
@@ -337,7 +337,7 @@ mod tests {
     use sdg_detection::presets::edge_of;
     use sdg_geometry::{BoundingBox, GraspLine, Polygon, RotationalSymmetry};
 
-    /// A model of an untaught network: everything that a file contains, made quickly.
+    /// A model of an untaught network, with everything that a file contains.
     fn untaught(kind: ModelKind) -> GraspModel {
         let outline = Polygon::from_box(&BoundingBox { x1: 20.0, y1: 20.0, x2: 100.0, y2: 50.0 });
         let cutout = RgbImage::from_fn(120, 70, |x, y| {

@@ -1,10 +1,11 @@
-//! The network's score, calibrated so that 0.5 separates right from wrong without verification (`--no-verify`).
+//! The network's score, calibrated so that 0.5 separates correct from wrong detections without verification
+//! (`--no-verify`).
 //!
 //! ```text
-//! network score ─ logistic, fitted on held-back augmentations ─ score of an unverified detection
+//! network score ─ logistic, fitted on held-out augmentations ─ score of an unverified detection
 //! ```
-//! Scores are compared in log-odds, where those of right and of wrong detections are spread about their medians;
-//! probabilities accumulate near 0 and 1. A verified detection is scored by all evidence ([`crate::verdict`]).
+//! Scores are compared in log-odds, in which the scores of correct and of wrong detections each spread about their
+//! median; probabilities accumulate near 0 and 1. A verified detection is scored by all evidence ([`crate::verdict`]).
 
 use serde::{Deserialize, Serialize};
 
@@ -23,17 +24,18 @@ pub struct NetworkCalibration {
 
 /// Scores are clamped to this distance from 0 and 1.
 const MIN_PROBABILITY: f64 = 1e-4;
-/// Minimum spread of scores on one side, in log-odds: a few equal scores say little about later ones. Derived from
-/// that, not measured.
+/// Minimum spread of the scores on one side, in log-odds, because a few equal scores predict little about later ones.
+/// Derived from that, not measured.
 const MIN_SPREAD: f64 = 0.3;
-/// The percentiles, on the side towards the other scores, that measure the spread; for a normal distribution they are
-/// 1.28 standard deviations from the median.
+/// The percentile, on the side towards the other scores, that measures the spread.
 const FACING_PERCENT: f64 = 10.0;
+/// Distance of this percentile of a normal distribution from the median, in standard deviations.
 const FACING_DEVIATIONS: f64 = 1.281_551_6;
-/// Ratio of the deviations from the threshold to the median of the wrong scores and to that of the right ones: for
-/// normal distributions 5 % of the wrong ones are accepted while 10 % of the right ones are refused (1.645 over 1.282).
+/// Ratio of two distances of the threshold, each in deviations: that to the median of the wrong scores over that to the
+/// median of the correct ones. With normal distributions, 5 % of the wrong scores are accepted when 10 % of the correct
+/// ones are refused (1.645 over 1.282).
 const WRONG_PER_RIGHT_DEVIATION: f64 = 1.2836;
-/// Bounds of the slope, so that a few scores make neither a step nor a flat line. Derived from that, not measured.
+/// Bounds of the slope, so that a few scores give neither a step nor a flat line. Derived from that, not measured.
 const SLOPE_BOUNDS: (f64, f64) = (0.5, 4.0);
 
 /// The log-odds of a raw score.
@@ -47,16 +49,16 @@ fn probability(log_odds: f64) -> f64 {
 }
 
 impl NetworkCalibration {
-    /// Leaves a score unchanged.
+    /// The calibration that leaves a score unchanged.
     pub const NEUTRAL: Self = Self { threshold: 0.5, slope: 1.0 };
 
-    /// Finds the threshold between the raw scores of right and wrong detections, from its distance in deviations to the
-    /// medians of both. The deviation of each side is that of its scores towards the other side, so that single
-    /// outliers and scores far from the threshold do not move it.
+    /// Finds the threshold between the raw scores of correct and wrong detections, from its distances to the medians of
+    /// both, in deviations. The deviation of each side is measured towards the other side, so that single outliers and
+    /// scores far from the threshold do not move the threshold.
     ///
-    /// `None` without a right score; without a wrong one, `no_wrong` replaces them. `usual` is the usual threshold of
-    /// networks of this kind, in log-odds, if it is known: the threshold is at least `usual`, because samples of a few
-    /// other objects say little about later ones, and from above it is moved half-way to `usual`.
+    /// `None` without a correct score; `no_wrong` is used if there is no wrong score. `usual` is the usual threshold of
+    /// networks of this kind, in log-odds, if it is known. Samples of a few other objects predict little about later
+    /// ones; therefore the threshold is at least `usual`, and a higher threshold is moved half-way to `usual`.
     pub fn fit(right: &[f64], wrong: &[f64], no_wrong: f64, usual: Option<f64>) -> Option<Self> {
         let in_log_odds = |scores: &[f64]| -> Vec<f64> {
             scores.iter().copied().filter(|score| score.is_finite()).map(log_odds).collect()

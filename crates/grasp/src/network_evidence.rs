@@ -1,10 +1,10 @@
-//! Log-odds of a place from a network's proposal, or from the lack of one.
+//! Log-odds of a place from a network's proposal, or from its absence.
 //!
-//! A network that was taught for half a minute also gives detections on other objects, and misses parts, so that
-//! neither a proposal nor its absence is strong evidence. Its strength is measured on held-back samples while teaching:
+//! A network that was taught for half a minute also detects other objects and misses parts, so that neither a proposal
+//! nor its absence is strong evidence. The strength of this evidence is measured on held-out samples during teaching:
 //!
 //! ```text
-//! held-back samples with the part ─ places on the part ────────┐
+//! held-out samples with the part ── places on the part ────────┐
 //!                                                              ├─ the network's scores there, counted ─ likelihood ratio
 //! samples without it ─ the place that agrees best with it ─────┘
 //! ```
@@ -14,12 +14,12 @@ use serde::{Deserialize, Serialize};
 use crate::network_calibration::{NetworkCalibration, log_odds};
 
 /// A score this far below the threshold, in log-odds, does not speak against the part: pictures score lower than
-/// held-back samples by about this much (the housing's right places by a median of 3.7, and 5.5;
+/// held-out samples by about this much (the correct places of the housing by a median of 3.7, and 5.5;
 /// docs/decisions/013-base-weights.md).
 #[cfg(any(feature = "teach", test))]
 const PICTURES_SCORE_LOWER_BY: f64 = 2.0;
 
-/// Counts of the network's outputs (silent, unsure, sure) on the part and on other objects.
+/// Counts of the network's outputs (no proposal, unsure, sure) on the part and on other objects.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct NetworkEvidence {
     on_part: [u32; 3],
@@ -31,7 +31,7 @@ pub(crate) struct NetworkEvidence {
 }
 
 impl NetworkEvidence {
-    /// From the network's scores on the part and on other objects, 0 without a proposal.
+    /// Counts the network's scores on the part and on other objects; a score is 0 without a proposal.
     #[cfg(any(feature = "teach", test))]
     pub(crate) fn new(on_part: &[f64], elsewhere: &[f64], calibration: &NetworkCalibration) -> Self {
         let mut evidence = Self { margin: PICTURES_SCORE_LOWER_BY, ..Self::default() };
@@ -53,8 +53,7 @@ impl NetworkEvidence {
         }
     }
 
-    /// ln of the likelihood ratio of such a score, on the part over elsewhere. One is added to the count of every
-    /// class.
+    /// ln of the likelihood ratio of such a score: on the part over elsewhere. Every count is increased by one.
     pub(crate) fn log_likelihood_ratio(&self, score: f64, calibration: &NetworkCalibration) -> f64 {
         let class = self.class(score, calibration);
         let share = |counts: &[u32; 3]| f64::from(counts[class] + 1) / f64::from(counts.iter().sum::<u32>() + 3);

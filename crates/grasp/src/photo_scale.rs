@@ -8,10 +8,10 @@ use crate::model::GraspModel;
 use crate::taught::TaughtDemonstration;
 
 impl GraspModel {
-    /// The same model for calibrated cameras, as if its photos had been taken vertically from above at a large
-    /// distance. `lengths` gives the pixels of the first photo per metre of the part's surface; finer photos are
-    /// reduced to `max_pixels_per_m`, which suits cameras over a table better. The part is assumed to have the same
-    /// length in all photos.
+    /// The model for calibrated cameras, as if its photos had been taken vertically from above at a large distance.
+    /// `lengths` gives the pixels of the first photo per metre of the part's surface; finer photos are reduced to
+    /// `max_pixels_per_m`, a resolution typical of cameras above a table. The part is assumed to have the same length
+    /// in all photos.
     ///
     /// # Errors
     /// Impossible lengths, and a part that is too small in the reduced photo.

@@ -1,21 +1,21 @@
-//! From a grasp in the image to a pose of the gripper.
+//! Conversion of a grasp in the image to a pose of the gripper.
 
 use nalgebra::{Isometry3, Matrix3, Point2, Rotation3, Translation3, UnitQuaternion, Vector3};
 use sdg_geometry::{PlanarGrasp, PosedCamera};
 
 use crate::GraspError;
 
-/// The heights that a photo does not show: known from the part, or measured once.
+/// The heights of the marks and of the grasp, which a photo does not show: known from the part, or measured once.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GraspPlane {
-    /// Height of the marks' plane in the base frame, in metres. The original uses the table's height and so has a
-    /// parallax error: 11 mm for a part of 40 mm seen 150 px off the axis.
+    /// Height of the marks' plane in the base frame, in metres. The original uses the table's height and therefore has
+    /// a parallax error: 11 mm for a part of 40 mm, 150 px off the axis.
     pub mark_height_m: f64,
     /// Height of the gripper's centre point when it closes, in the base frame, in metres.
     pub grasp_height_m: f64,
 }
 
-/// The grasp pose, and the width of the part there.
+/// The grasp pose, and the width of the part at the grasp.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GraspPose {
     /// Transform from the tool centre point's frame to the robot's base, metres: z points down to the table,
@@ -105,7 +105,7 @@ mod tests {
 
     #[test]
     fn a_turn_to_the_right_in_the_image_turns_the_gripper_with_it() {
-        // Image y is opposite to base y here, so that +90° in the image is the direction -y of the base.
+        // Image y is opposite to base y for this camera, so that +90° in the image is the direction -y of the base.
         let grasp = PlanarGrasp { x: 320.0, y: 240.0, angle: Angle::from_degrees(90.0), width: 22.0 };
         let pose = GraspPose::from_planar(&half_a_metre_above(0.4, 0.0), &grasp, &PLANE, 0.08).unwrap();
         assert!((pose.base_from_tcp * Vector3::x() + Vector3::y()).norm() < 1e-9);

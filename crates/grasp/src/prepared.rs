@@ -2,11 +2,11 @@
 //!
 //! ```text
 //! cut-out ─ resized ─────────────┐
-//!                                ├─ the part is as large in both, and no larger than needed
+//!                                ├─ the part has the same size in both, as small as possible
 //! picture ─ halved some times ───┘
 //! ```
-//! A telephone's photo shows a part by a thousand pixels; a quarter of them places it equally well and takes a
-//! sixteenth of the time.
+//! In a telephone's photo a part is a thousand pixels long; with a quarter of the resolution the pose is as accurate,
+//! and takes a sixteenth of the time.
 
 use std::sync::{Arc, Mutex};
 
@@ -20,14 +20,14 @@ use crate::round_top::RoundTop;
 use crate::sizes::SizeRange;
 use crate::taught_marks::TaughtMarks;
 
-/// Largest extent of a part at the working resolution, in pixels. Chosen for time: it costs at most a fraction of a
-/// pixel.
+/// Maximum extent of a part at the working resolution, in pixels. Chosen for time: the resulting error is at most a
+/// fraction of a pixel.
 const MAX_EXTENT_PX: f64 = 256.0;
 /// Largest enlargement of a cut-out; a picture that would need more is halved instead. Chosen by hand, not measured.
 const MAX_ENLARGEMENT: f64 = 1.19;
-/// A cut-out within this ratio of its own size is not resized. Chosen by hand, not measured.
+/// A cut-out is not resized if its size would change by less than this ratio. Chosen by hand, not measured.
 const SAME_SIZE: f64 = 0.02;
-/// Number of cached sizes: a stream of pictures has one or two.
+/// Maximum number of cached sizes; a stream of pictures has one or two.
 const MAX_KEPT: usize = 4;
 
 /// The resizing that gives picture and cut-out the same scale.
@@ -40,7 +40,7 @@ pub(crate) struct WorkingSize {
 }
 
 impl WorkingSize {
-    /// For a part of `extent_px` in its cut-out that lies in a picture `scale` times as large.
+    /// The resizing for a part of `extent_px` in its cut-out that is `scale` times as large in the picture.
     pub(crate) fn new(extent_px: f64, scale: f64) -> Self {
         let mut halvings = 0;
         let in_picture = |halvings: u32| scale / f64::from(1u32 << halvings);
@@ -64,9 +64,9 @@ impl WorkingSize {
 #[derive(Debug)]
 pub(crate) struct Prepared {
     pub(crate) search: ShapeSearch,
-    /// `None` if there are too few edges around the marks, and for a part of revolution.
+    /// The position of the marks; `None` if there are too few edges around them, and for a part of revolution.
     pub(crate) marks_shift: Option<MarksShift>,
-    /// For a part of revolution only.
+    /// The position of the marks of a part of revolution; `None` for other parts.
     pub(crate) round_top: Option<RoundTop>,
 }
 
@@ -88,7 +88,8 @@ impl Prepared {
     }
 }
 
-/// The most recently used sizes of one demonstration. Each takes milliseconds, and is the same at any time.
+/// The most recently used sizes of one demonstration. Each takes milliseconds to prepare, with the same result each
+/// time.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct PreparedSizes {
     kept: Arc<Mutex<Vec<Kept>>>,
@@ -111,7 +112,7 @@ impl PreparedSizes {
     /// The demonstration for sizes in `range`, for pictures resized by `working`.
     ///
     /// # Errors
-    /// A part with nothing to compare at that size.
+    /// A part without a shape to compare at that size.
     pub(crate) fn get(
         &self,
         cutout: &RgbImage,
@@ -149,7 +150,7 @@ mod tests {
         let size = |extent_px: f64, scale: f64| WorkingSize::new(extent_px, scale);
         assert_eq!(size(120.0, 1.0), WorkingSize { halvings: 0, cutout_scale: 1.0 });
         assert_eq!(size(120.0, 1.01), WorkingSize { halvings: 0, cutout_scale: 1.0 });
-        // 1000 px in the photo and in the picture: 250 of 256 px after two halvings.
+        // 1000 px in the photo and in the picture: 250 px after two halvings, of at most 256 px.
         assert_eq!(size(1000.0, 1.0), WorkingSize { halvings: 2, cutout_scale: 0.25 });
         // 60 px in the photo, 180 in the picture: 90 px in a picture halved once would require an enlarged cut-out.
         assert_eq!(size(60.0, 3.0), WorkingSize { halvings: 2, cutout_scale: 0.75 });

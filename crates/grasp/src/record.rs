@@ -10,21 +10,21 @@ use crate::{Contributions, ModelKind, TurnSource};
 pub struct DetectionRecord {
     /// Calibrated, in `[0, 1]`: at least 0.5 is accepted.
     pub score: f64,
-    /// The network's own, in `[0, 1]`; null without a network (model S).
+    /// The network's score, in `[0, 1]`; null without a network (model S).
     pub network_score: Option<f64>,
-    /// Agreement of the demonstration with the image, in `[0, 1]`; null without verification.
+    /// Agreement of demonstration and image, in `[0, 1]`; null without verification.
     pub agreement: Option<f64>,
-    /// Left, top, right, bottom.
+    /// The box: left, top, right, bottom.
     #[serde(rename = "box")]
     pub bounds: [f64; 4],
-    /// x, y and the network's score of each; empty for models without keypoints.
+    /// The keypoints: x, y and the network's score of each; empty for models without keypoints.
     pub keypoints: Vec<[f64; 3]>,
     /// The outline's corners; absent without verification.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub polygon: Option<Vec<[f64; 2]>>,
     /// Grasp point, direction and width.
     pub grasp: GraspRecord,
-    /// The source of the first estimate of the turn.
+    /// The source of the first estimate of the orientation.
     pub turn_source: TurnSource,
     /// The contributions to the score, in log-odds; absent without verification.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -37,9 +37,9 @@ pub struct DetectionRecord {
 /// A [`sdg_geometry::PlanarGrasp`] in pixels and degrees.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct GraspRecord {
-    /// Pixels to the right.
+    /// Position to the right, in pixels.
     pub x: f64,
-    /// Pixels down.
+    /// Position downwards, in pixels.
     pub y: f64,
     /// Direction of the marked line, in (-180, 180], y down; the jaws close across it.
     pub angle_deg: f64,
@@ -48,7 +48,7 @@ pub struct GraspRecord {
 }
 
 impl DetectionRecord {
-    /// The record of a detection by a model of that kind.
+    /// The record of a detection by a model of this kind.
     pub fn new(detection: &GraspDetection, kind: ModelKind) -> Self {
         let b = detection.bbox;
         let grasp = detection.grasp;

@@ -1,7 +1,7 @@
 //! The region of a picture that is searched.
 //!
-//! A part lies in the region if its grasp point and at least half of its area do. It is judged together with its
-//! surroundings, even where it extends beyond the region (search_window.rs).
+//! A part lies in the region if its grasp point and at least half of its area do. Its surroundings are evaluated even
+//! beyond the region (search_window.rs).
 
 use std::fmt;
 
@@ -9,10 +9,10 @@ use nalgebra::Point2;
 use sdg_geometry::{BoundingBox, PlanarSimilarity, Polygon};
 use serde::{Deserialize, Serialize};
 
-/// Minimum share of a part's area in the region. Chosen by hand.
+/// Minimum fraction of a part's area in the region. Chosen by hand.
 const MIN_SHARE: f64 = 0.5;
 
-/// A rectangle of whole pixels in a picture: only parts in it are searched.
+/// A rectangle of whole pixels in a picture, to which the search is restricted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SearchRegion {
     /// Left edge.
@@ -23,7 +23,7 @@ pub struct SearchRegion {
     pub width: u32,
     /// Height in pixels.
     pub height: u32,
-    /// Width and height of the pictures for which it was given; `None` for pictures of any size.
+    /// Width and height of the pictures for which the region was given; `None` for pictures of any size.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub picture: Option<[u32; 2]>,
 }
@@ -31,12 +31,12 @@ pub struct SearchRegion {
 /// The reason why a region cannot be searched.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "the messages say what the fields are")]
+#[allow(missing_docs, reason = "the messages explain the fields")]
 pub enum RegionError {
-    /// It has no pixel.
+    /// The region has no pixels.
     #[error("expected a region of at least 1 × 1 pixels, found {region}")]
     Empty { region: SearchRegion },
-    /// It extends beyond the picture.
+    /// The region extends beyond the picture.
     #[error("expected a region within the picture of {width} × {height} pixels, found {region}")]
     Outside { region: SearchRegion, width: u32, height: u32 },
     /// A picture of another size.
@@ -44,10 +44,10 @@ pub enum RegionError {
         "expected a picture of {expected_width} × {expected_height} pixels, for which the region was given, found {width} × {height}"
     )]
     OtherPicture { expected_width: u32, expected_height: u32, width: u32, height: u32 },
-    /// It shows nothing of the plane of the marks.
+    /// The region shows nothing of the plane of the marks.
     #[error("expected a region that shows the table where parts may lie, found {region}, which does not")]
     OffTable { region: SearchRegion },
-    /// The part does not fit in.
+    /// The region is too small for the part.
     #[error(
         "expected a region that the part fits in, which is {} pixels long and {} wide there, found {region}: make it larger",
         length.ceil(),
@@ -63,23 +63,23 @@ impl fmt::Display for SearchRegion {
 }
 
 impl SearchRegion {
-    /// For pictures of any size.
+    /// A region for pictures of any size.
     pub fn new([x, y, width, height]: [u32; 4]) -> Self {
         Self { x, y, width, height, picture: None }
     }
 
-    /// The same for pictures of that width and height only.
+    /// The region for pictures of this width and height only.
     pub fn of_picture(self, size: [u32; 2]) -> Self {
         Self { picture: Some(size), ..self }
     }
 
-    /// Its left, upper, right and lower edge.
+    /// The left, upper, right and lower edge.
     pub fn bounds(&self) -> BoundingBox {
         let [x1, y1, width, height] = [self.x, self.y, self.width, self.height].map(f64::from);
         BoundingBox { x1, y1, x2: x1 + width, y2: y1 + height }
     }
 
-    /// Whether it lies in a picture of this width and height, and is given for such pictures.
+    /// Whether the region lies in a picture of this width and height, and is given for such pictures.
     ///
     /// # Errors
     /// A region without pixels, one that extends beyond the picture, one that was given for pictures of another size.
@@ -99,8 +99,8 @@ impl SearchRegion {
         if self.width == 0 || self.height == 0 { Err(RegionError::Empty { region: *self }) } else { Ok(()) }
     }
 
-    /// Whether a part with this outline, in its pixels, and this `grasp_point` lies in it: the point does, and at least
-    /// half of the outline's area.
+    /// Whether a part lies in the region: its `grasp_point` and at least half of its outline's area do. Both are in
+    /// pixels of the picture.
     pub(crate) fn has(&self, grasp_point: &Point2<f64>, outline: &Polygon) -> bool {
         let BoundingBox { x1, y1, x2, y2 } = self.bounds();
         // The lower and right edges belong to the next region.

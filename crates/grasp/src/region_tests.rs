@@ -1,4 +1,4 @@
-//! A region compared with the whole picture, and the errors.
+//! The search of a region compared with that of the whole picture, and the errors.
 
 use std::ops::ControlFlow;
 
@@ -13,10 +13,13 @@ use crate::region::SearchRegion;
 use crate::teach::{TeachOptions, teach};
 
 const SIZE: [u32; 2] = [480, 360];
-/// The region's search reads the same pixels around a part, but starts from other places.
+/// Maximum difference in position: the region's search reads the same pixels around a part, but starts from other
+/// places.
 const MAX_APART_PX: f64 = 0.3;
+/// Maximum difference in angle, for the same reason.
 const MAX_TURN_RAD: f64 = 0.01;
-/// The table's colours are those of the region, and the best detection in it determines the reference size.
+/// Maximum difference of scores: the region determines the table's colours, and the best detection in it the reference
+/// size.
 const MAX_SCORES_APART: f64 = 0.05;
 
 fn picture() -> RgbImage {
@@ -36,8 +39,8 @@ fn refused(model: &GraspModel, picture: &RgbImage) -> String {
     model.detect(picture, Verification::ByShape).unwrap_err().to_string()
 }
 
-/// At every position of a region that is moved over the picture, across parts and between them, the parts in it are
-/// found as in the whole picture, and nothing else.
+/// At every position of a region that is moved across the picture, the search finds the same parts as the search of the
+/// whole picture, and nothing else.
 #[test]
 fn in_a_region_is_found_what_the_whole_picture_has_there() {
     let (model, picture) = (drawn_part::model(SIZE), picture());
@@ -67,11 +70,11 @@ fn in_a_region_is_found_what_the_whole_picture_has_there() {
         };
         num_cut += whole.iter().filter(is_cut).count();
     }
-    // Otherwise the picture or the regions test nothing.
+    // Enough parts lie in the regions and across their borders for the test to be meaningful.
     assert!(num_parts >= 20 && num_cut >= 20, "{num_parts} parts, {num_cut} cut");
 }
 
-/// Only the surroundings of the region are read.
+/// Pixels beyond the surroundings of the region are not read.
 #[test]
 fn the_rest_of_the_picture_changes_nothing() {
     let region = SearchRegion::new([20, 10, 120, 120]);
@@ -132,12 +135,12 @@ fn half_of_a_part_and_its_grasp_point_decide() {
         turn_source: TurnSource::Search,
         light: 1.0,
     };
-    // Its box extends from x − 20 to x + 20; the grasp is 5 to the right of the centre.
+    // The detection's box extends from x − 20 to x + 20; the grasp is 5 to the right of the centre.
     assert!(detection(120.0, 70.0).lies_in(&region));
     assert!(detection(100.0, 70.0).lies_in(&region), "half");
     assert!(!detection(99.0, 70.0).lies_in(&region), "less than half");
     assert!(detection(154.9, 70.0).lies_in(&region) && !detection(155.0, 70.0).lies_in(&region), "the grasp point");
-    // A quarter, although the grasp point is inside.
+    // Only a quarter of the area is inside, although the grasp point is.
     assert!(!detection(99.0, 51.0).lies_in(&region));
 }
 
@@ -164,7 +167,7 @@ fn regions_that_cannot_be_searched_are_refused_each_with_its_reason() {
     assert!(small.contains("that the part fits in, which is 68 pixels long and "), "{small}");
     assert!(small.ends_with("found 60 × 30 pixels from (100, 100): make it larger"), "{small}");
     assert!(refused(&with(SearchRegion::new([100, 100, 60, 30])).unwrap(), &picture).contains("make it larger"));
-    // Teaching refuses it before it starts.
+    // Teaching rejects the region before it starts.
     let mut options = TeachOptions { kind: ModelKind::C, ..TeachOptions::new(1) };
     options.region = Some(SearchRegion::new([100, 100, 60, 30]).of_picture(SIZE));
     let demonstration = drawn_part::demonstration(SIZE);

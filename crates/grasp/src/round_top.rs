@@ -1,9 +1,10 @@
 //! The position of the marks of a part of revolution in a picture.
 //!
-//! The outline of a screw that lies on its side is at the height of its axis; its marks are on its upper side, higher
-//! by the part's radius there. This determines their shift in a camera's picture. Their surroundings differ in every
-//! roll and carry no information. If the part lies in the same roll, edges on its upper side also agree and hold its
-//! pose above the outline; the distance is found from the outline alone.
+//! The outline of a screw that lies on its side is at the height of the axis; the marks are on the upper side, higher
+//! by the radius at the marks. This height determines their shift in a camera's picture. The surroundings of the marks
+//! differ with the roll about the axis and carry no information. If the part lies in the same roll as in the photo,
+//! edges on its upper side also agree, and the pose lies higher than the outline; its distance from the outline is
+//! measured with the outline alone.
 
 use nalgebra::{Point2, Vector2};
 use sdg_geometry::PlanarSimilarity;
@@ -14,7 +15,7 @@ use crate::taught_marks::TaughtMarks;
 /// The marks on the upper side of a part of revolution.
 #[derive(Debug, Clone)]
 pub(crate) struct RoundTop {
-    /// Their height above the axis, in pixels of the cut-out.
+    /// Height of the marks above the axis, in pixels of the cut-out.
     rise: f64,
     /// The centre of the photo, in pixels of the cut-out.
     photo_middle: Point2<f64>,
@@ -30,7 +31,7 @@ impl RoundTop {
     /// The shift of the marks relative to the outline in the camera's picture.
     ///
     /// # Units and frames
-    /// Pixels of the picture, the focal length too; `below_camera` is the point of the table vertically below the
+    /// Pixels of the picture, also for the focal length; `below_camera` is the point of the table vertically below the
     /// camera.
     fn shift(&self, focal_px: f64, below_camera: Point2<f64>, image_from_cutout: &PlanarSimilarity) -> Vector2<f64> {
         let nearer = self.rise * image_from_cutout.scale / focal_px;

@@ -1,7 +1,7 @@
 //! Writes a safetensors file; the same content gives the same bytes.
 //!
-//! The `safetensors` crate reads (and checks) these files. It writes metadata in the order of a hash map, which
-//! differs from run to run; for the same file from the same seed a writer with a fixed order is needed.
+//! The `safetensors` crate reads and checks these files. It writes metadata in the order of a hash map, which differs
+//! from run to run; this writer has a fixed order, so that the same seed gives the same file.
 
 use std::collections::BTreeMap;
 
@@ -35,7 +35,7 @@ impl TensorBytes {
 pub(crate) fn values_from_halves(bytes: &[u8]) -> Vec<f32> {
     let halves: Vec<f16> = bytes.chunks_exact(2).map(|pair| f16::from_le_bytes([pair[0], pair[1]])).collect();
     let mut values = vec![0.0; halves.len()];
-    // Eight at a time, if the processor supports it.
+    // Converts eight values at a time, if the processor supports it.
     halves.convert_to_f32_slice(&mut values);
     values
 }

@@ -1,11 +1,11 @@
-//! Measurements of a part by teaching, besides its networks: a section of the model file.
+//! Measurements of a part during teaching: a section of the model file.
 
 use serde::{Deserialize, Serialize};
 
 use crate::network_calibration::NetworkCalibration;
 use crate::network_evidence::NetworkEvidence;
 
-/// The measurements of the part by teaching, as stored.
+/// The measurements of the part during teaching, as stored.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct ScoreCalibration {
     pub(crate) network: NetworkCalibration,
@@ -17,8 +17,8 @@ pub(crate) struct ScoreCalibration {
 }
 
 impl ScoreCalibration {
-    /// The log-likelihood ratio of a place by the network's score there, 0 without a proposal; `None` if that is not
-    /// known.
+    /// The log-likelihood ratio of a place from the network's score there, 0 without a proposal; `None` without the
+    /// network's evidence.
     pub(crate) fn log_likelihood_ratio(&self, network_score: f64) -> Option<f64> {
         Some(self.evidence?.log_likelihood_ratio(network_score, &self.network))
     }

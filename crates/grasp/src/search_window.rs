@@ -4,7 +4,7 @@
 //! picture ─ region ─ region and a margin, cut out ─ searched ─ detections in pixels of the picture ─ those that lie in the region
 //! ```
 //! The margin is half the part's length, so that parts that extend beyond the region are complete in the window. Pixels
-//! further out are not read.
+//! beyond the margin are not read.
 
 use image::{RgbImage, imageops};
 use nalgebra::Point2;
@@ -18,20 +18,20 @@ use crate::taught::TaughtDemonstration;
 use crate::verification::Shot;
 use sdg_shape::PixelRect;
 
-/// Margin of the window around the region, in lengths of the part: the largest extent beyond the region of a part with
+/// Margin of the window around the region, in lengths of the part: the maximum extent beyond the region of a part with
 /// half of its area inside.
 const MARGIN: f64 = 0.5;
-/// Additional pixels, for the gradients' smoothing. Chosen by hand.
+/// Additional margin in pixels, for the smoothing of the gradients. Chosen by hand.
 const BORDER_PX: f64 = 4.0;
 /// Window corners are at multiples of this many pixels of the halved picture, so that all levels of its pyramid have
 /// the pixels of the whole picture's levels.
 const GRID_PX: u32 = 8;
 
-/// Whether a region can be searched, as far as that is known without a picture: it has pixels, it lies within the
-/// pictures for which it is given, if their size is given, and the demonstrations' part fits in.
+/// Whether a region can be searched, as far as is known without a picture: it has pixels and, if the size of its
+/// pictures is given, lies within them and is large enough for the demonstrations' part.
 ///
 /// # Errors
-/// As for [`SearchRegion::check`], and a region that the part does not fit in.
+/// As for [`SearchRegion::check`], and a region that is too small for the part.
 pub(crate) fn check_region(region: &SearchRegion, demonstrations: Option<&Vec<TaughtDemonstration>>) -> Result<()> {
     let Some(picture) = region.picture else { return Ok(region.check_pixels()?) };
     region.check(picture)?;
@@ -49,13 +49,13 @@ pub(crate) struct SearchWindow {
 }
 
 impl SearchWindow {
-    /// The image itself.
+    /// The whole image as a window.
     pub(crate) fn whole([width, height]: [u32; 2]) -> Self {
         Self { rect: PixelRect { left: 0, top: 0, width, height }, whole: [width, height] }
     }
 
-    /// The window of an image of size `whole` that contains everything needed to judge parts in `bounds`, in its
-    /// pixels; `region` is the user's.
+    /// The window of an image of size `whole` that contains everything needed to evaluate parts in `bounds`, in pixels
+    /// of the image; `region` is the region given by the user.
     ///
     /// # Errors
     /// [`RegionError::SmallerThanPart`].
@@ -92,7 +92,7 @@ impl SearchWindow {
         Ok(Self { rect: PixelRect { left, top, width, height }, whole })
     }
 
-    /// These pixels of an image.
+    /// The pixels of the window.
     pub(crate) fn cut(&self, image: &RgbImage) -> RgbImage {
         let PixelRect { left, top, width, height } = self.rect;
         imageops::crop_imm(image, left, top, width, height).to_image()
@@ -108,12 +108,12 @@ impl SearchWindow {
         }
     }
 
-    /// Moves from its pixels to those of the whole image.
+    /// Maps pixels of the window to those of the whole image.
     pub(crate) fn whole_from_window(&self) -> PlanarSimilarity {
         PlanarSimilarity::translation(f64::from(self.rect.left), f64::from(self.rect.top))
     }
 
-    /// Detections of the window, in pixels of the whole image.
+    /// Moves a detection of the window to pixels of the whole image.
     pub(crate) fn in_whole(&self, found: &mut Found) {
         let shift = self.whole_from_window();
         let PlanarSimilarity { tx, ty, .. } = shift;
@@ -135,8 +135,8 @@ impl SearchWindow {
     }
 }
 
-/// Length and width of a polygon: its longest distance, and the smallest distance between two parallel lines that
-/// enclose it.
+/// Length and width of a polygon: the largest distance between two points, and the smallest distance between two
+/// parallel lines that enclose the polygon.
 fn extents(polygon: &Polygon) -> [f64; 2] {
     let hull = convex_hull(polygon.vertices.iter().copied());
     let distances = hull.iter().flat_map(|a| hull.iter().map(move |b| (b - a).norm()));
@@ -156,7 +156,7 @@ mod tests {
 
     #[test]
     fn extents_by_hand() {
-        // 3 × 4 turned by 30°: the diagonal, and the shorter side.
+        // 3 × 4 rotated by 30°: the diagonal, and the shorter side.
         let turn = PlanarSimilarity { angle: Angle::from_degrees(30.0), ..PlanarSimilarity::IDENTITY };
         let rectangle = Polygon::from_box(&BoundingBox { x1: 0.0, y1: 0.0, x2: 3.0, y2: 4.0 }).transformed(&turn);
         let [length, across] = extents(&rectangle);

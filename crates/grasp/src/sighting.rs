@@ -10,14 +10,14 @@ use crate::verification::{PlacedDemonstration, SearchedImage, search, verify};
 /// A place where the part may be, before it is scored.
 pub(crate) struct Sighting<'a> {
     pub(crate) placed: PlacedDemonstration<'a>,
-    /// 0 without a proposal of the network.
+    /// The network's score; 0 without a proposal of the network.
     pub(crate) network_score: f64,
     /// The network's scores of the keypoints; empty for a place found by the search.
     pub(crate) keypoint_scores: Vec<f64>,
     pub(crate) turn_source: TurnSource,
 }
 
-/// The one with the highest agreement, for any score.
+/// The sighting with the highest agreement, regardless of its score.
 #[cfg(feature = "teach")]
 pub(crate) fn best_agreement<'s, 'a>(sightings: &'s [Sighting<'a>]) -> Option<&'s Sighting<'a>> {
     sightings.iter().max_by(|a, b| a.placed.agreement.total_cmp(&b.placed.agreement))
@@ -30,7 +30,7 @@ pub(crate) fn sightings<'a>(proposals: &Proposals, image: &SearchedImage<'a>) ->
     proposed.into_iter().flatten().chain(found.iter().map(|placed| searched(placed, proposals))).collect()
 }
 
-/// The same, but of the network's proposals only the candidates down to the first right one: verifying the others takes
+/// As [`sightings`], but with the network's proposals only down to the first correct one: verifying the others takes
 /// longer than the search and does not change the network's score on the part.
 #[cfg(feature = "teach")]
 pub(crate) fn sightings_to_first<'a>(
@@ -74,8 +74,8 @@ fn searched<'a>(placed: &PlacedDemonstration<'a>, proposals: &Proposals) -> Sigh
     }
 }
 
-/// The pose of the search for the part of the candidate, if its agreement is so high that refining the candidate's own
-/// pose would end there; that refinement took most of model C's time.
+/// The pose found by the search on the candidate's part, if its agreement is so high that refinement of the candidate's
+/// pose would converge to it; that refinement took most of model C's time.
 fn found_already<'f, 'a>(
     candidate: &PoseCandidate,
     found: &'f [PlacedDemonstration<'a>],

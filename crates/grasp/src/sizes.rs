@@ -1,8 +1,9 @@
 //! The possible sizes of a part in a picture of an uncalibrated camera.
 //!
-//! A photo and a picture may have different numbers of pixels because one was resized or cropped. The files do not say
-//! which, so both hypotheses are tried: **same pixels**, a part covers as many pixels as in its photo, and **same
-//! frame**, it covers the same share of the picture. Around each, sizes vary within the model's tolerance.
+//! A photo and a picture may have different numbers of pixels because one was resized or cropped. The files do not
+//! record which, so both hypotheses are tried: **same pixels**, a part covers as many pixels as in its photo, and
+//! **same frame**, it covers the same fraction of the picture. Around each hypothesis, sizes vary within the model's
+//! tolerance.
 
 use std::ops::RangeInclusive;
 
@@ -12,15 +13,15 @@ use sdg_geometry::{Angle, PlanarSimilarity};
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct SizeRange {
     pub(crate) scales: RangeInclusive<f64>,
-    /// The hypotheses in it, one or both.
+    /// The hypotheses in the range, one or both.
     nominal: Vec<f64>,
 }
 
 /// Hypotheses within this ratio are one. Chosen by hand, not measured.
 const SAME_LOG: f64 = 0.03;
 /// Overlapping ranges are searched together if the largest size is at most this many times the smallest, because one
-/// template has its edges at one resolution. At 3, drillscrews taught at three quarters of the pixels were found in one
-/// of nine cases, at 1.9 in seven. Chosen by hand between these two.
+/// template has its edges at one resolution. With 3, drillscrews taught at three quarters of the pixels were found in
+/// one of nine cases, with 1.9 in seven. Chosen by hand between these two.
 const MAX_RATIO: f64 = 1.9;
 
 impl SizeRange {
@@ -43,7 +44,7 @@ impl SizeRange {
         vec![same_pixels, Self { scales: about(same_frame), nominal: vec![same_frame] }]
     }
 
-    /// Of several ranges the one that contains a scale or is nearest to it.
+    /// The range that contains a scale or is nearest to it.
     pub(crate) fn nearest(ranges: &[Self], scale: f64) -> Option<&Self> {
         ranges.iter().min_by(|a, b| a.distance(scale).total_cmp(&b.distance(scale)))
     }
@@ -93,13 +94,13 @@ mod tests {
 
     #[test]
     fn another_number_of_pixels_is_another_size_or_another_crop() {
-        // 1.05 times the pixels: from 0.75 to 1.05 · 1.35 in one search.
+        // 1.05 times the number of pixels: from 0.75 to 1.05 · 1.35 in one search.
         let [range] = &SizeRange::all(Some([640, 480]), [672, 504], &TOLERANCE)[..] else { panic!("one range") };
         assert!((range.scales.start() - 0.75).abs() < 1e-12 && (range.scales.end() - 1.4175).abs() < 1e-12);
         assert!(range.log_size(1.0) == 0.0 && range.log_size(1.05) == 0.0);
         assert!((range.log_size(1.155) - 1.1f64.ln()).abs() < 1e-12);
 
-        // A third of the pixels, and half as many again: too far for one search.
+        // 1.5 times the number of pixels, and a third: too far for one search.
         assert_eq!(SizeRange::all(Some([640, 480]), [960, 720], &TOLERANCE).len(), 2);
         let [pixels, frame] = &SizeRange::all(Some([960, 720]), [320, 240], &TOLERANCE)[..] else {
             panic!("two ranges")

@@ -1,11 +1,11 @@
-//! A camera without calibration that looks at the table at a slant: the picture is rectified to a level view and
-//! searched, and the detections are mapped back.
+//! Detection with a slanted camera without calibration: the picture is rectified to a level view and searched, and the
+//! detections are mapped back.
 //!
 //! ```text
 //! level search ─ best places ─ their shortening ─ slant ─ rectified picture ─ search ─ better? ─ transformed back
 //! ```
-//! All parts lie on one plane, so that a few sure places determine the slant for all. A single shortened part leaves
-//! open which end of the slant is the far one; the slant with the better agreement of the place with the photo is used.
+//! All parts lie on one plane, so that a few sure places determine the slant for all. A single shortened part does not
+//! show which side of the slant is the far one; the slant with the better agreement of place and photo is used.
 
 use image::RgbImage;
 use nalgebra::{Point2, Vector2};
@@ -16,32 +16,33 @@ use crate::detection::{Found, GraspDetection};
 use crate::sighting::Sighting;
 use crate::verification::{SearchedImage, Shot, agreement_in, foreshortening, usual_focal_px};
 
-/// Number of places used, best first, and their minimum agreement. Chosen by hand, for time.
+/// Maximum number of places used, best first. Chosen by hand, for time.
 const NUM_SLANT_PLACES: usize = 4;
+/// Minimum agreement of these places. Chosen by hand, for time.
 const MIN_AGREEMENT: f64 = 0.25;
-/// Minimum share of edges on crests; a place below it carries no information. Chosen by hand.
+/// Minimum fraction of edges on crests; a place below it carries no information. Chosen by hand.
 const MIN_CONSENSUS: f64 = 0.3;
 /// Standard deviation of ln shortening relative to that of the slant. Chosen by hand.
 const SHORTENING_NOISE: f64 = 0.12;
-/// A smaller tilt shortens by less than 3 % and is ignored.
+/// Minimum tilt in radians: a smaller one shortens by less than 3 % and is ignored.
 const MIN_TILT: f64 = 0.24;
-/// Minimum share of the shortening, relative to a level camera, that a slant must explain: less is noise of the fits.
-/// Chosen by hand, for time; the agreement of the places decides.
+/// Minimum fraction of the shortening, relative to a level camera, that a slant must explain: less is noise of the
+/// fits. Chosen by hand, for time; the agreement of the places decides.
 const MIN_EXPLAINED: f64 = 0.1;
 /// Minimum gain of agreement over the level view, of a slanted place and then of the picture. For places seen by a
 /// camera slanted by 30° the best gains 0.07 to 0.16, for a level camera at most 0.02 (tuned sets).
 const SLANT_GAIN: f64 = 0.03;
-/// If nothing is accepted in the level picture, a slant can also make another part, mainly a longer one, similar to the
-/// photo; then a sure detection is required. Otherwise three more of the tuned sets' pictures without the part would
-/// have a false alarm.
+/// Minimum score in the rectified picture if nothing is accepted in the picture itself: a slant can also make another
+/// part, mainly a longer one, similar to the photo. Without this minimum, three more of the tuned sets' pictures
+/// without the part would have a false alarm.
 const SURE: f64 = 0.9;
-/// Largest distance of the level picture's border from its centre, in sides of the picture.
+/// Maximum distance of the level picture's border from its centre, in sides of the picture.
 const MAX_REACH: f64 = 0.75;
 /// Size of the rectified area around a place, in sides of its box.
 const MARGIN: f64 = 0.2;
 
-/// Whether the detections in the level picture explain more than those in the picture itself. Scores cannot decide:
-/// they are equally high for a pose with a small error.
+/// Whether the detections in the rectified picture explain more than those in the picture itself. Scores cannot decide
+/// this: they are equally high for a pose with a small error.
 pub(crate) fn explains_more(slanted: &[Found], level: &[Found]) -> bool {
     fn accepted(found: &[Found]) -> impl Iterator<Item = &GraspDetection> {
         found.iter().map(|found| &found.detection).filter(|detection| detection.is_accepted())
@@ -51,8 +52,8 @@ pub(crate) fn explains_more(slanted: &[Found], level: &[Found]) -> bool {
     is_sure && worth(slanted) > worth(level) + SLANT_GAIN
 }
 
-/// A shortened place: its position from the picture's centre; its shortening, as a vector that half a turn does not
-/// change; and its share of edge points on crests.
+/// A shortened place: the position relative to the picture's centre, the shortening as a vector that a rotation by 180°
+/// does not change, and the fraction of edge points on crests.
 struct Shortened {
     at: Vector2<f64>,
     shortening: Vector2<f64>,
@@ -64,8 +65,8 @@ fn shortening_vector(log_ratio: f64, direction: Angle) -> Vector2<f64> {
     log_ratio * Vector2::new(cos, sin)
 }
 
-/// The slant under which the best places would look as in the photo; `None` if the camera may be level. `shot` is that
-/// of a level camera.
+/// The slant at which the best places would look as in the photo; `None` if the camera may be level. `shot` is that of
+/// a level camera.
 pub(crate) fn suggested_slant(
     picture: &RgbImage,
     shot: &Shot,
@@ -113,7 +114,7 @@ pub(crate) fn suggested_slant(
     (gain >= SLANT_GAIN).then_some(slant)
 }
 
-/// All tried slants: to 50°, every 2° of tilt and 10° of direction.
+/// All tried slants: tilts up to 50° in steps of 2°, directions in steps of 10°.
 fn slants(focal_px: f64) -> impl Iterator<Item = Slant> {
     (0..=25).flat_map(move |tilt| {
         (0..if tilt == 0 { 1 } else { 36 }).map(move |direction| Slant {
@@ -124,7 +125,7 @@ fn slants(focal_px: f64) -> impl Iterator<Item = Slant> {
     })
 }
 
-/// The residual of a slant for the shortened places; the residual of a place is bounded.
+/// The residual of a slant for the shortened places; the contribution of each place is bounded.
 fn cost(slant: &Slant, shortened: &[Shortened]) -> Option<f64> {
     let terms = shortened.iter().map(|place| {
         let (log_ratio, direction) = slant.shortening_at(place.at)?;
@@ -134,15 +135,15 @@ fn cost(slant: &Slant, shortened: &[Shortened]) -> Option<f64> {
     terms.sum()
 }
 
-/// The picture as a camera vertically above the table would have taken it.
+/// The picture that a camera vertically above the table would have taken.
 pub(crate) struct LevelImage {
     pub(crate) image: RgbImage,
     slant: Slant,
-    /// Width and height of the picture, which may be a part of a larger one.
+    /// Width and height of the picture, which may be a window of a larger one.
     size: [u32; 2],
-    /// The shot of the picture if the camera were level.
+    /// The shot that a level camera would have taken.
     taken: Shot,
-    /// The position of the centre of the camera's picture, in pixels of the level one.
+    /// The position of the centre of the camera's picture, in pixels of the level picture.
     middle: Vector2<f64>,
 }
 
@@ -157,7 +158,7 @@ impl LevelImage {
         Some(Self::of(picture, taken, slant, [bounds[0].sup(&-reach), bounds[1].inf(&reach)]))
     }
 
-    /// The surroundings of some points of the picture.
+    /// The level image of the surroundings of some points of the picture.
     pub(crate) fn about(picture: &RgbImage, taken: &Shot, slant: &Slant, points: &[Point2<f64>]) -> Option<Self> {
         let [least, largest] = level_bounds(taken, slant, points)?;
         let margin = Vector2::repeat(MARGIN * (largest - least).amax());
@@ -187,7 +188,7 @@ impl LevelImage {
         Some(self.taken.below_camera + seen)
     }
 
-    /// A detection of the level picture, in the slanted one; `None` where it lies outside.
+    /// Maps a detection of the level picture to the slanted one; `None` if it lies outside.
     pub(crate) fn seen(&self, found: Found) -> Option<Found> {
         let Found { detection, placement } = found;
         let points = |all: &[Point2<f64>]| all.iter().map(|point| self.point(point)).collect::<Option<Vec<_>>>();
@@ -226,7 +227,8 @@ impl LevelImage {
     }
 }
 
-/// Smallest and largest coordinates of the level points seen at some points of the picture, from its centre.
+/// Smallest and largest coordinates, relative to the centre, of the level points that correspond to some points of the
+/// picture.
 fn level_bounds(taken: &Shot, slant: &Slant, points: &[Point2<f64>]) -> Option<[Vector2<f64>; 2]> {
     let mut bounds = [Vector2::repeat(f64::INFINITY), Vector2::repeat(f64::NEG_INFINITY)];
     for point in points {
@@ -236,7 +238,7 @@ fn level_bounds(taken: &Shot, slant: &Slant, points: &[Point2<f64>]) -> Option<[
     Some(bounds)
 }
 
-/// Share of a detection's box that lies in the picture.
+/// Minimum fraction of a detection's box in the picture.
 const MIN_INSIDE: f64 = 0.6;
 
 #[cfg(test)]
@@ -250,8 +252,8 @@ mod tests {
         Vector2::from(size.map(|side| 0.5 * f64::from(side)))
     }
 
-    /// A dark plate of 110 × 60 pixels with two holes and a printed stripe, turned, at a point of the table relative to
-    /// its centre.
+    /// Brightness at a point of the table, relative to the centre of a dark, rotated plate of 110 × 60 pixels with two
+    /// holes and a printed stripe.
     fn color(level: Vector2<f64>) -> f64 {
         let (sin, cos) = 0.6f64.sin_cos();
         let [u, v] = [cos * level.x + sin * level.y, cos * level.y - sin * level.x];
@@ -284,8 +286,7 @@ mod tests {
         let seen = picture(|seen| slant.level_from_picture(seen));
         let made = LevelImage::new(&seen, &Shot::level(&seen), &slant).unwrap();
         let level = picture(Some);
-        // The plate and its surroundings; the level picture's centre is elsewhere in the one made from the slanted
-        // picture.
+        // Compares the plate and its surroundings; the image made from the slanted picture has its centre elsewhere.
         let mut sum = 0.0;
         for (y, x) in (100..260).flat_map(|y| (160..320).map(move |x| (y, x))) {
             let at = Vector2::new(f64::from(x), f64::from(y)) - half(SIZE) + made.middle;

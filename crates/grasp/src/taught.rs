@@ -1,4 +1,4 @@
-//! A demonstration as a model keeps it: cropped to the part, with everything that is compared with later images.
+//! A demonstration in a model: cropped to the part, with the data that are compared with images.
 
 use image::RgbImage;
 use nalgebra::{Point2, Vector2};
@@ -15,15 +15,15 @@ use crate::sizes::SizeRange;
 use crate::taught_marks::TaughtMarks;
 use crate::{GraspError, NUM_KEYPOINTS};
 
-/// Margin in pixels around the part, so that gradients at the outline have both sides. Chosen by hand, not measured.
+/// Margin in pixels around the part, so that gradients at the outline use both sides. Chosen by hand, not measured.
 const MARGIN_PX: f64 = 16.0;
 
-/// The cut-out, its marks, and the data that are laid over images.
+/// The cut-out, its marks, and the data that are compared with images.
 #[derive(Debug, Clone)]
 pub struct TaughtDemonstration {
     /// The photo, cropped to the part and a margin.
     pub cutout: RgbImage,
-    /// The marks on it.
+    /// The marks on the cut-out.
     pub marks: TaughtMarks,
     prepared: PreparedSizes,
     /// The cut-out without colours, for pictures without colours.
@@ -38,7 +38,7 @@ impl TaughtDemonstration {
     /// Crops a demonstration to its part.
     ///
     /// # Errors
-    /// No grasp marked, or nothing to compare in the outline.
+    /// A demonstration without a marked grasp, or without a shape to compare in the outline.
     pub fn new(demonstration: &Demonstration) -> Result<Self, GraspError> {
         let Annotation { label, bbox, jaw_width, outline, .. } = &demonstration.annotation;
         let grasp = *demonstration.annotation.require_grasp()?;
@@ -70,8 +70,8 @@ impl TaughtDemonstration {
         let outline = outline.as_ref().map(|o| Polygon { vertices: o.vertices.iter().map(moved).collect() });
         let grasp = GraspLine::new(moved(&grasp.start), moved(&grasp.end));
         let width_px = decimal(jaw_width.unwrap_or_else(|| {
-            // Without an outline, the width is measured across the box, which overestimates it: the gripper then opens
-            // wider than necessary.
+            // Without an outline, the width is measured across the box, which overestimates it, so that the gripper
+            // opens wider than necessary.
             grasp.opening_across(&outline.clone().unwrap_or_else(|| Polygon::from_box(&bbox)))
         }));
         Self::from_parts(
@@ -91,7 +91,7 @@ impl TaughtDemonstration {
     /// Restores a stored demonstration.
     ///
     /// # Errors
-    /// Nothing in the outline to compare.
+    /// A cut-out without a shape to compare in the outline.
     pub fn from_parts(cutout: RgbImage, marks: TaughtMarks) -> Result<Self, GraspError> {
         Self::with_config(cutout, marks, CheckConfig::DEFAULT)
     }
@@ -108,17 +108,17 @@ impl TaughtDemonstration {
             finer_reference: OnceLock::new(),
             check,
         };
-        // Errors of a demonstration are to appear here, not at the first picture.
+        // Errors of a demonstration must appear here, not at the first picture.
         let own_size = &SizeRange::all(None, [1, 1], &made.check.search.scales)[0];
         made.prepared(own_size, Colors::There)?;
         Ok(made)
     }
 
-    /// Prepared for pictures in which the part has a size in `range`, with colours or without; also the resizing of
-    /// those pictures.
+    /// The demonstration prepared for pictures in which the part has a size in `range`, with or without colours, and
+    /// the resizing of those pictures.
     ///
     /// # Errors
-    /// A part with nothing to compare at that size.
+    /// A part without a shape to compare at that size.
     pub(crate) fn prepared(
         &self,
         range: &SizeRange,
@@ -144,13 +144,13 @@ impl TaughtDemonstration {
         self.reference.get_or_init(|| Reference::new(&self.cutout, &self.marks.region(), config))
     }
 
-    /// The same in views of twice the resolution.
+    /// As [`Self::reference`], in views of twice the resolution.
     pub(crate) fn finer_reference(&self, config: &ComparisonConfig) -> &Reference {
         let made = || Reference::new(&self.cutout, &self.marks.region(), &config.finer());
         self.finer_reference.get_or_init(made)
     }
 
-    /// The same demonstration with other settings of comparison and search. Files do not store them: a demonstration
+    /// The demonstration with other settings of comparison and search. Files do not store the settings: a demonstration
     /// read from a file has the defaults.
     ///
     /// # Errors
@@ -159,7 +159,7 @@ impl TaughtDemonstration {
         Self::with_config(self.cutout, self.marks, check)
     }
 
-    /// The settings of its comparison and search.
+    /// The settings of comparison and search.
     pub fn check(&self) -> &CheckConfig {
         &self.check
     }
@@ -175,7 +175,7 @@ impl TaughtDemonstration {
         PlanarGrasp::from_line(&line, self.marks.width_px * image_from_cutout.scale)
     }
 
-    /// The outline for a pose of the cut-out in an image; the box's corners when no outline was drawn.
+    /// The outline for a pose of the cut-out in an image; the box's corners if no outline was drawn.
     pub fn outline(&self, image_from_cutout: &PlanarSimilarity) -> Polygon {
         self.marks.region().transformed(image_from_cutout)
     }

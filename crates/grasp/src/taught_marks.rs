@@ -1,11 +1,11 @@
-//! The marks of a demonstration as a model keeps them.
+//! The marks of a demonstration as stored in a model.
 
 use sdg_geometry::{BoundingBox, GraspLine, Polygon};
 use serde::{Deserialize, Serialize};
 
 use crate::sizes::scaling;
 
-/// The marks, in pixels of the kept cut-out.
+/// The marks, in pixels of the stored cut-out.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TaughtMarks {
     /// The object's name.
@@ -18,7 +18,7 @@ pub struct TaughtMarks {
     pub outline: Option<Polygon>,
     /// The part's width between the jaws: as marked, or measured across the outline.
     pub width_px: f64,
-    /// Width and height of the photo from which the cut-out comes; `None` if it was resized since.
+    /// Width and height of the photo from which the cut-out comes; `None` if the cut-out was resized since.
     #[serde(default)]
     pub photo_size: Option<[u32; 2]>,
     /// The centre of that photo, in pixels of the cut-out; `None` in files without it.

@@ -4,15 +4,15 @@
 //! network score ────────────────┐
 //! edges, surface, hue ──────────┤
 //! visible, likeness, details ───┼─ log-odds of each, bounded ─ sum ─ logistic ─ score; 0.5 decides
-//! size, share outside ──────────┤
-//! resemblance ──────────────────┤  how much other things look like this part: known from teaching
-//! table, rim, added, mirror ────┘  what contradicts the part, without bounds
+//! size, fraction outside ───────┤
+//! resemblance ──────────────────┤  agreement of other objects with this part: measured during teaching
+//! table, rim, added, mirror ────┘  contradictions of the part
 //! ```
-//! Each kind of evidence is wrong in its own pictures: gloss spoils edges and surface, a covering hand hides half of
-//! the part, the network detects other parts as well. So each adds log-odds within bounds, and none of them alone moves
-//! a pose that all others support below 0.5. Contradictions of the part do: bare table where it should be, no edge
-//! along its outline, more edges than it has, a better fit of its mirror image. The weights are those of a logistic
-//! regression on generated parts ([`crate::fitting`]).
+//! Each kind of evidence is wrong in some pictures: gloss spoils edges and surface, a covering hand hides half of the
+//! part, the network also detects other parts. Therefore each kind adds log-odds within bounds, and a pose that all
+//! other evidence supports is accepted. Only three contradictions reject it alone: bare table where the part should be,
+//! more edges than the part has, and a better fit of its mirror image. The weights come from a logistic regression on
+//! generated parts ([`crate::fitting`]).
 
 use sdg_shape::{CloseLook, Evidence, RivalFit};
 use serde::Serialize;
@@ -24,7 +24,7 @@ use crate::evidence_kind::{Advice, EvidenceKind};
 /// it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Contributions {
-    /// The network's proposal there, or its absence; absent without a network.
+    /// The network's proposal at the pose, or its absence; absent without a network.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub network: Option<f64>,
     /// Agreement of the demonstration's edges with the image.
@@ -33,27 +33,27 @@ pub struct Contributions {
     pub surface: f64,
     /// Closeness of the hue to the demonstration's.
     pub hue: f64,
-    /// The share of the part in regions that agree.
+    /// Fraction of the part in regions that agree.
     pub visible: f64,
-    /// Difference of its size from that of the best detection in the picture, or from the part's if that is known.
+    /// Difference in size from the best detection in the picture, or from the part if its size is known.
     pub size: f64,
-    /// The share of the part outside the picture.
+    /// Fraction of the part outside the picture.
     pub outside: f64,
-    /// Resemblance of other objects with this part.
+    /// Resemblance of other objects to this part.
     pub resemblance: f64,
     /// The log-odds of the small network whose input is photo and picture laid over each other; its minimum if edges
     /// and surface agree too little for its evaluation.
     pub likeness: f64,
-    /// The output of the network that distinguishes parts from their look-alikes, if it is sure; otherwise, or if it
-    /// was not evaluated, 0.
+    /// The output of the network that distinguishes parts from their look-alikes; 0 if the network is undecided or was
+    /// not evaluated.
     pub details: f64,
     /// Table where the part should be.
     pub table: f64,
-    /// The share of the outline without an edge.
+    /// Fraction of the outline without an edge.
     pub rim: f64,
     /// Edges inside the outline that are absent from the photo.
     pub added: f64,
-    /// The difference by which the mirror image fits better where it differs from the photo.
+    /// The difference by which the mirror image fits better, where it differs from the photo.
     pub mirror: f64,
 }
 
@@ -89,8 +89,8 @@ impl Contributions {
         (log_odds < 0.0).then_some(kind)
     }
 
-    /// The evidence against the part: first the strongest objection, then each that supports the part clearly less than
-    /// it could by `config`, the greatest loss first.
+    /// The evidence against the part: first the strongest objection, then each kind that supports the part clearly less
+    /// than it could with `config`, the greatest loss first.
     pub fn objections(&self, config: &ScoreConfig) -> Vec<EvidenceKind> {
         /// Smaller losses also occur in clear views. Chosen by hand.
         const MIN_LOSS: f64 = 0.5;
@@ -105,10 +105,10 @@ impl Contributions {
         strongest.into_iter().chain(lost.into_iter().map(|(kind, _)| kind)).collect()
     }
 
-    /// The further demonstration, or the setting, that would help if this is the part after all; `light` is its
-    /// brightness over that of the demonstration. `None` if no photo would help.
+    /// The further demonstration, or the setting, that would help if this is the part after all; `light` is the
+    /// brightness over that of the demonstration. `None` if neither would help.
     pub(crate) fn advice(&self, light: f64) -> Option<Advice> {
-        // Outside this range the light differs. Chosen by hand, not measured.
+        // Outside this range of brightness the light differs. Chosen by hand, not measured.
         const DARKER: f64 = 0.6;
         const BRIGHTER: f64 = 1.6;
         match self.strongest_objection()? {
@@ -126,23 +126,23 @@ impl Contributions {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Clues {
     pub(crate) evidence: Evidence,
-    /// ln of its size over the nearest nominal size.
+    /// ln of the size over the nearest nominal size.
     pub(crate) log_size: f64,
-    /// ln of the likelihood ratio of the network's score there, on the part over elsewhere; `None` if it was not
+    /// ln of the likelihood ratio of the network's score: on the part over elsewhere; `None` if the network was not
     /// evaluated.
     pub(crate) network: Option<f64>,
     /// Mean agreement of other objects with the part.
     pub(crate) resemblance: f64,
 }
 
-/// Minimum share of the photo's edges in which photo and rival must differ.
+/// Minimum fraction of the photo's edges in which photo and rival must differ.
 const MIN_RIVALS_SHARE: f64 = 0.03;
 
 /// Minimum score of the size reference. Chosen by hand, not measured.
 const MIN_REFERENCE_SCORE: f64 = 0.3;
 
-/// The scores of all detections in one picture and their contributions. Each is first judged alone, then by the size of
-/// the best among them, since the parts of one picture are equally far from the camera.
+/// The scores of all detections in one picture and their contributions. Each is first scored alone, then relative to
+/// the size of the best one, since the parts of one picture are equally far from the camera.
 pub(crate) fn judge_picture(clues: &[Clues], config: &ScoreConfig) -> Vec<(f64, Contributions)> {
     let surest = || {
         clues
@@ -156,7 +156,7 @@ pub(crate) fn judge_picture(clues: &[Clues], config: &ScoreConfig) -> Vec<(f64, 
     clues.iter().map(|clues| judge(clues, reference, config)).collect()
 }
 
-/// The same for a picture of a sequence in which parts had a size before, as [`Clues::log_size`].
+/// As [`judge_picture`], for a picture of a sequence in which parts had a size before, as [`Clues::log_size`].
 pub(crate) fn judge_picture_of_sequence(
     clues: &[Clues],
     earlier_log_size: Option<f64>,
@@ -171,7 +171,7 @@ pub(crate) fn judge_picture_of_sequence(
 fn judge(clues: &Clues, reference_log_size: Option<f64>, config: &ScoreConfig) -> (f64, Contributions) {
     let seen = &clues.evidence;
     let off_size = reference_log_size.map_or(0.0, |reference| (clues.log_size - reference).powi(2));
-    // Without a close look there is no such evidence.
+    // Without a close look these terms are neutral.
     let closely =
         |term: &Term, value: &dyn Fn(&CloseLook) -> f64| seen.close.map_or(0.0, |close| term.log_odds(value(&close)));
     let contributions = Contributions {
@@ -197,11 +197,11 @@ fn judge(clues: &Clues, reference_log_size: Option<f64>, config: &ScoreConfig) -
     (1.0 / (1.0 + (-log_odds).exp()), contributions)
 }
 
-/// The difference by which the rival fits better, as far as it fits at all (in another light, or rolled, a part fits
-/// neither); 0 if the two differ too little.
+/// The difference by which the rival fits better, weighted by how well it fits at all (in other light, or rolled, a
+/// part fits neither); 0 if photo and rival differ too little.
 pub(crate) fn rivals_gain(rival: RivalFit) -> f64 {
-    /// Up to the first value of its fit a rival explains nothing, from the second on everything. Chosen on the tuned
-    /// sets and parts.
+    /// Below the first value of its fit, the rival gets no weight, above the second the full weight. Chosen on the
+    /// tuned sets and parts.
     const FITS: [f64; 2] = [0.5, 0.7];
     let explains = ((rival.fit - FITS[0]) / (FITS[1] - FITS[0])).clamp(0.0, 1.0);
     if rival.share < MIN_RIVALS_SHARE { 0.0 } else { -rival.margin * explains }
@@ -216,7 +216,7 @@ pub(crate) mod tests {
         CloseLook { likeness, details: Some(1.5), bare: 0.0, fit: 0.75, no_rim: 0.02, added: 0.0, mirrored: None }
     }
 
-    /// A clear view of the part: the medians of right poses on generated parts.
+    /// A clear view of the part: the medians of correct poses on generated parts.
     fn clear() -> Clues {
         let evidence = Evidence {
             edges: 0.79,
@@ -252,7 +252,7 @@ pub(crate) mod tests {
         let best = |term: &Term| term.range.map(|value| term.log_odds(value)).into_iter().fold(f64::MIN, f64::max);
         let worst = |term: &Term| term.range.map(|value| term.log_odds(value)).into_iter().fold(f64::MAX, f64::min);
         let config = ScoreConfig::DEFAULT;
-        // The network is not always evaluated: without it the others must suffice.
+        // The network is not always evaluated: without it, the other terms must suffice.
         for asked in [true, false] {
             let terms: Vec<_> = config.terms().into_iter().filter(|(name, _)| asked || *name != "network").collect();
             for (name, term) in &terms {
@@ -276,7 +276,7 @@ pub(crate) mod tests {
         assert!(changed(|c| c.evidence.close = Some(look(-2.0))) < 0.0 && changed(|c| c.evidence.visible = 0.5) < 0.0);
         assert!(changed(|c| c.evidence.outside = 0.3) < 0.0 && changed(|c| c.resemblance = 0.45) < 0.0);
         assert!(changed(|c| c.network = Some(-0.9)) < 0.0);
-        // Networks propose look-alikes as well as the part.
+        // Networks also propose look-alikes of the part.
         assert_eq!(changed(|c| c.network = Some(0.9)), 0.0);
     }
 
@@ -315,7 +315,7 @@ pub(crate) mod tests {
         let config = ScoreConfig::DEFAULT;
         let objections = |clues: &Clues| judge(clues, None, &config).1.objections(&config);
         assert_eq!(objections(&hidden)[0], EvidenceKind::Visible);
-        // The strongest objection first; then the evidence that only supports the part less than it could.
+        // First the strongest objection, then the evidence that supports the part less than it could.
         let of_covered = objections(&covered);
         assert!(
             of_covered.contains(&EvidenceKind::Visible) && of_covered.contains(&EvidenceKind::Edges),

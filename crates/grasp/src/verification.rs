@@ -1,8 +1,8 @@
-//! Verification by the demonstration: it is laid over the image at a model's proposals and at the search's matches, and
+//! Verification: the demonstration is laid over the image at a model's proposals and at the search's matches, and
 //! refined.
 //!
 //! ```text
-//! picture ─ halved for each size that is looked for ─ SearchedImage ─┬─ search: the whole picture ──┬─ PlacedDemonstration
+//! picture ─ halved for each size that is searched ─── SearchedImage ─┬─ search: the whole picture ──┬─ PlacedDemonstration
 //! network ─ PoseCandidate ───────────────────────────────────────────┴─ verify: about the candidate ┘  {pose, Evidence}
 //! ```
 //! [`crate::verdict`] computes a score from the evidence.
@@ -23,7 +23,7 @@ use crate::prepared::{Prepared, WorkingSize};
 use crate::sizes::{SizeRange, scaling};
 use crate::taught::TaughtDemonstration;
 
-/// An image and the demonstrations that are searched in it, at every possible size.
+/// An image, and the demonstrations that are searched in it, at every possible size.
 pub(crate) struct SearchedImage<'a> {
     views: Vec<View<'a>>,
     sized: Vec<SizedDemonstration<'a>>,
@@ -38,17 +38,17 @@ pub(crate) struct Shot {
     pub(crate) below_camera: Point2<f64>,
 }
 
-/// Default focal length of a camera in widths of the picture, if nothing gives it: 49° across, as in a telephone.
-/// Chosen by hand.
+/// Assumed focal length of a camera, in widths of the picture: a field of view of 49°, as in a telephone. Chosen by
+/// hand.
 const FOCAL_WIDTHS: f64 = 1.1;
 
-/// Focal length of the camera that took a picture of this width and height, in pixels.
+/// Assumed focal length of the camera that took a picture of this width and height, in pixels.
 pub(crate) fn usual_focal_px(size: [u32; 2]) -> f64 {
     FOCAL_WIDTHS * f64::from(size[0].max(size[1]))
 }
 
 impl Shot {
-    /// Of a camera that looks vertically down.
+    /// The shot of a camera that points vertically down.
     #[cfg(any(feature = "teach", test))]
     pub(crate) fn level(image: &RgbImage) -> Self {
         let (width, height) = image.dimensions();
@@ -56,7 +56,7 @@ impl Shot {
     }
 }
 
-/// The image, halved several times, with its gradients, which every comparison reads.
+/// The image, halved several times, with its gradients, which all comparisons use.
 struct View<'a> {
     halvings: u32,
     below_camera: Point2<f64>,
@@ -84,14 +84,14 @@ struct SizedDemonstration<'a> {
 }
 
 impl<'a> SearchedImage<'a> {
-    /// Prepares every demonstration for the image's size. A demonstration that shows nothing to compare at some size is
-    /// not searched at that size.
+    /// Prepares every demonstration for the image's size. A demonstration is not searched at sizes at which it has no
+    /// shape to compare.
     #[cfg(feature = "teach")]
     pub(crate) fn new(image: &'a RgbImage, demonstrations: &'a [TaughtDemonstration]) -> Self {
         Self::of(image, &Shot::level(image), demonstrations)
     }
 
-    /// The same for an image that was not taken vertically from above.
+    /// Prepares every demonstration for an image that need not have been taken vertically from above.
     pub(crate) fn of(image: &'a RgbImage, shot: &Shot, demonstrations: &'a [TaughtDemonstration]) -> Self {
         let mut searched = Self { views: Vec::new(), sized: Vec::new() };
         let colors = Colors::of(image);
@@ -116,13 +116,13 @@ impl<'a> SearchedImage<'a> {
         searched
     }
 
-    /// A demonstration in the range of sizes nearest to one.
+    /// A demonstration in the range of sizes nearest to `scale`.
     fn sized_for(&self, demonstration_idx: usize, scale: f64) -> Option<&SizedDemonstration<'a>> {
         let of_it = self.sized.iter().filter(|sized| sized.demonstration_idx == demonstration_idx);
         of_it.min_by(|a, b| a.range.distance(scale).total_cmp(&b.range.distance(scale)))
     }
 
-    /// The index of the image halved this many times.
+    /// The index of the view that is halved this many times.
     fn view(&mut self, image: &'a RgbImage, shot: &Shot, halvings: u32, demonstration: &TaughtDemonstration) -> usize {
         if let Some(idx) = self.views.iter().position(|view| view.halvings == halvings) {
             return idx;
@@ -146,16 +146,16 @@ pub(crate) struct PlacedDemonstration<'a> {
     pub(crate) demonstration: &'a TaughtDemonstration,
     pub(crate) demonstration_idx: usize,
     pub(crate) image_from_cutout: PlanarSimilarity,
-    /// The same for the marks and their surroundings, which may be shifted relative to the outline.
+    /// The pose of the marks and their surroundings, which may be shifted relative to the outline.
     pub(crate) image_from_marks: PlanarSimilarity,
     /// Whether the image has colours.
     pub(crate) colors: Colors,
-    /// Edges and surface together, in `[0, 1]`.
+    /// Agreement of edges and surface together, in `[0, 1]`.
     pub(crate) agreement: f64,
     pub(crate) evidence: Evidence,
-    /// ln of its size over the nearest nominal size.
+    /// ln of the size over the nearest nominal size.
     pub(crate) log_size: f64,
-    /// Mean brightness there divided by that of the demonstration.
+    /// Mean brightness at the pose divided by that of the demonstration.
     pub(crate) light: f64,
 }
 
@@ -166,11 +166,12 @@ impl PlacedDemonstration<'_> {
     }
 }
 
-/// Distance from an end of the size range, in ln, within which a pose may have been stopped by it, and the gain of
-/// agreement beyond it that shows this. Chosen by hand.
+/// Distance from an end of the size range, in ln, within which the end may have stopped the refinement of a pose.
+/// Chosen by hand.
 const END_MARGIN_LOG: f64 = 0.02;
+/// Gain of agreement beyond the end that shows this. Chosen by hand.
 const MIN_GAIN_BEYOND_END: f64 = 0.05;
-/// Minimum agreement for searching the marks; poses below it are refused. Chosen by hand, for time.
+/// Minimum agreement for a search of the marks; poses below it are refused. Chosen by hand, for time.
 const MIN_MARKED: f64 = 0.3;
 
 impl<'a> SizedDemonstration<'a> {
@@ -184,7 +185,7 @@ impl<'a> SizedDemonstration<'a> {
         scaling(self.working.shrink()).compose(view_from_working).compose(&scaling(self.working.cutout_scale))
     }
 
-    /// Whether a match at an end of the size range agrees better beyond it: then it is another part.
+    /// Whether a match at an end of the size range agrees better beyond the range, and is therefore another part.
     fn is_of_other_size(&self, view: &View<'_>, view_from_working: &PlanarSimilarity, agreement: f64) -> bool {
         let scales = self.prepared.search.scales();
         let from_end =
@@ -205,8 +206,9 @@ impl<'a> SizedDemonstration<'a> {
         evidence: Evidence,
     ) -> PlacedDemonstration<'a> {
         let image_from_cutout = self.image_from_cutout(view_from_working);
-        // In the plane of the marks nothing is displaced, and nothing limits a shift along a rod: of 40 pictures by
-        // another camera three had errors of 7 to 8 mm with it, and 2 to 4 mm without (pendulum, rod end).
+        // In a plan view of the marks' plane the marks are not displaced, and nothing would limit a shift along a rod:
+        // in three of 40 pictures of another camera the errors were 7 to 8 mm with a shift, and 2 to 4 mm without
+        // (pendulum, rod end).
         let is_flat = self.demonstration.check().score.is_size_known || agreement < MIN_MARKED;
         let marks_shift = self.prepared.marks_shift.as_ref().filter(|_| !is_flat);
         let round_top = self.prepared.round_top.as_ref().filter(|_| !is_flat);
@@ -234,8 +236,8 @@ impl<'a> SizedDemonstration<'a> {
 
 impl SizedDemonstration<'_> {
     /// The pose of marks above or below the outline, and the agreement and evidence of the part without their
-    /// displacement; `None` if they are in its plane, or if the part would then agree less, because something else
-    /// attracted them.
+    /// displacement. `None` if the marks lie in the outline's plane, or if the part agrees less without the
+    /// displacement, because other edges attracted the marks.
     fn raised(
         &self,
         view: &View<'_>,
@@ -277,12 +279,12 @@ pub(crate) fn search<'a>(searched: &SearchedImage<'a>) -> Vec<PlacedDemonstratio
     found
 }
 
-/// Lays the demonstration over the image at the candidate, in both directions, and returns the better one; `None` if
-/// its size there is outside the search range.
+/// Lays the demonstration over the image at the candidate, in both directions, and returns the better pose; `None` if
+/// its size is outside the search range.
 ///
-/// Keypoints give position and turn well, but a short grasp line gives the scale badly, so that the box determines
-/// it: the start takes the scale at which the outline is as large as the detected box. A network that confuses the
-/// part's ends is wrong by half a turn; the demonstration distinguishes the ends.
+/// Keypoints give position and orientation well, but a short grasp line gives the scale badly. Therefore the initial
+/// scale makes the outline as large as the detected box. A network that confuses the part's ends is wrong by 180°; the
+/// demonstration distinguishes the ends.
 pub(crate) fn verify<'a>(candidate: &PoseCandidate, searched: &SearchedImage<'a>) -> Option<PlacedDemonstration<'a>> {
     let of_it = searched.sized.iter().filter(|sized| sized.demonstration_idx == candidate.demonstration_idx);
     let demonstration = of_it.clone().next()?.demonstration;
@@ -294,8 +296,8 @@ pub(crate) fn verify<'a>(candidate: &PoseCandidate, searched: &SearchedImage<'a>
     better_way_round(sized, &start, searched)
 }
 
-/// Refined from `start` and from half a turn further; returns the one of better agreement, refined by edges and
-/// surface. `None` if its size is outside the search range: that is another part.
+/// Refines the pose from `start` and from `start` rotated by 180°; returns the pose of better agreement, refined by
+/// edges and surface. `None` if its size is outside the search range, as for another part.
 fn better_way_round<'a>(
     sized: &SizedDemonstration<'a>,
     start: &PlanarSimilarity,
@@ -316,8 +318,8 @@ fn better_way_round<'a>(
     scales.contains(&refined.scale).then(|| sized.placed(view, &refined, agreement, comparison.evidence(&refined)))
 }
 
-/// The shortening of a placed demonstration, and its direction in the image; `None` if its size there is outside the
-/// search range.
+/// The shortening of a placed demonstration, and its direction in the image; `None` if the size is outside the search
+/// range.
 pub(crate) fn foreshortening(searched: &SearchedImage<'_>, placed: &PlacedDemonstration<'_>) -> Option<Foreshortening> {
     let sized = searched.sized_for(placed.demonstration_idx, placed.image_from_cutout.scale)?;
     let view = &searched.views[sized.view_idx];
@@ -365,7 +367,7 @@ pub(crate) fn differences(
     Some(differences)
 }
 
-/// `pose` turned and scaled about the centre of the outline in the image.
+/// `pose` rotated and scaled about the centre of the outline in the image.
 fn about_middle(
     demonstration: &TaughtDemonstration,
     pose: &PlanarSimilarity,

@@ -13,43 +13,43 @@ use crate::watch::Watch;
 /// Calls block until the requested action is done. After an error the arm is at rest, or the robot itself brings it to
 /// rest.
 pub trait Arm {
-    /// Its links, limits and hand.
+    /// Links, limits and hand of the arm.
     fn geometry(&self) -> &ArmGeometry;
 
     /// The present state of the arm.
     ///
     /// # Errors
-    /// [`RobotError::Lost`] if it does not answer.
+    /// [`RobotError::Lost`] if the arm does not answer.
     fn state(&mut self) -> Result<ArmState, RobotError>;
 
-    /// Follows a motion; `watch` sees every state on the way and decides when to stop.
+    /// Follows a motion; `watch` receives every state on the path and decides when to stop.
     ///
     /// # Errors
     /// [`RobotError::Stopped`] after a stop requested by `watch`, and errors reported by the arm.
     fn follow(&mut self, motion: &CheckedMotion, watch: &mut Watch) -> Result<MotionEnd, RobotError>;
 
-    /// Stands still for some seconds; `watch` sees the states.
+    /// Stands still for `duration_secs`; `watch` receives every state.
     ///
     /// # Errors
-    /// As [`Arm::follow`].
+    /// As for [`Arm::follow`].
     fn wait(&mut self, duration_secs: f64, watch: &mut Watch) -> Result<(), RobotError>;
 
     /// The present state of the hand.
     ///
     /// # Errors
-    /// [`RobotError::Lost`] if it does not answer.
+    /// [`RobotError::Lost`] if the hand does not answer.
     fn hand(&mut self) -> Result<HandState, RobotError>;
 
     /// Starts a motion of the hand, which runs in parallel with the arm's.
     ///
     /// # Errors
-    /// [`RobotError::Hand`] if it refuses.
+    /// [`RobotError::Hand`] if the hand refuses the command.
     fn start_hand(&mut self, command: HandCommand) -> Result<(), RobotError>;
 
     /// Waits until the hand has finished its command.
     ///
     /// # Errors
-    /// [`RobotError::Hand`] if it failed or does not end, and as for [`Arm::follow`].
+    /// [`RobotError::Hand`] if the command failed or does not end, and as for [`Arm::follow`].
     fn finish_hand(&mut self, watch: &mut Watch) -> Result<HandState, RobotError>;
 
     /// Sets the contact threshold at which the arm stops by itself.
@@ -73,16 +73,16 @@ pub trait Arm {
     /// Recovers from a reflex or another error, without moving the arm.
     ///
     /// # Errors
-    /// If the error persists.
+    /// The error, if it persists.
     fn recover(&mut self) -> Result<(), RobotError>;
 }
 
 /// An arm that accepts torques and can therefore be compliant.
 pub trait CompliantArm: Arm {
-    /// Moves straight down from the arm's position until it measures a contact, presses on it, and stops; `watch` sees
-    /// every state.
+    /// Moves straight down from the arm's position until it measures a contact, presses on it, and stops; `watch`
+    /// receives every state.
     ///
     /// # Errors
-    /// As [`Arm::follow`].
+    /// As for [`Arm::follow`].
     fn touch_down(&mut self, touch_down: &TouchDown, watch: &mut Watch) -> Result<Touched, RobotError>;
 }

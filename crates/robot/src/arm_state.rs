@@ -8,17 +8,17 @@ pub const PERIOD_SECS: f64 = 1e-3;
 /// Mode of the arm's controller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ArmMode {
-    /// It holds its position and accepts commands.
+    /// The arm holds its position and accepts commands.
     Idle,
-    /// It follows a motion.
+    /// The arm follows a motion.
     Moving,
-    /// A person moves it by hand.
+    /// A person moves the arm by hand.
     Guiding,
-    /// It stopped by itself, after a contact or a command that it could not follow, and must be recovered.
+    /// The arm stopped by itself, after a contact or a command that it could not follow, and must be recovered.
     Reflex,
     /// The stop button is pressed, or the brakes are closed.
     UserStopped,
-    /// It recovers from an error.
+    /// The arm recovers from an error.
     Recovering,
 }
 
@@ -58,7 +58,7 @@ pub struct ArmState {
 pub struct HandState {
     /// Distance between the fingers, m.
     pub opening_m: f64,
-    /// Whether the hand presses on something with the commanded force, at a width near the commanded one.
+    /// Whether the hand presses on an object with the commanded force, at a width near the commanded one.
     pub is_grasping: bool,
     /// Force of each finger, N, if the hand measures it.
     pub force_n: Option<f64>,
@@ -85,9 +85,9 @@ pub enum HandCommand {
     },
 }
 
-/// Tolerances below (first) and above (second) the commanded width of a part, m. A width read from a picture is right
-/// to a few millimetres, and a round part may be gripped beside its thickest place; closing on nothing must be
-/// detected.
+/// Tolerances below (first) and above (second) the commanded width of a part, m. The tolerances are wide because a
+/// width measured in a picture is accurate to a few millimetres only, and a round part may be gripped beside its
+/// thickest place, but narrow enough to detect a hand that closed without a part.
 pub const GRASP_TOLERANCE_M: [f64; 2] = [0.03, 0.03];
 /// Fingers closer together than this hold nothing, m.
 pub const MIN_HELD_WIDTH_M: f64 = 0.001;
@@ -120,6 +120,6 @@ pub enum ContactSensitivity {
 pub enum MotionEnd {
     /// The arm is at the motion's end.
     Arrived,
-    /// An obstacle stopped the arm; the contact, in words.
+    /// An obstacle stopped the arm; the text describes the contact.
     Blocked(String),
 }

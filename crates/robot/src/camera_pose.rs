@@ -21,7 +21,8 @@ impl CameraPose {
         }
     }
 
-    /// The tcp's pose that puts the camera at a pose; for a camera beside the robot, that pose itself.
+    /// The pose of the tcp at which the camera has the pose `base_from_camera`; for a camera beside the robot,
+    /// `base_from_camera` itself.
     pub(crate) fn base_from_tcp(&self, arm: &ArmGeometry, base_from_camera: &Isometry3<f64>) -> Isometry3<f64> {
         let tcp_from_camera = self.tcp_from_camera(arm);
         tcp_from_camera.map_or(*base_from_camera, |tcp_from_camera| base_from_camera * tcp_from_camera.inverse())

@@ -11,7 +11,7 @@ use crate::watch::StopReason;
 /// Errors of this crate.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "the messages say what the fields are")]
+#[allow(missing_docs, reason = "the messages explain the fields")]
 pub enum RobotError {
     /// A motion violates a limit; it was not started.
     #[error("the motion was not started: {0}")]
@@ -19,7 +19,7 @@ pub enum RobotError {
     /// No motion can be planned.
     #[error(transparent)]
     Planning(#[from] KinematicsError),
-    /// There is no path around the obstacles of the cell.
+    /// No path leads around the obstacles of the cell.
     #[error("no path through the cell: {0}")]
     NoWay(#[from] PlanError),
     /// The arm was stopped on its path.
@@ -51,7 +51,7 @@ pub enum RobotError {
     /// The hand failed.
     #[error("the hand failed: {0}")]
     Hand(String),
-    /// Perception itself failed, which differs from finding nothing.
+    /// Perception itself failed; a picture without the part is not such an error.
     #[error("perception failed: {0}")]
     Perception(String),
     /// A setting outside its range, or one that the arm does not support.
@@ -69,7 +69,7 @@ pub enum RobotError {
 }
 
 impl RobotError {
-    /// Whether the arm was, or may have been, in motion; after such an error nothing moves until a person allows it.
+    /// Whether the arm was, or may have been, in motion. After such an error nothing moves until a person allows it.
     pub fn latches(&self) -> bool {
         !matches!(
             self,

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! τ = Jᵀ (-K e - ∫ k_i K e dt - D (J q̇ - v_d))  +  (I - Jᵀ Jᵀ⁺) (k_n (q_n - q) - 2 √k_n q̇)  +  coriolis
-//!     └ spring, its integral and damper of the tcp   └ of the elbow, without moving the tcp
+//!     └ spring, its integral and damper of the tcp   └ spring of the elbow, without moving the tcp
 //! ```
 //! J is the tcp's Jacobian in the base frame, e the deviation of the tcp from its desired pose (m, and half of a
 //! rotation vector, rad), v_d the desired twist, D = 2 √(K m) for a mass m of the tcp. Gravity is not included: the
@@ -27,12 +27,12 @@ const DAMPING: f64 = 1e-2;
 /// Stiffness of the tcp.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Impedance {
-    /// Along x, y and z of the base, N/m, and about them, N·m/rad.
+    /// Stiffness along x, y and z of the base, N/m, and about them, N·m/rad.
     pub stiffness: Vector6<f64>,
     /// Mass of the tcp assumed by the damper, kg along and kg·m² about each direction: libfranka's example has 1 for
     /// all.
     pub mass: Vector6<f64>,
-    /// Growth rate of the spring's force in each direction, as a multiple of itself per second, 1/s.
+    /// Growth rate of the integral force in each direction, as a multiple of the spring's force per second, 1/s.
     pub integral_per_sec: Vector6<f64>,
     /// Stiffness of the elbow about its configuration at the start, N·m/rad.
     pub null_stiffness: f64,
@@ -58,7 +58,7 @@ impl Impedance {
         null_stiffness: 10.0,
         max_torque_step_nm: 0.9,
     };
-    /// Soft along z, stiff sideways and in rotation: for pressing on something.
+    /// Soft along z, stiff sideways and in rotation: for pressing on a surface.
     pub const SOFT_DOWN: Self = Self {
         stiffness: Vector6::new(1000.0, 1000.0, 150.0, 50.0, 50.0, 50.0),
         mass: Vector6::new(5.0, 5.0, 1.0, 1.0, 1.0, 1.0),
@@ -73,7 +73,7 @@ impl Impedance {
 pub struct TcpReference {
     /// The pose.
     pub base_from_tcp: Isometry3<f64>,
-    /// Its velocity, m/s and rad/s in the base frame.
+    /// The velocity of the tcp, m/s and rad/s in the base frame.
     pub twist: Vector6<f64>,
 }
 
@@ -91,7 +91,8 @@ pub struct ImpedanceControl {
 const MAX_INTEGRAL: Vector6<f64> = Vector6::new(15.0, 15.0, 15.0, 5.0, 5.0, 5.0);
 
 impl ImpedanceControl {
-    /// Starts at joint positions (rad), which are the elbow's, after this torque (N·m, without gravity).
+    /// Starts at joint positions `q` (rad), to which the elbow's spring pulls, after a last `torque` (N·m, without
+    /// gravity).
     pub fn new(impedance: Impedance, q: JointVector, torque: JointVector) -> Self {
         Self { impedance, q_null: q, torque, integral: Vector6::zeros() }
     }
@@ -101,8 +102,8 @@ impl ImpedanceControl {
         self.impedance = impedance;
     }
 
-    /// The torques of the next cycle (N·m) for measured joint positions (rad) and velocities (rad/s); `coriolis` is
-    /// zero if the robot does not report it; at contact speeds it is less than friction.
+    /// The torques of the next cycle (N·m) for measured joint positions (rad) and velocities (rad/s). `coriolis` may be
+    /// zero if the robot does not report it: at contact speeds it is smaller than friction.
     pub fn torque(
         &mut self,
         arm: &ArmGeometry,
@@ -141,7 +142,7 @@ impl ImpedanceControl {
 pub(crate) fn pose_error(base_from_tcp: &Isometry3<f64>, wanted: &Isometry3<f64>) -> Vector6<f64> {
     let translation = base_from_tcp.translation.vector - wanted.translation.vector;
     let tcp_from_wanted = base_from_tcp.rotation.inverse() * wanted.rotation;
-    // Of the two quaternions of a rotation the one of the shorter way.
+    // Of the two quaternions of a rotation, this sign selects the one with the smaller angle.
     let sign = if tcp_from_wanted.w < 0.0 { -1.0 } else { 1.0 };
     let rotation = base_from_tcp.rotation * (tcp_from_wanted.imag() * -sign);
     Vector6::new(translation.x, translation.y, translation.z, rotation.x, rotation.y, rotation.z)
@@ -178,13 +179,13 @@ mod tests {
         let torque = settled(Impedance::SOFT, q, &q, wanted);
         let expected = jacobian.transpose() * Vector6::new(0.0, 0.0, 1.5, 0.0, 0.0, 0.0);
         assert!((torque - expected).amax() < 1e-9, "{torque} {expected}");
-        // Other directions have other stiffnesses: 10 mm to the side at 1000 N/m.
+        // The stiffness depends on the direction: 10 mm sideways at 1000 N/m.
         let mut wanted = here;
         wanted.translation.y += 0.010;
         let torque = settled(Impedance::SOFT_DOWN, q, &q, wanted);
         let expected = jacobian.transpose() * Vector6::new(0.0, 10.0, 0.0, 0.0, 0.0, 0.0);
         assert!((torque - expected).amax() < 1e-9, "{torque} {expected}");
-        // A turn of 0.1 rad: the sine of half of it, at 10 N·m/rad.
+        // A rotation by 0.1 rad: the sine of half the angle, at 10 N·m/rad.
         let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 0.1);
         let wanted = Isometry3::from_parts(here.translation, turn * here.rotation);
         let torque = settled(Impedance::SOFT, q, &q, wanted);
@@ -202,7 +203,7 @@ mod tests {
         for _ in 0..500 {
             control.torque(&panda, &q, &zero, &still(wanted), &zero);
         }
-        // 1 mm at 1000 N/m is 1 N; at 5/s the integral has 2.5 N more after half a second.
+        // 1 mm at 1000 N/m is 1 N; at 5/s the integral adds 2.5 N in half a second.
         let expected = jacobian.transpose() * Vector6::new(0.0, 0.0, -3.5, 0.0, 0.0, 0.0);
         assert!((control.last_torque() - expected).amax() < 1e-6, "{}", control.last_torque());
         for _ in 0..8000 {
@@ -243,7 +244,7 @@ mod tests {
             assert!((torque - last).amax() <= Impedance::SOFT.max_torque_step_nm + 1e-12);
             last = torque;
         }
-        // It removes power from the motion.
+        // The damping torques remove power from the motion.
         assert!(last.dot(&dq) < 0.0, "{last}");
         // Known Coriolis torques are added.
         let mut coriolis = zero;

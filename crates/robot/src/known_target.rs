@@ -11,7 +11,7 @@ use crate::perception::PartFinder;
 use crate::planned_arm::PlannedArm;
 use crate::sequence::GraspConfig;
 
-/// Assumed accuracy of positions and sizes, m and as a share.
+/// Assumed accuracy of positions, in m, and of sizes, as a fraction.
 const EXACT: f64 = 1e-4;
 
 /// Finds the same target, or none, for any pose of the arm.
@@ -36,7 +36,7 @@ impl PartFinder<PlannedArm> for KnownTarget {
         Ok(self.target)
     }
 
-    /// A part that was put down lies at its intended place.
+    /// Returns the intended place: a part that was put down is assumed to lie there.
     fn find_nearest(&mut self, _arm: &mut PlannedArm, base_from_tcp: &Isometry3<f64>) -> Result<Option<GraspTarget>> {
         Ok(self.target.map(|target| GraspTarget { base_from_tcp: *base_from_tcp, ..target }))
     }

@@ -5,13 +5,13 @@
 //! PartFinder ─► GraspTarget ─► grasp: plan ─► Robot::follow ─► SafetyLimits::check ─► CheckedMotion ─► Arm::follow
 //!                                                                                     Watch ◄─ ArmState ─┘
 //! ```
-//! [`Arm`] is implemented by [`FrankaArm`] here and by the simulated workcell in `simulation`. A motion reaches an arm only as a
-//! [`CheckedMotion`], and after an error nothing moves until [`Robot::recover`].
+//! [`Arm`] is implemented by [`FrankaArm`] and by the simulated workcell of the crate `simulation`. A motion reaches an
+//! arm only as a [`CheckedMotion`], and after an error nothing moves until [`Robot::recover`].
 //!
 //! [`grasp_and_place`] continues to a [`PlaceGoal`]; [`Robot::plan_around`] finds paths around the obstacles of the
 //! cell.
 //!
-//! This crate has no cameras or detection (a [`PartFinder`] is handed in), no files and no terminal.
+//! This crate has no cameras and no detection (the caller passes a [`PartFinder`]), no files and no terminal.
 //!
 //! ```
 //! use sdg_kinematics::{JointLimits, Trajectory, ready_pose};

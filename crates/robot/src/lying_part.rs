@@ -7,54 +7,55 @@ use sdg_kinematics::collision::{Obstacle, Shape};
 use crate::part_shape::PartShape;
 use crate::room::{MIN_FINGER_ROOM_M, gap_m};
 
-/// Distance by which the finger tips' capsules extend beyond them along the fingers' motion, m.
+/// Distance by which the capsules of the finger tips extend beyond the finger tips along their motion, m.
 const CAPSULES_STAND_OUT_M: f64 = 0.0055;
-/// On straight paths, which lead fingers between parts, these capsules are thinner by that distance and by the
-/// planner's margin beyond the room that fingers must have in a tray (3 mm, and 1 mm), m.
+/// Distance by which parts are made thinner on straight paths, which lead fingers between parts, m: the excess of the
+/// capsules, plus the difference between the planner's margin (3 mm) and the room that fingers must have in a tray
+/// (1 mm).
 const THINNER_M: f64 = CAPSULES_STAND_OUT_M + 0.003 - MIN_FINGER_ROOM_M;
 /// Minimum thickness assumed for a part, m.
 const MIN_HALF_M: f64 = 0.0005;
-/// Grasps closer together than this belong to the same part, m.
+/// Largest distance between two grasps of the same part, m.
 const SAME_WITHIN_M: f64 = 0.015;
 
 /// A part lying in the cell.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LyingPart {
-    /// Its grasp as marked, base frame: x along the marked line, z down.
+    /// The part's grasp as marked, base frame: x along the marked line, z down.
     pub base_from_part: Isometry3<f64>,
-    /// Its known shape.
+    /// The known shape of the part.
     pub shape: PartShape,
 }
 
 impl LyingPart {
-    /// Whether it is the part of this grasp.
+    /// Whether a grasp at this pose belongs to the part.
     pub(crate) fn is_at(&self, base_from_part: &Isometry3<f64>) -> bool {
         (self.base_from_part.translation.vector - base_from_part.translation.vector).xy().norm() < SAME_WITHIN_M
     }
 
-    /// Its outline on the table, base frame, m.
+    /// Outline of the part on the table, base frame, m.
     pub(crate) fn outline_in_base(&self) -> Polygon {
         self.shape.outline_in_base(&self.base_from_part)
     }
 
-    /// Whether the two overlap as seen from above.
+    /// Whether the two parts overlap as seen from above.
     pub(crate) fn overlaps(&self, other: &Self) -> bool {
         gap_m(&self.outline_in_base(), &other.outline_in_base()) < 0.0
     }
 
-    /// A solid that contains it, from the surface under it to its top.
+    /// A solid that contains the part, from the surface under it to its top.
     pub(crate) fn obstacle(&self, number: usize) -> Obstacle {
         self.solid(number, 0.0)
     }
 
-    /// The same for fingers that move straight down or up beside it.
+    /// The solid, made thinner, for fingers that move straight down or up beside the part.
     pub(crate) fn obstacle_beside_fingers(&self, number: usize) -> Obstacle {
         self.solid(number, THINNER_M)
     }
 
     fn solid(&self, number: usize, thinner_m: f64) -> Obstacle {
         let half_height_m = 0.5 * self.shape.top_m();
-        // z of the grasp's frame points down: the centre of the height is this far below the grasp.
+        // z of the grasp's frame points down: the solid's centre is this far below the grasp.
         let middle_z_m = self.shape.grasp_height_m() - half_height_m;
         let (center, shape) = match self.shape.disc() {
             Some((center, radius_m)) => {
@@ -69,44 +70,44 @@ impl LyingPart {
         };
         let p = self.base_from_part.translation;
         Obstacle {
-            name: format!("part {} that lies at ({:.2}, {:.2}) m", number + 1, p.x, p.y),
+            name: format!("part {} at ({:.2}, {:.2}) m", number + 1, p.x, p.y),
             shape,
             base_from_obstacle: self.base_from_part * Translation3::new(center.x, center.y, middle_z_m),
         }
     }
 }
 
-/// Lying parts, each once: of several at one place the latest report.
+/// Lying parts, without duplicates: of several at one place only the latest is kept.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct LyingParts(Vec<LyingPart>);
 
 impl LyingParts {
-    /// These, each once.
+    /// Collects parts without duplicates.
     pub(crate) fn new(told: &[LyingPart]) -> Self {
         let mut parts = Self::default();
         told.iter().for_each(|part| parts.put(part.clone()));
         parts
     }
 
-    /// A part may lie there, if none is known there yet.
+    /// Adds a part that may lie at its place, unless one is known there already.
     pub(crate) fn suppose(&mut self, part: LyingPart) {
         if !self.0.iter().any(|other| other.is_at(&part.base_from_part)) {
             self.0.push(part);
         }
     }
 
-    /// A part lies there.
+    /// Adds a part, which replaces the one known at its place.
     pub(crate) fn put(&mut self, part: LyingPart) {
         self.take(&part.base_from_part);
         self.0.push(part);
     }
 
-    /// Nothing lies there any more, or contact with it is intended.
+    /// Removes the part at a place: it was taken, or contact with it is intended.
     pub(crate) fn take(&mut self, base_from_part: &Isometry3<f64>) {
         self.0.retain(|part| !part.is_at(base_from_part));
     }
 
-    /// All of them.
+    /// All known parts.
     pub(crate) fn all(&self) -> &[LyingPart] {
         &self.0
     }
@@ -130,7 +131,7 @@ mod tests {
     #[test]
     fn a_solid_holds_the_part_from_what_it_lies_on_to_its_top() {
         let obstacle = LyingPart { base_from_part: at(0.5, 0.1), shape: bar() }.obstacle(0);
-        assert_eq!(obstacle.name, "part 1 that lies at (0.50, 0.10) m");
+        assert_eq!(obstacle.name, "part 1 at (0.50, 0.10) m");
         let distance_m = |x: f64, y: f64, z: f64| {
             let p = obstacle.base_from_obstacle.inverse() * Point3::new(x, y, z);
             obstacle.shape.signed_distance_m(&p)

@@ -1,28 +1,28 @@
-//! Speed of the sequence, as shares of an arm's limits.
+//! Speed of the sequence, as fractions of an arm's limits.
 
 use sdg_kinematics::{ArmGeometry, CartesianLimits, JointLimits};
 
 use crate::error::{Result, RobotError};
 
-/// Shares of the arm's velocity, acceleration and jerk limits.
+/// Fractions of the arm's velocity, acceleration and jerk limits.
 type Shares = [f64; 3];
 
-/// The largest share of the joints' velocity limits, which is that of rehearsals: higher speeds were never tried.
+/// Largest fraction of the joints' velocity limits: the one of rehearsals. Higher speeds were never tried.
 pub const MAX_SPEED: f64 = 0.6;
-/// The default speed of a real arm.
+/// Default speed of a real arm, as a fraction of the joints' velocity limits.
 pub const DEFAULT_SPEED: f64 = 0.1;
 
 /// The speed of each kind of motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pace {
-    /// Free motions, as shares of the joints' limits.
+    /// Free motions, as fractions of the joints' limits.
     free: Shares,
-    /// Free motions with the part, as shares of the joints' limits: slow acceleration keeps the part from sliding
+    /// Free motions with the part, as fractions of the joints' limits: slow acceleration keeps the part from sliding
     /// between the fingers.
     carry: Shares,
-    /// The final descent, as shares of the tcp's limits.
+    /// The final descent, as fractions of the tcp's limits.
     approach: Shares,
-    /// The ascent with the part, as shares of the tcp's limits.
+    /// The ascent with the part, as fractions of the tcp's limits.
     lift: Shares,
 }
 
@@ -35,15 +35,15 @@ impl Pace {
         lift: [0.25, 0.10, 0.05],
     };
 
-    /// Free motions at a share of the joints' velocity limits; all other motions are slower in proportion.
+    /// Free motions at a fraction of the joints' velocity limits; all other motions scale in proportion.
     ///
     /// # Errors
-    /// A share that is not above 0 and at most [`MAX_SPEED`].
+    /// [`RobotError::Configuration`] for a fraction that is not above 0 and at most [`MAX_SPEED`].
     pub fn at_speed(speed: f64) -> Result<Self> {
         if !(speed > 0.0 && speed <= MAX_SPEED) {
             return Err(RobotError::Configuration {
                 what: "speed".into(),
-                expected: format!("a share of the arm's velocity limits above 0 and at most {MAX_SPEED}"),
+                expected: format!("a fraction of the arm's velocity limits above 0 and at most {MAX_SPEED}"),
                 found: speed.to_string(),
             });
         }
@@ -89,7 +89,7 @@ mod tests {
     fn a_tenth_is_a_tenth_of_frankas_velocity() {
         let pace = Pace::at_speed(DEFAULT_SPEED).unwrap();
         assert!((pace.free_limits(&ArmGeometry::panda()).velocity_max[0] - 0.2175).abs() < 1e-12);
-        // 0.18 of 1.7 m/s at 60 %: a sixth of that.
+        // The approach has 0.18 of 1.7 m/s at speed 0.6; at 0.1 it has a sixth of that.
         assert!((pace.approach_limits(&ArmGeometry::panda()).velocity_m_s - 0.051).abs() < 1e-12);
         assert_eq!(Pace::at_speed(MAX_SPEED).unwrap(), Pace::REHEARSED);
         for bad in [0.0, -0.1, 0.61, f64::NAN] {

@@ -8,16 +8,15 @@ use crate::error::{Result, RobotError};
 
 /// Largest extent of an outline from its grasp, m.
 const MAX_RADIUS_M: f64 = 1.0;
-/// Minimum share of the surrounding circle that a disc's outline fills: a square fills 0.64 of its circle.
+/// Minimum fraction of the surrounding circle that the outline of a disc fills: a square fills 0.64 of its circle.
 const DISC_SHARE: f64 = 0.9;
 
 /// A part as seen from above, in the frame of its grasp, and its height.
 ///
-/// The grasp's frame is that of `base_from_tcp` when the part is held as marked: x along the marked line, y across it,
-/// z down.
+/// The grasp's frame is the tcp's frame while the part is held as marked: x along the marked line, y across it, z down.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PartShape {
-    /// Convex, m.
+    /// The convex outline, m.
     outline: Polygon,
     jaw_width_m: f64,
     top_m: f64,
@@ -25,8 +24,8 @@ pub struct PartShape {
 }
 
 impl PartShape {
-    /// A part with these points of its outline (m, in the grasp's frame; their convex hull is used), this width between
-    /// the fingers (m), and these heights of its top and its grasp over the surface under it, m.
+    /// A part from points of its outline in the grasp's frame, whose convex hull is used, the width between the
+    /// fingers, and the heights of top and grasp above the surface under the part; all in m.
     ///
     /// # Errors
     /// [`RobotError::Configuration`] for numbers that are not finite, for an outline without an area, and for one that
@@ -63,8 +62,8 @@ impl PartShape {
         Ok(Self { outline: Polygon { vertices: outline }, jaw_width_m, top_m, grasp_height_m })
     }
 
-    /// The shape that is known from a grasp alone: the width (m) between the fingers. The part is assumed to be as long
-    /// as it is wide there, and to extend as far above the tcp as below.
+    /// The shape that is known from a grasp alone, with the width (m) between the fingers. The part is assumed to be as
+    /// long as the fingers are wide, and to extend as far above the tcp as below.
     ///
     /// # Errors
     /// As for [`PartShape::new`].
@@ -74,12 +73,12 @@ impl PartShape {
         Self::new(corners, jaw_width_m, 2.0 * grasp_height_m, grasp_height_m)
     }
 
-    /// The outline's corners, m, the grasp's frame.
+    /// Corners of the outline in the grasp's frame, m.
     pub fn outline(&self) -> &[Point2<f64>] {
         &self.outline.vertices
     }
 
-    /// Centre and radius (m) of the circle around an outline that fills nearly all of it; `None` for others.
+    /// Centre and radius (m) of the circle around the outline, if the outline fills nearly all of it; otherwise `None`.
     pub(crate) fn disc(&self) -> Option<(Point2<f64>, f64)> {
         let center = self.outline.bounds().center();
         let radius_m = self.outline().iter().map(|p| (p - center).norm()).fold(0.0, f64::max);
@@ -97,17 +96,17 @@ impl PartShape {
         self.jaw_width_m
     }
 
-    /// Height of its top over the surface under it, m.
+    /// Height of the part's top above the surface under it, m.
     pub fn top_m(&self) -> f64 {
         self.top_m
     }
 
-    /// Height of its grasp over the surface under it, m.
+    /// Height of the grasp above the surface under the part, m.
     pub fn grasp_height_m(&self) -> f64 {
         self.grasp_height_m
     }
 
-    /// The outline on the table of a part with its grasp at a pose, m, base frame.
+    /// Outline on the table of a part whose grasp is at a pose, base frame, m.
     pub(crate) fn outline_in_base(&self, base_from_part: &Isometry3<f64>) -> Polygon {
         let in_base = |p: &Point2<f64>| (base_from_part * Point3::new(p.x, p.y, 0.0)).xy();
         Polygon { vertices: self.outline().iter().map(in_base).collect() }

@@ -12,13 +12,13 @@ use crate::height::{MeasuredHeight, Sighting};
 
 /// Finds the grasp of the taught part from the arm's present pose.
 pub trait PartFinder<A: Arm> {
-    /// Takes a picture and returns the best grasp in it, with any score; `None` if nothing is seen.
+    /// Takes a picture and returns its best grasp, at any score; `None` if there is no detection.
     ///
     /// # Errors
-    /// If no picture can be taken or perception itself fails; the sequence is aborted with this error.
+    /// A picture that cannot be taken, and a failure of perception; the sequence is aborted with this error.
     fn find(&mut self, arm: &mut A) -> Result<Option<GraspTarget>>;
 
-    /// As [`PartFinder::find`] if several parts are seen: the one nearest to a grasp (`base_from_tcp`).
+    /// As [`PartFinder::find`], but of several detections it returns the nearest one to the grasp `base_from_tcp`.
     ///
     /// # Errors
     /// As for [`PartFinder::find`].
@@ -26,8 +26,8 @@ pub trait PartFinder<A: Arm> {
         self.find(arm)
     }
 
-    /// Takes a picture and returns the parts in it that may be the one at a grasp, at any height: for an unknown
-    /// height. Empty if there are none, and for perception that measures no heights.
+    /// Takes a picture for measuring a height and returns the detections that may be the part of the grasp `expected`,
+    /// at any height. Empty if there are none, and for perception that measures no heights.
     ///
     /// # Errors
     /// As for [`PartFinder::find`].
@@ -35,8 +35,8 @@ pub trait PartFinder<A: Arm> {
         Ok(Vec::new())
     }
 
-    /// z of the surface beside a part shown by two sightings of the last calls of [`PartFinder::sight`], searched near
-    /// its expected height; `None` if nothing of it is seen.
+    /// Measures z of the surface beside a part from two sightings of the last calls of [`PartFinder::sight`], near its
+    /// expected height; `None` if the pictures do not show the surface well enough.
     ///
     /// # Errors
     /// As for [`PartFinder::find`].
@@ -44,7 +44,8 @@ pub trait PartFinder<A: Arm> {
         Ok(None)
     }
 
-    /// The other sure detections in the picture of the last call: parts of the same kind beside the one that was found.
+    /// The other detections above the threshold in the picture of the last call: parts of the same kind beside the one
+    /// that was found.
     fn others(&self) -> Vec<GraspTarget> {
         Vec::new()
     }
@@ -60,21 +61,21 @@ pub trait PartFinder<A: Arm> {
 pub enum GraspStep {
     /// Perception finds the part.
     Detect,
-    /// The arm moves over the part and turns to it.
+    /// The arm moves above the part and rotates the hand to match it.
     Hover,
-    /// The hand comes down to the part.
+    /// The hand descends to the part.
     Approach,
-    /// The fingers close on it.
+    /// The fingers close on the part.
     Close,
-    /// The arm lifts it.
+    /// The arm lifts the part.
     Lift,
     /// The part stays between the fingers.
     Hold,
-    /// The arm carries it over its place.
+    /// The arm carries the part to above its place.
     Carry,
-    /// The hand comes down with it until it measures contact with the place.
+    /// The hand descends with the part until it measures contact with the place.
     PutDown,
-    /// The fingers open and the hand goes up.
+    /// The fingers open and the hand moves up.
     Release,
     /// Perception measures where the part lies.
     Check,
@@ -121,7 +122,7 @@ impl fmt::Display for GraspStep {
     }
 }
 
-/// Observes the steps, and may know more than the arm does: a simulation knows the part's true pose.
+/// Observes the steps. An observer may know more than the arm: a simulation knows the part's true pose.
 pub trait StepObserver<A: Arm> {
     /// Called before a step.
     ///

@@ -1,4 +1,4 @@
-//! Places for putting parts down: a pose, the cells of a tray, a bin.
+//! Places for putting parts down: a single pose, the cells of a tray, a bin.
 
 use nalgebra::{Isometry3, Point2, Translation3, UnitQuaternion, Vector3};
 
@@ -7,13 +7,13 @@ use crate::error::{Result, RobotError};
 /// A place of a workcell, for one part or several.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Place {
-    /// Its name.
+    /// The name in the workcell file.
     pub name: String,
     /// Centre of a pose or a bin, or of a tray's first cell: x and y in the base frame, m.
     pub at_m: [f64; 2],
     /// Direction of the part's marked line, and of a tray's columns: about the vertical from the base's x, rad.
     pub yaw_rad: f64,
-    /// Surface under the parts: its z in the base frame, m.
+    /// z of the surface under the parts, base frame, m.
     pub surface_m: f64,
     /// The number and arrangement of its parts.
     pub kind: PlaceKind,
@@ -24,16 +24,16 @@ pub struct Place {
 pub enum PlaceKind {
     /// One part in a pose.
     Pose,
-    /// Cells in a grid, counted along x first.
+    /// Cells in a grid, numbered along x first.
     Tray {
-        /// Cells along its x and its y.
+        /// Number of cells along the tray's x and y.
         cells: [u32; 2],
-        /// Pitch of the cells, m.
+        /// Pitch of the cells along the tray's x and y, m.
         pitch_m: [f64; 2],
     },
     /// Any number of parts, in any pose.
     Bin {
-        /// Length of its inside along x and y, m.
+        /// Inner size along the bin's x and y, m.
         size_m: [f64; 2],
     },
 }
@@ -41,48 +41,48 @@ pub enum PlaceKind {
 /// The goal for one part.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlaceGoal {
-    /// The place, and the cell of a tray, in words.
+    /// Name of the place, with the cell of a tray, for messages.
     pub name: String,
     /// x and y of the part's grasp in the base frame, m.
     pub at_m: [f64; 2],
-    /// Direction of its marked line about the vertical from the base's x, rad.
+    /// Direction of the part's marked line about the vertical from the base's x, rad.
     pub yaw_rad: f64,
-    /// z of the surface under it in the base frame, m.
+    /// z of the surface under the part, base frame, m.
     pub surface_m: f64,
-    /// Inside of a bin along the goal's x and y, m: the part may lie there in any pose. `None` for a pose that must be
-    /// met.
+    /// Inner size of a bin along the goal's x and y, m: the part may lie there in any pose. `None` if the pose of the
+    /// goal is required.
     pub bin_m: Option<[f64; 2]>,
     /// The neighbouring cells of a tray.
     pub tray: Option<TrayCell>,
 }
 
-/// A cell and its neighbours.
+/// The neighbourhood of a cell.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrayCell {
     /// Pitch along the tray's x and y, m.
     pub pitch_m: [f64; 2],
-    /// The neighbouring cells, up to eight: steps along the tray's x and y.
+    /// The neighbouring cells, up to eight, as steps along the tray's x and y.
     pub neighbours: Vec<[i32; 2]>,
 }
 
 /// Deviation of a part from its goal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlaceOffset {
-    /// Along the marked line and across it, m.
+    /// Offset along the marked line and across it, m.
     pub beside_m: [f64; 2],
-    /// Turn, up to the part's symmetry, rad.
+    /// Angle between part and goal, up to the part's symmetry, rad.
     pub angle_rad: f64,
 }
 
 impl PlaceOffset {
-    /// Distance over the table, m.
+    /// Horizontal distance, m.
     pub fn distance_m(&self) -> f64 {
         self.beside_m[0].hypot(self.beside_m[1])
     }
 }
 
 impl Place {
-    /// Number of its cells.
+    /// Number of cells; 1 for a pose and a bin.
     pub fn num_cells(&self) -> u32 {
         match self.kind {
             PlaceKind::Tray { cells: [columns, rows], .. } => columns * rows,
@@ -90,7 +90,7 @@ impl Place {
         }
     }
 
-    /// The goal of a part; cells count from 1.
+    /// The goal of a part; cells are numbered from 1.
     ///
     /// # Errors
     /// [`RobotError::Configuration`] for a cell that does not exist.
@@ -119,7 +119,7 @@ impl Place {
         })
     }
 
-    /// The corners of its area on the table, counter-clockwise, base frame, m: for a pose only its point.
+    /// The corners of the place's area on the table, counter-clockwise, base frame, m; for a pose only its point.
     pub fn corners(&self) -> Vec<Point2<f64>> {
         let [low, high] = match self.kind {
             PlaceKind::Pose => return vec![self.at([0.0; 2])],
@@ -132,9 +132,9 @@ impl Place {
         [[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]].map(|p| self.at(p)).to_vec()
     }
 
-    /// Whether a part there belongs to this place.
+    /// Whether a part at x and y of the base frame (m) belongs to this place.
     pub fn covers(&self, at_m: [f64; 2]) -> bool {
-        /// Around the point of a pose.
+        /// Radius around the point of a pose.
         const POSE_RADIUS_M: f64 = 0.03;
         let apart = Point2::from(at_m) - Point2::from(self.at_m);
         let (sin, cos) = self.yaw_rad.sin_cos();
@@ -159,15 +159,15 @@ impl Place {
 }
 
 impl PlaceGoal {
-    /// The pose of the part's grasp there, `base_from_tcp` of a hand that holds it as marked: x along the marked line,
-    /// z down.
+    /// The pose of the part's grasp at the goal, at z `height_m` and rotated by `turn_rad`: `base_from_tcp` of a hand
+    /// that holds the part as marked, with x along the marked line and z down.
     pub fn base_from_part(&self, height_m: f64, turn_rad: f64) -> Isometry3<f64> {
         let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
         let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), self.yaw_rad + turn_rad);
         Isometry3::from_parts(Translation3::new(self.at_m[0], self.at_m[1], height_m), turn * down)
     }
 
-    /// As [`PlaceGoal::base_from_part`], in the neighbouring cells.
+    /// As [`PlaceGoal::base_from_part`], for parts in the neighbouring cells.
     pub(crate) fn neighbours_in_base(&self, height_m: f64) -> impl Iterator<Item = Isometry3<f64>> {
         let base_from_part = self.base_from_part(height_m, 0.0);
         let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), self.yaw_rad);
@@ -201,7 +201,7 @@ mod tests {
 
     #[test]
     fn cells_count_along_the_trays_x_first() {
-        // The tray's x is the base's y, its y the base's -x.
+        // The tray's x is the base's y; the tray's y is the base's -x.
         for (cell, expected) in [(1, [0.4, 0.2]), (3, [0.4, 0.4]), (4, [0.35, 0.2]), (6, [0.35, 0.4])] {
             let goal = tray().goal(cell).unwrap();
             let apart = Point2::from(goal.at_m) - Point2::from(expected);

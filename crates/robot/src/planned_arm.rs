@@ -17,16 +17,16 @@ pub enum PlannedAction {
     Wait(f64),
     /// A command of the hand.
     Hand(HandCommand),
-    /// Coming down until a contact: at its expected place.
+    /// A descent until a contact, which is assumed at its expected place.
     Down {
-        /// Joint positions there, rad.
+        /// Joint positions at the contact, rad.
         end: JointVector,
-        /// Its duration, s.
+        /// Duration of the descent, s.
         duration_secs: f64,
     },
 }
 
-/// Follows every motion exactly and holds after every grasp; records the commands.
+/// An arm that follows every motion exactly, holds the part after every grasp, and records the commands.
 #[derive(Debug, Clone)]
 pub struct PlannedArm {
     geometry: ArmGeometry,
@@ -47,12 +47,12 @@ impl PlannedArm {
         }
     }
 
-    /// Its commands, in order.
+    /// The recorded commands, in order.
     pub fn actions(&self) -> &[PlannedAction] {
         &self.actions
     }
 
-    /// Its duration, s; the hand's motions in parallel with the arm's take no time.
+    /// Duration of the recorded sequence, s; motions of the hand in parallel with the arm take no time.
     pub fn duration_secs(&self) -> f64 {
         self.state.time_secs
     }
@@ -157,7 +157,7 @@ impl Arm for PlannedArm {
 }
 
 impl CompliantArm for PlannedArm {
-    /// The contact is at its expected place: above the last part of the path, which allows for an uncertain height.
+    /// Assumes the contact at its expected place: above the last part of the path, which allows for an uncertain height.
     fn touch_down(&mut self, touch_down: &TouchDown, _watch: &mut Watch) -> Result<Touched> {
         let way_m = (touch_down.max_way_m - touch_down.below_table_m).max(0.0);
         let mut base_from_tcp = self.geometry.forward(&self.state.q);
@@ -226,7 +226,7 @@ mod tests {
                 _ => None,
             })
             .collect();
-        // To the look-out pose, above the part, down, and up.
+        // Motions to the look-out pose, above the part, down, and up.
         assert_eq!(motions.len(), 4);
         assert!(motions.windows(2).all(|pair| (pair[0].end() - pair[1].start()).amax() < 1e-9));
         let tcp = ArmGeometry::panda().forward(motions[2].end()).translation.vector;
@@ -236,7 +236,7 @@ mod tests {
         let expected = arm.duration_secs() / 0.25;
         assert!((frames.len() as f64 - expected).abs() <= 3.0, "{} of {expected}", frames.len());
         assert_eq!((frames[0].0, frames[frames.len() - 1].0), (start, *motions[3].end()));
-        // Slow: no joint moves by more than a tenth of Franka's 2.61 rad/s.
+        // At speed 0.1, no joint is faster than a tenth of Franka's 2.61 rad/s.
         assert!(frames.windows(2).all(|pair| (pair[1].0 - pair[0].0).amax() <= 0.261 * 0.25 + 1e-9));
         assert_eq!(frames[frames.len() - 1].1, 0.02);
     }

@@ -2,8 +2,8 @@
 //!
 //! To stop, the motion's own time is slowed down to a standstill: `q(s(t))` with `ds/dt` from 1 to 0 along a smooth
 //! step. The arm thus stays on the checked path, and velocities only decrease. The additional acceleration is the
-//! velocity times `d²s/dt²`, at most `1.5 / STOP_SECS` of it: 3.4 rad/s² at 60 % of Franka's speed. The slowest joint's
-//! limit is 7.5, of which the motion itself, including corners, takes 40 %.
+//! velocity times `d²s/dt²`, which is at most `1.5 / STOP_SECS`: 3.4 rad/s² at 60 % of Franka's speed. The lowest limit
+//! of a joint is 7.5 rad/s², of which the motion itself, including corners, uses 40 %.
 
 use sdg_kinematics::JointVector;
 
@@ -35,7 +35,7 @@ pub struct Playback<'a> {
 /// A stop in progress.
 #[derive(Debug, Clone, Copy)]
 struct Stopping {
-    /// The motion's time at its start, in seconds.
+    /// The motion's time when the stop began, in seconds.
     from_secs: f64,
     since_cycles: u64,
 }
@@ -51,7 +51,7 @@ impl<'a> Playback<'a> {
         self.motion.start()
     }
 
-    /// Starts a controlled stop; another call changes nothing.
+    /// Starts a controlled stop; further calls change nothing.
     pub fn stop(&mut self) {
         if self.stopping.is_none() {
             let from_secs = self.num_cycles as f64 * PERIOD_SECS;
@@ -64,7 +64,7 @@ impl<'a> Playback<'a> {
         self.stopping.is_some()
     }
 
-    /// The reference of the next cycle; `None` when the arm is to be at rest, at the end or after a stop.
+    /// The reference of the next cycle; `None` at the end of the motion or of a stop.
     pub fn next_reference(&mut self) -> Option<JointReference> {
         let Some(stopping) = self.stopping else {
             if self.num_cycles >= (self.motion.duration_secs() / PERIOD_SECS).ceil() as u64 {
@@ -103,7 +103,7 @@ mod tests {
         SafetyLimits::default().check(trajectory).unwrap()
     }
 
-    /// Around two corners at the pace of rehearsals, nowhere at rest between start and end.
+    /// A motion around two corners at the pace of rehearsals, nowhere at rest between start and end.
     fn curved() -> (RoundedPath, CheckedMotion) {
         let steps = [
             [0.9, 0.5, -0.3, 0.3, 0.4, -0.2, 0.9],
@@ -158,11 +158,11 @@ mod tests {
             assert!(off_path < ON_PATH_RAD, "stopped at {stop_at}: {off_path} rad off the path");
         }
         println!(
-            "the largest shares of a stop: {:.2} of the acceleration, {:.2} of the torque",
+            "the largest fractions of the limits during a stop: {:.2} of the acceleration, {:.2} of the torque",
             largest[0], largest[1]
         );
         assert!(largest.iter().all(|share| *share <= 1.0), "{largest:?}");
-        // Braking in the corner adds to the corner's own accelerations, so that this exceeds the motion alone.
+        // Braking adds to the accelerations of the corner, so that this exceeds the 0.4 of the motion alone.
         assert!(largest[0] > 0.45, "{largest:?}");
     }
 
@@ -193,7 +193,7 @@ mod tests {
             assert!(references.len() <= stop_at + (STOP_SECS * 1e3) as usize + 1, "{stop_at}");
             let last = references.last().unwrap();
             assert!(last.dq.amax() < 1e-9, "stopped at {stop_at}: {}", last.dq);
-            // The path is straight in joint space: every joint has completed the same share of its distance.
+            // The path is straight in joint space: every joint has completed the same fraction of its distance.
             let (start, way) = (motion.start(), motion.end() - motion.start());
             let shares = (last.q - start).component_div(&way);
             assert!((shares.max() - shares.min()).abs() < 1e-9, "{shares}");

@@ -12,10 +12,11 @@ use crate::safety::{FeltBelow, LimitsFrom, SafetyLimits, Violation};
 use crate::touch::{TouchDown, Touched};
 use crate::watch::{StopReason, Watch};
 
-/// Largest distance of a motion's start from the controller's reference, rad: not visible to a person.
+/// Largest distance of a motion's start from the controller's reference, rad; a person cannot see it.
 const MAX_START_DISTANCE_RAD: f64 = 1e-3;
-/// How often a motion is slowed down until joints and tcp keep their limits, and the factor of its speed each time.
+/// Maximum number of times that a motion is slowed down until joints and tcp keep their limits.
 const MAX_SLOWDOWNS: usize = 8;
+/// Factor of the speed each time.
 const SLOWDOWN: f64 = 0.8;
 
 /// An arm, the limits of its motions, and whether it may move.
@@ -30,18 +31,18 @@ pub struct Robot<'a, A: Arm> {
     latched: Option<String>,
     /// The load that was given to the hand.
     load: Load,
-    /// The place where the hand last came down by contact, until it has moved up from there.
+    /// The place of the hand's last contact, until the hand has moved up from there.
     felt_below: Option<FeltBelow>,
 }
 
 impl<'a, A: Arm> Robot<'a, A> {
-    /// Puts an arm behind limits; `watch` sees every state and may stop it.
+    /// Restricts an arm to motions within limits; `watch` receives every state and may stop the arm.
     pub fn new(arm: &'a mut A, limits: SafetyLimits, watch: Watch) -> Self {
         let watch = watch.of_arm(&arm.geometry().limits);
         Self { arm, limits, watch, latched: None, load: Load::NONE, felt_below: None }
     }
 
-    /// The arm, for taking pictures with it and for reading its own data. It must not be used for motions.
+    /// The arm, for taking pictures and for reading its data. It must not be used for motions.
     pub fn arm(&mut self) -> &mut A {
         self.arm
     }
@@ -51,12 +52,12 @@ impl<'a, A: Arm> Robot<'a, A> {
         self.arm.geometry()
     }
 
-    /// The limits of every motion.
+    /// The limits against which every motion is checked.
     pub fn limits(&self) -> &SafetyLimits {
         &self.limits
     }
 
-    /// The states of the last second.
+    /// The checks of every state, with the states of the last second.
     pub fn watch(&self) -> &Watch {
         &self.watch
     }
@@ -120,9 +121,9 @@ impl<'a, A: Arm> Robot<'a, A> {
         })
     }
 
-    /// The first motion within the speed limits; if there is none, the slowest one tried.
+    /// Plans with decreasing speeds and returns the first motion within the speed limits; if there is none, the slowest.
     ///
-    /// A path is timed at samples; between two of them a joint may slightly exceed its limit.
+    /// This is necessary because a path is timed at samples: between two samples a joint may slightly exceed its limit.
     fn slowed(&self, plan: impl Fn(f64) -> Result<Trajectory>) -> Result<Trajectory> {
         let mut share = 1.0;
         for _ in 0..MAX_SLOWDOWNS {
@@ -145,7 +146,7 @@ impl<'a, A: Arm> Robot<'a, A> {
     /// Checks a motion and follows it to its end.
     ///
     /// # Errors
-    /// [`RobotError::Unsafe`] before anything moves; later the reason that ended the motion, after which nothing moves.
+    /// [`RobotError::Unsafe`] before anything moves; later the error that ended the motion, after which nothing moves.
     pub fn follow(&mut self, trajectory: Trajectory) -> Result<()> {
         let state = self.ready()?;
         let apart = (trajectory.start() - state.q_commanded).abs();
@@ -162,13 +163,13 @@ impl<'a, A: Arm> Robot<'a, A> {
             Err(error) => Err(error),
         };
         if ended.is_ok() {
-            // It has left the contact: the limits apply again.
+            // The hand has left the contact: the limits apply again.
             self.felt_below = None;
         }
         self.note(ended)
     }
 
-    /// Stands still for some seconds.
+    /// Stands still for `duration_secs`.
     ///
     /// # Errors
     /// As for [`Arm::wait`].
@@ -230,7 +231,7 @@ impl<'a, A: Arm> Robot<'a, A> {
     /// Recovers the arm and allows motions again, after a person has checked it.
     ///
     /// # Errors
-    /// If the error persists; then nothing moves.
+    /// The error, if it persists; nothing moves then.
     pub fn recover(&mut self) -> Result<()> {
         self.arm.recover()?;
         self.latched = None;
@@ -267,11 +268,11 @@ impl<'a, A: Arm> Robot<'a, A> {
     }
 }
 
-/// Share of the tcp's limits at which the descent is checked; the actual descent is slower.
+/// Fractions of the tcp's limits at which the descent is checked; the actual descent is slower.
 const TOUCH_SHARES: [f64; 3] = [0.05, 0.05, 0.02];
 
 impl<A: CompliantArm> Robot<'_, A> {
-    /// Moves straight down from the arm's position until a contact. The whole path is checked before, with the table
+    /// Moves straight down from the arm's position until a contact. The whole path is checked first, with the table
     /// lowered by [`TouchDown::below_table_m`].
     ///
     /// # Errors
@@ -291,7 +292,7 @@ impl<A: CompliantArm> Robot<'_, A> {
         self.limits.lowered(below_m, below_m).check(way)?;
         self.watch.begin();
         let touched = self.arm.touch_down(touch_down, &mut self.watch);
-        // After an error it may be anywhere on the checked path.
+        // After an error the hand may be anywhere on the checked path.
         let lowest_m = touched.as_ref().map_or(lowest.translation.z, |touched| touched.tcp_height_m);
         self.felt_below = Some(FeltBelow::new(&base_from_tcp.translation.vector, lowest_m, below_m));
         self.note(touched)

@@ -3,14 +3,15 @@
 //! ```text
 //!        ┌──────┐  part in the next cell along y
 //!        └──────┘
-//!    room   ┌─┐    finger, open to let go, with the part's own place between it and the other
+//!    room   ┌─┐    finger, open for the release, with the part's place between it and the other
 //!        ┌──┴─┴─┐
-//!        │ part │  turned as the symmetry of the part allows, the fingers find room elsewhere
+//!        │ part │  rotated by an angle of the part's symmetry, the hand may have room elsewhere
 //!        └──┬─┬─┘
 //!           └─┘
 //! ```
-//! All neighbouring cells count as filled. The order of filling would change nothing for a hand with a fixed turn: its
-//! fingers open equally to both sides, and of two neighbours the second is always placed beside the first.
+//! All neighbouring cells count as filled. The order of filling would make no difference for a hand with a fixed
+//! orientation: its fingers open equally to both sides, and of two neighbours the second is always placed beside the
+//! first.
 
 use std::f64::consts::TAU;
 
@@ -22,20 +23,20 @@ use crate::error::{Result, RobotError};
 use crate::part_shape::PartShape;
 use crate::place::PlaceGoal;
 
-/// Minimum distance between fingers and a part in a neighbouring cell, m: it may lie 2 mm beside its cell before it is
-/// grasped again.
+/// Minimum distance between fingers and a part in a neighbouring cell, m: that part may lie 2 mm off its cell's centre
+/// before it is grasped again.
 const FINGER_ROOM_M: f64 = 0.002;
-/// Minimum distance between two parts, m: both may have that offset.
+/// Minimum distance between two parts, m: both may be off by [`FINGER_ROOM_M`].
 const PART_ROOM_M: f64 = 2.0 * FINGER_ROOM_M;
-/// Minimum room for fingers that compensate the sliding of a part, m: they are then not at the centre of their cell.
+/// Minimum room for fingers that compensate the sliding of a part, m: they are then off the centre of the cell.
 pub(crate) const MIN_FINGER_ROOM_M: f64 = 0.5 * FINGER_ROOM_M;
-/// Turns that are tried for a part with full rotational symmetry: every 15°, which includes both axes of a tray and its
-/// diagonals.
+/// Number of angles that are tried for a part with full rotational symmetry: every 15°, which includes both axes of a
+/// tray and its diagonals.
 const NUM_TURNS: u32 = 24;
-/// Rounding of lengths, m.
+/// Allowance for the rounding of lengths, m.
 const ROUNDING_M: f64 = 1e-9;
 
-/// Turns of the part's symmetry, rad.
+/// Angles by which the part can be rotated without visible change, rad.
 pub(crate) fn same_turns_rad(symmetry: RotationalSymmetry) -> Vec<f64> {
     let num = match symmetry {
         RotationalSymmetry::Fold(count) => count.clamp(1, 36),
@@ -51,11 +52,11 @@ pub(crate) fn release_opening_m(width_m: f64, release_margin_m: f64) -> f64 {
 }
 
 impl PlaceGoal {
-    /// Refuses a cell if parts in its neighbours leave no room for this part, or for fingers that open by
-    /// `release_margin_m` more than its width (m), at all turns of its symmetry.
+    /// Checks that parts in the neighbouring cells leave room for this part, and at some angle of its symmetry for
+    /// fingers that open `release_margin_m` wider than the part (m).
     ///
     /// # Errors
-    /// [`RobotError::Configuration`] with the object that has no room, and a sufficient pitch.
+    /// [`RobotError::Configuration`] without that room; it says what has no room, and which pitch is sufficient.
     pub fn check_room(&self, part: &PartShape, symmetry: RotationalSymmetry, release_margin_m: f64) -> Result<()> {
         let opening_m = release_opening_m(part.jaw_width_m(), release_margin_m);
         let turns_rad = same_turns_rad(symmetry);
@@ -77,7 +78,7 @@ impl PlaceGoal {
         Err(RobotError::Configuration { what: format!("\"{}\"", self.name), expected, found })
     }
 
-    /// The object that has no room, in words.
+    /// Says what has no room; `None` if there is enough.
     fn lacks_room(&self, part: &PartShape, turns_rad: &[f64], opening_m: f64) -> Option<String> {
         let base_from_part = self.base_from_part(0.0, 0.0);
         let own = part.outline_in_base(&base_from_part);
@@ -95,13 +96,13 @@ impl PlaceGoal {
         if near >= FINGER_ROOM_M - ROUNDING_M {
             return None;
         }
-        let turned = if turns_rad.len() > 1 { ", however the hand is turned," } else { "" };
+        let turned = if turns_rad.len() > 1 { " at every angle of the hand," } else { "" };
         let comes = match near < -ROUNDING_M {
             true => format!("would reach {:.1} mm into", -near * 1e3),
             false => format!("come within {:.1} mm of", near * 1e3),
         };
         Some(format!(
-            "the part is {:.0} mm wide between the fingers; {:.0} mm thick and open to {:.0} mm to let it go, they {comes} a part in a \
+            "the part is {:.0} mm wide between the fingers; {:.0} mm thick and open to {:.0} mm to release it, they {comes} a part in a \
              neighbouring cell{turned} and at least {:.0} mm are required",
             part.jaw_width_m() * 1e3,
             thickness_m(part) * 1e3,
@@ -111,7 +112,7 @@ impl PlaceGoal {
     }
 
     /// The poses of the hand at which its fingers, at this opening (m), have the most room among the surrounding parts;
-    /// empty if that is too little.
+    /// empty if no pose has enough.
     pub(crate) fn with_room_for_fingers<T>(
         &self,
         part: &PartShape,
@@ -141,7 +142,7 @@ impl PlaceGoal {
         self.neighbours_in_base(0.0).map(|base_from_part| part.outline_in_base(&base_from_part))
     }
 
-    /// The smallest sufficient pitch, in whole millimetres, increased along the tray's x, its y, or both.
+    /// The smallest sufficient pitch, increased along the tray's x, y, or both, in whole millimetres.
     fn sufficient_pitch(&self, along: [bool; 2], does: impl Fn(&Self) -> bool) -> Option<[f64; 2]> {
         const MAX_STEPS: u32 = 300;
         let before_m = self.tray.as_ref()?.pitch_m;
@@ -154,7 +155,7 @@ impl PlaceGoal {
         let both = |step: u32| along.map(|is_longer| if is_longer { step } else { 0 });
         let (num, mut pitch_m) = (1..=MAX_STEPS).find_map(|step| Some((step, does(both(step))?)))?;
         if along == [true, true] {
-            // One side alone may have caused all of it.
+            // A larger pitch along one axis may be sufficient.
             let fewer = (0..num).find_map(|step| does([step, num]).or_else(|| does([num, step])));
             pitch_m = fewer.unwrap_or(pitch_m);
         }
@@ -162,7 +163,7 @@ impl PlaceGoal {
     }
 }
 
-/// A length increased by this many millimetres: whole ones, so that the reported pitch is sufficient.
+/// A length, rounded down to whole millimetres and increased by `steps` millimetres.
 fn longer_m(before_m: f64, steps: u32) -> f64 {
     const STEP_M: f64 = 1e-3;
     if steps == 0 { before_m } else { ((before_m / STEP_M + ROUNDING_M).floor() + f64::from(steps)) * STEP_M }
@@ -172,12 +173,12 @@ fn told([along_m, across_m]: [f64; 2]) -> String {
     format!("{:.0} x {:.0} mm", along_m * 1e3, across_m * 1e3)
 }
 
-/// Thickness of a finger along its motion, up to the height of the part's top, m.
+/// Largest thickness of a finger along its motion, between its tip and the height of the part's top, m.
 fn thickness_m(part: &PartShape) -> f64 {
     finger_thickness_m(part.top_m() - part.grasp_height_m())
 }
 
-/// The area of the fingers on the table, from the closed to the open position: corners in the base frame, m.
+/// The areas that the two fingers cover on the table from the closed to the open position, base frame, m.
 fn fingers_in_base(base_from_tcp: &Isometry3<f64>, closed_m: f64, opening_m: f64, thickness_m: f64) -> [Polygon; 2] {
     let (x, inner, outer) = (FINGER_HALF_WIDTH_M, 0.5 * closed_m, 0.5 * opening_m + thickness_m);
     [1.0, -1.0].map(|side: f64| {
@@ -187,7 +188,7 @@ fn fingers_in_base(base_from_tcp: &Isometry3<f64>, closed_m: f64, opening_m: f64
     })
 }
 
-/// Distance of two convex polygons, m; negative if they overlap, by the distance that separates them.
+/// Distance between two convex polygons, m; if they overlap, minus the shortest distance that separates them.
 pub(crate) fn gap_m(one: &Polygon, other: &Polygon) -> f64 {
     let edges = one.edges().chain(other.edges());
     let separation_m = edges.filter_map(|(from, to)| {

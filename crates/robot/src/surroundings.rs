@@ -12,17 +12,16 @@ use crate::robot::Robot;
 
 /// The table's name among the obstacles.
 pub(crate) const TABLE: &str = "table";
-/// Number of searches whose paths are tried if a limit that the planner does not know, mainly the workspace, refuses
-/// one.
+/// Maximum number of searches: a path may violate a limit that the planner does not know, mainly the workspace.
 const NUM_SEEDS: u64 = 5;
-/// Maximum number of checks of a search: about a second, and some ten times the number for difficult paths.
+/// Maximum number of collision checks of a search: about one second, and ten times as many as difficult paths need.
 const MAX_CHECKS: usize = 50_000;
-/// Margin subtracted from the start's height over the table, in addition to the planner's margin, m.
+/// Distance from the table that is left to start and destination, in addition to the planner's margin, m.
 const START_ROOM_M: f64 = 0.002;
-/// Extent of the hand's capsules below the tcp for a hand that points down, m.
+/// Extent of the hand's capsules below the tcp while the hand points down, m.
 const HAND_BELOW_TCP_M: f64 = 0.010;
 
-/// The arm with its fingers at an opening (m), the table and obstacles.
+/// Collision model of the arm with its fingers at an opening (m), the table and the obstacles.
 pub(crate) fn collision_model(
     arm: &ArmGeometry,
     table_height_m: f64,
@@ -35,7 +34,7 @@ pub(crate) fn collision_model(
         base_from_obstacle: Isometry3::translation(0.0, 0.0, table_height_m),
     };
     let mut model = CollisionModel::new(arm, [&[table], obstacles].concat(), opening_m)?;
-    // Link 1 turns only about the vertical: a table higher than the base's foot surrounds it and is no obstacle.
+    // Link 1 rotates only about the vertical: a table higher than the foot of the base surrounds it and is no obstacle.
     model.allow(Body::link(1), TABLE)?;
     Ok(model)
 }
@@ -62,19 +61,19 @@ pub struct Surroundings<'a> {
     pub held: &'a [Capsule],
     /// Opening of the hand on straight paths, m; elsewhere it may be fully open.
     pub opening_m: f64,
-    /// Height over the table during the motion, if start and destination are that high, m.
+    /// Minimum height above the table during the motion, m; less if start or destination is lower.
     pub table_clearance_m: f64,
 }
 
 /// A path around the obstacles of the cell.
 #[derive(Debug, Clone)]
 pub struct Way {
-    /// Motions in sequence, each from rest to rest: one, unless the arm has to stop at a waypoint; none if it is there
-    /// already.
+    /// Motions in sequence, each from rest to rest: usually one, several if the arm has to stop at waypoints, none if
+    /// the arm is at the destination already.
     pub motions: Vec<Trajectory>,
     /// The straight approach, if one was requested.
     pub approach: Option<JointPath>,
-    /// The pose that is reached.
+    /// Index of the pose that is reached.
     pub goal_idx: usize,
 }
 
@@ -100,8 +99,8 @@ impl Surroundings<'_> {
         Ok(model)
     }
 
-    /// The same where the hand may touch the table, and the held part may touch the surface or parts at its place: the
-    /// held part is not known as exactly as the fingers, and its room in a tray is judged before.
+    /// The collision model of straight paths: the hand may touch the table, and the held part may touch every obstacle,
+    /// because its shape is known less exactly than the fingers', and its room in a tray was checked before.
     pub(crate) fn contact_model(&self, arm: &ArmGeometry, table_height_m: f64) -> Result<CollisionModel> {
         let lying = self.lying.iter().enumerate().map(|(number, part)| part.obstacle_beside_fingers(number));
         let opening_m = self.opening_m.clamp(0.0, arm.hand.opening_max_m);
@@ -140,11 +139,11 @@ impl Surroundings<'_> {
     }
 }
 
-/// The lowest point of the arm's moving capsules from link 2 on, base frame, m.
+/// z of the lowest point of the capsules from link 2 to the held part, base frame, m.
 fn lowest_m(model: &CollisionModel, arm: &ArmGeometry, q: &JointVector) -> f64 {
     let frames = arm.frames(q);
     let links = (2..=NUM_JOINTS).map(|number| (Body::link(number), number));
-    // Hand and held part have their capsules in link 7's frame.
+    // The capsules of hand and held part are in link 7's frame.
     let bodies = links.chain([(Body::HAND, NUM_JOINTS), (Body::HELD_PART, NUM_JOINTS)]);
     bodies
         .flat_map(|(body, number)| {

@@ -1,8 +1,8 @@
-//! Coming down with a compliant tcp until a contact is measured by its force.
+//! Descent with a compliant tcp until a contact is measured by its force.
 //!
 //! ```text
-//! stand, to measure the forces in free air ─> down at a constant speed ─> felt: press with a force ─> stand, report
-//!      └ stiff, with integral action ────────────────┘ └ nothing felt     └ soft along z
+//! stand, to measure the forces in free air ─> down at a constant speed ─> contact: press with a force ─> stand, report
+//!      └ stiff, with integral action ────────────────┘ └ no contact     └ soft along z
 //! ```
 //! The force is the robot's own estimate of the external force; the height is the measured one.
 
@@ -16,14 +16,14 @@ use crate::impedance::{Impedance, ImpedanceControl, TcpReference};
 /// Time during which the arm stands still to measure the forces in free air, s, and averaging time of force and height
 /// at the end.
 const STANDING_SECS: f64 = 0.2;
-/// The reference reaches its speed within this time, s.
+/// Time within which the reference reaches its speed, s.
 const RAMP_SECS: f64 = 0.5;
-/// Joint friction lets the reference lead the tcp; largest lead, m: 15 N at 1000 N/m.
+/// Largest distance by which the reference may lead the tcp, which joint friction holds back, m: 15 N at 1000 N/m.
 const MAX_LEAD_M: f64 = 0.015;
-/// Yielding of the reference per newton above the pressing force, m/(N s): the force settles within a few tenths of a
-/// second.
+/// Speed of the reference per newton of deviation from the pressing force, m/(N s): the force settles within a few
+/// tenths of a second.
 const YIELDING_M_PER_NS: f64 = 0.02;
-/// Largest speed of that yielding, m/s.
+/// Largest speed of the reference while pressing, m/s.
 const MAX_YIELDING_M_S: f64 = 0.015;
 
 /// Settings of a touch-down.
@@ -37,18 +37,18 @@ pub struct TouchDown {
     pub speed_m_s: f64,
     /// Largest length of the descent, as measured, m.
     pub max_way_m: f64,
-    /// Largest distance of the path below the table of the limits, m: the uncertainty of the table's height.
+    /// Largest distance of the path below the given height of the table, m: the uncertainty of that height.
     pub below_table_m: f64,
     /// Change of the vertical force that counts as a contact, N.
     pub contact_n: f64,
-    /// Pressing force after it, N.
+    /// Pressing force after the contact, N.
     pub press_n: f64,
     /// Duration of pressing, s.
     pub press_secs: f64,
 }
 
 impl Default for TouchDown {
-    /// 6 mm/s, at most 30 mm and 10 mm below the given height of the table; 3 N are a contact.
+    /// 6 mm/s, at most 30 mm down and 10 mm below the given height of the table; 3 N count as a contact.
     fn default() -> Self {
         Self {
             free_air: Impedance::FREE_AIR,
@@ -64,18 +64,18 @@ impl Default for TouchDown {
 }
 
 impl TouchDown {
-    /// Refuses impossible values.
+    /// Checks that all values are possible.
     ///
     /// # Errors
     /// [`RobotError::Configuration`].
     pub(crate) fn validate(&self) -> Result<()> {
-        /// At higher speeds a contact is an impact.
+        /// Maximum speed: at higher speeds a contact is an impact.
         const MAX_SPEED_M_S: f64 = 0.05;
         const MAX_WAY_M: f64 = 0.2;
         const MAX_FORCE_N: f64 = 15.0;
         for (what, found, max) in [
-            ("speed of coming down in m/s", self.speed_m_s, MAX_SPEED_M_S),
-            ("way down in m", self.max_way_m, MAX_WAY_M),
+            ("speed of the descent in m/s", self.speed_m_s, MAX_SPEED_M_S),
+            ("length of the descent in m", self.max_way_m, MAX_WAY_M),
             ("force of a contact in N", self.contact_n, MAX_FORCE_N),
             ("force of pressing in N", self.press_n, MAX_FORCE_N),
             ("time of pressing in s", self.press_secs, 10.0),
@@ -98,7 +98,7 @@ pub struct Touched {
     pub tcp_height_m: f64,
     /// The pressing force at the end, N.
     pub force_n: f64,
-    /// The largest force on the path and at the end, N.
+    /// The largest force during the whole touch-down, N.
     pub peak_n: f64,
     /// Largest deviation of the tcp from its reference in free air, m and rad.
     pub free_air_error: [f64; 2],
@@ -120,7 +120,7 @@ pub struct Descent {
     start: Isometry3<f64>,
     phase: Phase,
     phase_cycles: u32,
-    /// Distance of the reference below the start, m, and its downward speed, m/s.
+    /// Distance of the reference below the start, m.
     down_m: f64,
     speed_m_s: f64,
     free_air_n: f64,
@@ -133,7 +133,7 @@ pub struct Descent {
 }
 
 impl Descent {
-    /// Starts at the arm's position (rad), after this torque (N·m, without gravity).
+    /// Starts at the arm's joint positions `q` (rad), after a last `torque` (N·m, without gravity).
     pub fn new(touch_down: TouchDown, arm: &ArmGeometry, q: JointVector, torque: JointVector) -> Self {
         Self {
             touch_down,
@@ -156,7 +156,7 @@ impl Descent {
     /// The torques of the next cycle (N·m), and whether they are the last.
     ///
     /// `force_n` is the vertical external force, upwards, as the robot estimates it. Only its change from free air
-    /// counts, so that a part of unknown weight, or a robot with the opposite sign, makes no difference.
+    /// counts, so that the result depends neither on the weight of a held part nor on the sign of the estimate.
     pub fn next(&mut self, arm: &ArmGeometry, q: &JointVector, dq: &JointVector, force_n: f64) -> (JointVector, bool) {
         let pressed_n = (force_n - self.free_air_n).abs();
         let base_from_tcp = arm.forward(q);
@@ -216,8 +216,7 @@ impl Descent {
         (self.control.torque(arm, q, dq, &reference, &JointVector::zeros()), is_last)
     }
 
-    /// Downward speed of the reference while the force is below the pressing force, or upward speed while it is above,
-    /// m/s.
+    /// Downward speed of the reference while pressing, m/s; negative (upward) if the force is too large.
     fn yielding(&self, pressed_n: f64) -> f64 {
         let too_little_n = self.touch_down.press_n - pressed_n;
         (YIELDING_M_PER_NS * too_little_n).clamp(-MAX_YIELDING_M_S, MAX_YIELDING_M_S)
@@ -251,11 +250,12 @@ mod tests {
 
     use super::*;
 
-    /// What the robot feels where nothing touches it, N.
+    /// The external force that the robot reports in free air, N.
     const FREE_AIR_N: f64 = 2.0;
     const MAX_CYCLES: usize = 10_000;
 
-    /// Comes down with an arm that something holds where it is, feeling `pressed_n` of the force of its own spring, N, once it moves.
+    /// Descends with an arm that is held in place, so that once the reference moves, the external force is `pressed_n`
+    /// of the spring's own force, N.
     fn descend(touch_down: TouchDown, pressed_n: impl Fn(f64) -> f64) -> Touched {
         let (arm, q, still) = (ArmGeometry::panda(), ready_pose(), JointVector::zeros());
         let mut descent = Descent::new(touch_down, &arm, q, still);
@@ -281,7 +281,7 @@ mod tests {
         }
     }
 
-    /// The reference gives way until the force that was asked for is felt.
+    /// The reference moves until the measured force is the requested one.
     #[test]
     fn it_presses_with_the_force_that_is_told() {
         for press_n in [4.0, 8.0] {

@@ -7,15 +7,15 @@ use sdg_kinematics::{JointLimits, JointVector, NUM_JOINTS};
 
 use crate::arm_state::{ArmMode, ArmState};
 
-/// The reason why a motion was ended early.
+/// Reasons for ending a motion early.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum StopReason {
-    /// A person requested it.
+    /// A person requested the stop.
     Interrupted,
-    /// An impossible state of an arm.
+    /// The arm reported an impossible state.
     Implausible(String),
-    /// No state for longer than [`MAX_SILENCE_SECS`] of the arm's clock, or a motion that does not end.
+    /// The arm reported no state for longer than [`MAX_SILENCE_SECS`] of its clock, or a motion did not end.
     Watchdog(String),
     /// The arm's controller is in a mode in which it does not move.
     Mode(ArmMode),
@@ -24,7 +24,7 @@ pub enum StopReason {
 impl fmt::Display for StopReason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Interrupted => f.write_str("a person asked for it"),
+            Self::Interrupted => f.write_str("a person requested it"),
             Self::Implausible(what) => write!(f, "its state is implausible: {what}"),
             Self::Watchdog(what) => write!(f, "watchdog: {what}"),
             Self::Mode(mode) => write!(f, "the arm is in mode \"{}\"", mode.name()),
@@ -35,16 +35,15 @@ impl fmt::Display for StopReason {
 /// The longest gap between two states of a moving arm, in seconds of its clock: the gap that Franka's controller itself
 /// bridges.
 pub const MAX_SILENCE_SECS: f64 = 0.020;
-/// States are a whole number of milliseconds apart; their difference in seconds is rounded.
+/// Allowance for rounding: states are a whole number of milliseconds apart.
 const ROUNDING_SECS: f64 = 0.5e-3;
 /// Length of the kept history, in seconds of the arm's clock.
 pub const HISTORY_SECS: f64 = 1.0;
-/// Largest movement of a measured joint between two states, as a multiple of its limit, plus an allowance for noise,
-/// rad.
+/// Largest speed of a joint between two states, as a multiple of its limit; [`NOISE_RAD`] is allowed in addition.
 const MAX_SPEED_SHARE: f64 = 2.0;
 const NOISE_RAD: f64 = 0.005;
 
-/// Called once in every cycle: whether to stop.
+/// Called once in every cycle; returns the reason if the motion must stop.
 pub type StopRequest = Box<dyn FnMut() -> Option<StopReason> + Send>;
 
 /// Checks every state of a moving arm.
@@ -53,7 +52,7 @@ pub struct Watch {
     states: VecDeque<ArmState>,
     stop: Option<StopReason>,
     max_silence_secs: f64,
-    /// The arm's, rad/s.
+    /// Velocity limits of the arm's joints, rad/s.
     velocity_max: JointVector,
 }
 
@@ -64,7 +63,7 @@ impl fmt::Debug for Watch {
 }
 
 impl Default for Watch {
-    /// Without a stop request.
+    /// A watch without a stop request.
     fn default() -> Self {
         Self::new(Box::new(|| None))
     }
@@ -82,7 +81,7 @@ impl Watch {
         self.max_silence_secs = max_silence_secs;
     }
 
-    /// Judges plausibility by the limits of an arm instead of the Panda's.
+    /// Uses the velocity limits of an arm instead of the Panda's for the plausibility of states.
     pub(crate) fn of_arm(self, limits: &JointLimits) -> Self {
         Self { velocity_max: limits.velocity_max, ..self }
     }
@@ -91,12 +90,12 @@ impl Watch {
     pub(crate) fn begin(&mut self) {
         self.stop = None;
         if let Some(state) = self.states.back_mut() {
-            // The earlier states stay for the file, but their distance is not evaluated.
+            // Earlier states stay in the history, but the time since them does not count as a gap.
             state.mode = ArmMode::Idle;
         }
     }
 
-    /// Checks a state; returns the reason to stop, if there is one. The first reason is kept.
+    /// Checks a state; returns the reason to stop, if there is one. Later calls return the first reason.
     pub fn observe(&mut self, state: &ArmState) -> Option<&StopReason> {
         if self.stop.is_none() {
             self.stop = self.implausible(state).or_else(|| (self.request)());
@@ -108,7 +107,7 @@ impl Watch {
         self.stop.as_ref()
     }
 
-    /// Whether a person or a program requests a stop now.
+    /// Asks whether a person or a program requests a stop.
     pub fn is_stop_requested(&mut self) -> Option<StopReason> {
         (self.request)()
     }
@@ -148,7 +147,7 @@ impl Watch {
         self.states.iter()
     }
 
-    /// The states of the last second as CSV, with a line of names.
+    /// The states of the last second as CSV, with a header line.
     pub fn states_csv(&self) -> String {
         use std::fmt::Write as _;
         let mut text = String::from("time_secs,mode");
@@ -199,7 +198,7 @@ mod tests {
             assert_eq!(watch.observe(&state(0.0, ready_pose())), None);
             let found = watch.observe(&second).unwrap().to_string();
             assert!(found.contains(expected), "{found}");
-            // A later state does not clear it.
+            // A later state does not clear the reason.
             assert!(watch.observe(&state(0.051, ready_pose())).is_some());
         }
     }

@@ -1,4 +1,4 @@
-//! The camera's pose: from its file, or from tf at the picture's time.
+//! The camera's pose: from the camera file, or from tf at the picture's time.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -19,17 +19,17 @@ const POLL_INTERVAL: Duration = Duration::from_millis(100);
 /// Source of the camera's pose.
 #[derive(Debug, Clone)]
 pub enum CameraPoseSource {
-    /// None: detections have no poses.
+    /// No source: detections have no poses.
     Unknown,
-    /// The camera's file.
+    /// The camera file.
     File(CameraOverTable),
-    /// tf; intrinsics from the camera's file, else from camera_info.
+    /// tf; the intrinsics come from the camera file, otherwise from camera_info.
     Transforms {
         /// The frame of the robot's base.
         base_frame: String,
         /// z of the table in that frame.
         table_height_m: f64,
-        /// Intrinsics from the camera's file.
+        /// Intrinsics from the camera file.
         intrinsics: Option<PinholeCamera>,
     },
 }
@@ -76,7 +76,7 @@ impl CameraPoseReader {
                         num_refused => Err(RosError::Transform {
                             target_frame: received.message.transforms[0].header.frame_id.clone(),
                             source_frame: received.message.transforms[0].child_frame_id.clone(),
-                            why: format!("{num_refused} on {topic} are no transforms"),
+                            why: format!("{num_refused} transforms on {topic} are invalid"),
                         }),
                     }
                 });
@@ -96,14 +96,14 @@ impl CameraPoseReader {
         }));
     }
 
-    /// The camera over the table at the time of a picture; `None` if no pose is known.
+    /// The camera and its pose above the table at the time of a picture; `None` if no pose is known.
     pub(super) fn at(&self, header: &Header) -> Result<Option<CameraOverTable>, RosError> {
         let known = lock(&self.known);
         let refused = |expected: &str, found: String| RosError::CameraInfo { expected: expected.to_owned(), found };
         match &self.source {
             CameraPoseSource::Unknown => Ok(None),
             CameraPoseSource::File(over_table) => {
-                // An unreadable camera_info does not affect the file.
+                // With a camera file, an unreadable camera_info does not matter.
                 if let Some(Ok(sent)) = &known.sent {
                     camera_info::check_same_camera(&over_table.camera.intrinsics, sent)?;
                 }
@@ -117,8 +117,8 @@ impl CameraPoseReader {
                     }
                     (Some(of_file), _) => *of_file,
                     (None, Some(Ok(sent))) => *sent,
-                    (None, Some(Err(why))) => return Err(refused("a camera_info that can be used", why.clone())),
-                    (None, None) => return Err(refused("a camera_info beside the pictures", "none yet".to_owned())),
+                    (None, Some(Err(why))) => return Err(refused("a usable camera_info", why.clone())),
+                    (None, None) => return Err(refused("a camera_info with the pictures", "none yet".to_owned())),
                 };
                 let base_from_camera = known.transforms.lookup(base_frame, &header.frame_id, header.stamp)?;
                 let camera = PosedCamera { intrinsics, world_from_camera: base_from_camera };

@@ -1,4 +1,4 @@
-//! `~/grasp`: the grasp sequence with an arm behind ROS 2, on a thread.
+//! `~/grasp`: runs the grasp sequence with a ROS 2 arm on a thread.
 
 use std::sync::Arc;
 use std::thread::JoinHandle;
@@ -19,25 +19,25 @@ use sdg_ros2::messages::{GraspRequest, GraspResponse, Header, PoseStamped, Time}
 use crate::pictures::Shared;
 use crate::settings::IsInterrupted;
 
-/// Maximum wait for a picture taken after the arm stopped.
+/// Maximum wait for a picture taken after the arm has stopped.
 const PICTURE_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// The inputs of a grasp besides the arm and the model.
+/// The inputs of a grasp in addition to arm and model.
 #[derive(Debug, Clone)]
 pub struct GraspSettings {
     /// The workcell, with the limits of motions.
     pub workcell: Workcell,
     /// The camera of the pictures.
     pub camera: MountedCamera,
-    /// The given height; without it, the height is measured.
+    /// The given height of the marks; without it, the height is measured.
     pub told: Option<GivenHeight>,
-    /// Share of the joints' velocity limits, unless a request gives another.
+    /// Fraction of the joints' velocity limits, unless a request gives another one.
     pub speed: f64,
     /// The frame of poses in responses.
     pub base_frame: String,
 }
 
-/// The newest picture of the topic, after the arm has stopped.
+/// Pictures of the topic that were taken after the arm has stopped.
 #[derive(Clone)]
 struct TopicPictures(Arc<Shared>);
 
@@ -71,7 +71,7 @@ pub(super) struct Grasping {
     is_interrupted: IsInterrupted,
     arm: Option<TrajectoryArm>,
     running: Option<JoinHandle<Ended>>,
-    /// Why motions are blocked.
+    /// The reason why motions are blocked.
     latched: Option<String>,
 }
 
@@ -95,10 +95,10 @@ impl Grasping {
     /// Begins a grasp.
     ///
     /// # Errors
-    /// The speed is invalid, the model has no lengths, or the arm was stopped before.
+    /// An error if the speed is invalid, the model has no lengths, or the arm was stopped before.
     pub(super) fn begin(&mut self, request: &GraspRequest, model: &GraspModel) -> Result<()> {
         if let Some(why) = &self.latched {
-            anyhow::bail!("nothing moves until a person has looked and starts the node again: {why}");
+            anyhow::bail!("nothing moves until a person has checked the arm and restarts the node: {why}");
         }
         let speed = if request.speed > 0.0 { request.speed } else { self.settings.speed };
         let pace = Pace::at_speed(speed)?;
@@ -187,7 +187,7 @@ fn watch(is_interrupted: &IsInterrupted) -> Watch {
     Watch::new(Box::new(move || is_interrupted().then_some(StopReason::Interrupted)))
 }
 
-/// Plans the same without moving, from the arm's current posture.
+/// Plans the grasp without moving, from the arm's current posture.
 fn planned(
     settings: &GraspSettings,
     config: &GraspConfig,

@@ -2,15 +2,15 @@
 //!
 //! ```text
 //! image ─ PictureReader: a thread ─ queue ─┐                     ┌─ Topics: pose, detections, overlay, tf, diagnostics
-//! camera_info, tf ─ CameraPoseReader: threads ──┴─ Searcher ─ Searched ┴─ Services: who waits for a picture
-//!                                             run: this thread       Teaching, Grasping: a thread each, while they go on
+//! camera_info, tf ─ CameraPoseReader: threads ──┴─ Searcher ─ Searched ┴─ Services: requests that wait for a picture
+//!                                             run: this thread       Teaching, Grasping: one thread each, while they run
 //! ```
 //!
-//! Deliberately absent: arguments, and reading files other than the taught model. Settings are passed as [`Settings`]
-//! and [`GraspSettings`], teaching as a function of a [`TeachJob`], so that the node teaches in the same way as its
+//! This crate parses no arguments and reads no files other than the taught model. Settings are passed as [`Settings`]
+//! and [`GraspSettings`], and teaching as a function of a [`TeachJob`], so that the node teaches in the same way as its
 //! caller.
 //!
-//! Without the feature `dds` the crate is empty: a build of the whole workspace does not compile RustDDS.
+//! Without the feature `dds` the crate is empty, so that a build of the whole workspace does not compile RustDDS.
 #![cfg(feature = "dds")]
 #![forbid(unsafe_code)]
 #![cfg_attr(test, allow(clippy::unwrap_used))]
@@ -51,7 +51,7 @@ const POLL_INTERVAL: Duration = Duration::from_millis(5);
 /// Runs until `is_interrupted` returns true.
 ///
 /// # Errors
-/// A network resource cannot be opened; received data never end the node.
+/// An error if a network resource cannot be opened; received data never ends the node.
 pub fn run(
     mut node: Node,
     settings: Settings,

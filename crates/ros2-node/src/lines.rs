@@ -1,4 +1,4 @@
-//! Lines on standard error about repeated problems.
+//! Prints repeated problems on standard error.
 
 use std::collections::HashMap;
 use std::sync::{Mutex, PoisonError};
@@ -9,12 +9,12 @@ const AGAIN_AFTER: Duration = Duration::from_secs(2);
 /// Maximum number of different messages that are remembered.
 const MAX_REMEMBERED: usize = 200;
 
-/// Prints each message at once, and its repetitions every two seconds with their number.
+/// Prints each message at once, and later ones of the same kind every two seconds with the number of repetitions.
 #[derive(Debug, Default)]
 pub(super) struct Lines(Mutex<HashMap<String, (Instant, u64)>>);
 
 impl Lines {
-    /// Messages that differ only in numbers count as the same.
+    /// Prints a message if it is due; messages that differ only in numbers count as the same.
     pub(super) fn complain(&self, text: &str) {
         if let Some(line) = self.line(text, Instant::now()) {
             eprintln!("sdg ros2: {line}");

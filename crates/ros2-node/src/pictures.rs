@@ -16,7 +16,7 @@ use crate::lines::Lines;
 /// Interval at which a thread checks whether it must end.
 const POLL_INTERVAL: Duration = Duration::from_millis(100);
 
-/// A picture with its origin.
+/// A picture with its header and times.
 #[derive(Debug, Clone)]
 pub(super) struct Picture {
     pub(super) header: Header,

@@ -63,7 +63,7 @@ impl Topics {
         })
     }
 
-    /// The topics' absolute names, for display at the start.
+    /// The absolute names of the topics, for the line that is printed at the start.
     pub(super) fn names(&self) -> String {
         [self.poses.topic(), self.detections.topic(), self.overlays.topic()].join(", ")
     }

@@ -1,4 +1,4 @@
-//! Searches pictures: detections in pixels and over the table.
+//! Searches pictures; the detections are in pixels and, with a camera pose, on the table.
 
 use std::path::Path;
 use std::time::Instant;
@@ -13,9 +13,9 @@ use sdg_ros2::messages::Header;
 
 use crate::pictures::Picture;
 
-/// A grasp model, and the camera that it uses.
+/// A grasp model, and its perception with a camera.
 pub(super) struct Searcher {
-    /// The model as read, for the arm's grasps.
+    /// The model as read from its file, for grasps by the arm.
     model: Option<GraspModel>,
     perception: Option<Perception>,
     min_score: f64,
@@ -25,7 +25,7 @@ pub(super) struct Searcher {
 pub(super) struct Searched {
     pub(super) header: Header,
     pub(super) arrived: Instant,
-    /// Best first.
+    /// The parts that were found, best first.
     pub(super) found: Vec<FoundPart>,
     /// The same detections in the form for drawing.
     pub(super) detections: Vec<GraspDetection>,
@@ -39,10 +39,10 @@ impl Searcher {
         Self { model, perception, min_score }
     }
 
-    /// Uses another model from now on.
+    /// Replaces the model.
     ///
     /// # Errors
-    /// The file is not a model.
+    /// An error if the file is not a model.
     pub(super) fn change_model(&mut self, path: &Path, device: &Device) -> Result<()> {
         *self = Self::new(Some(sdg_inputs::read_model(path, device)?), self.min_score);
         Ok(())
@@ -52,11 +52,11 @@ impl Searcher {
         self.model.as_ref()
     }
 
-    /// Searches a picture; `over_table` is its camera's pose, which is known for all pictures of a node or for none.
+    /// Searches a picture. `over_table` is the camera with its pose, which a node has for all pictures or for none.
     ///
     /// # Errors
-    /// There is no model, the model has no lengths although the camera is calibrated, or the picture's size differs
-    /// from the camera's.
+    /// An error if there is no model, if the model has no lengths although the camera is calibrated, or if the
+    /// picture's size differs from the camera's.
     pub(super) fn search(&mut self, picture: &Picture, over_table: Option<&CameraOverTable>) -> Result<Searched> {
         const NO_MODEL: &str = "no grasp model yet: start the node with one, or call the service teach";
         let perception = self.perception.as_mut().context(NO_MODEL)?;

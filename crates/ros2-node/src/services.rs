@@ -1,4 +1,4 @@
-//! The services: each with its full type, and as std_srvs/Trigger for clients without `sdg_interfaces`.
+//! The services, each with its full type, and also as std_srvs/Trigger for clients without `sdg_interfaces`.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -21,7 +21,7 @@ use crate::teaching::{Teach, TeachJob, Teaching};
 
 /// Default timeout for a picture.
 const DETECT_TIMEOUT: Duration = Duration::from_secs(5);
-/// Maximum timeout.
+/// Maximum timeout for a picture.
 const MAX_DETECT_TIMEOUT_SECS: f64 = 60.0;
 
 const TRIGGER: ServiceType = ServiceType { package: "std_srvs", name: "Trigger" };
@@ -89,7 +89,7 @@ struct Detecting {
 
 /// A change of the node's state by a service.
 pub(super) enum Change {
-    /// Detect with this model from now on.
+    /// Use this model for detection.
     UseModel(PathBuf),
 }
 
@@ -181,7 +181,7 @@ impl Services {
     fn answer_detection(&self, asker: Client, answer: Result<DetectResponse, String>) {
         let answer =
             answer.unwrap_or_else(|message| DetectResponse { success: false, message, ..DetectResponse::default() });
-        // A client that gets only yes or no asks whether the part is there.
+        // A Trigger only returns whether the part was found.
         let found = answer.success && !answer.detections.detections.is_empty();
         let message = answer.message.clone();
         self.detect.answer(asker, answer, found, message, &self.lines);
@@ -195,7 +195,7 @@ impl Services {
                 (_, None, _) => {
                     Err("no grasp model yet: start the node with one, or call the service teach".to_owned())
                 }
-                (_, _, true) => Err("a grasp is under way".to_owned()),
+                (_, _, true) => Err("a grasp is already running".to_owned()),
                 (Ok(request), Some(model), false) => {
                     grasping.begin(&request, model).map_err(|error| format!("{error:#}"))
                 }
@@ -220,7 +220,7 @@ impl Services {
     fn take_teachings(&mut self) {
         for (asker, request) in self.teach.requests(&self.lines) {
             let begun = match (asker, request, &self.trigger_teaching) {
-                _ if self.teaching.is_some() => Err("a teaching is under way".to_owned()),
+                _ if self.teaching.is_some() => Err("a teaching is already running".to_owned()),
                 (Client::Trigger(_), Ok(_), Some(job)) => Ok(Teaching::begin(job.clone(), &self.teach_with)),
                 (Client::Trigger(_), Ok(_), None) => {
                     Err("expected a node that was started with a demonstration and a file to teach".to_owned())

@@ -8,12 +8,12 @@ use sdg_ros2::dds::Qos;
 use crate::camera_pose::CameraPoseSource;
 use crate::teaching::{Teach, TeachJob};
 
-/// Whether the node must end, and an arm must stop.
+/// Returns whether the node must end and an arm must stop.
 pub type IsInterrupted = Arc<dyn Fn() -> bool + Send + Sync>;
 
 /// A node's settings.
 pub struct Settings {
-    /// The model for detection, until another is taught.
+    /// The model for detection, until another one is taught.
     pub model: Option<GraspModel>,
     /// Device of the models.
     pub device: Device,
@@ -29,7 +29,7 @@ pub struct Settings {
     pub is_compressed: bool,
     /// Quality of service of the picture subscription.
     pub picture_qos: Qos,
-    /// Teaches on a separate thread.
+    /// The function that teaches; it runs on a separate thread.
     pub teach: Arc<Teach>,
     /// The teaching of the Trigger service.
     pub trigger_teaching: Option<TeachJob>,

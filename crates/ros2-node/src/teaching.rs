@@ -14,9 +14,9 @@ use tempfile::TempPath;
 /// The inputs of a teaching.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TeachJob {
-    /// The photo, followed by a colon and its marks' file if that is elsewhere.
+    /// The photo, followed by a colon and the file of its marks if that is not beside the photo.
     pub photo: String,
-    /// The marks' file, if the request named or contained one.
+    /// The file of marks, if the request named or contained one.
     pub marks: Option<PathBuf>,
     /// The file to write.
     pub out: PathBuf,
@@ -26,13 +26,13 @@ pub struct TeachJob {
     pub seed: u64,
     /// Maximum time for training the network.
     pub time_budget: Option<Duration>,
-    /// Height of the marks over the table, if the camera's file is to be used.
+    /// Height of the marks above the table, if the camera file is to be used.
     pub mark_height_mm: Option<f64>,
-    /// Whether the node then detects with the model.
+    /// Whether the node then uses the model for detection.
     pub is_used: bool,
 }
 
-/// Teaches in the same way as the caller's own command, and writes the model.
+/// Teaches in the same way as the caller's command, and writes the model.
 pub type Teach = dyn Fn(&TeachJob) -> Result<()> + Send + Sync;
 
 impl TeachJob {
@@ -41,7 +41,7 @@ impl TeachJob {
     /// Default seed of a request.
     pub const DEFAULT_SEED: u64 = 1;
 
-    /// The job of a request, and the file of marks sent with it.
+    /// The job of a request, and the file with the marks that it contained.
     fn read(request: &TeachRequest) -> Result<(Self, Option<TempPath>)> {
         if request.photo_path.is_empty() || request.out_path.is_empty() {
             bail!("expected photo_path and out_path, found \"{}\" and \"{}\"", request.photo_path, request.out_path);
@@ -49,7 +49,7 @@ impl TeachJob {
         let brought = match request.annotation.as_str() {
             "" => None,
             text => {
-                // A new file with an unpredictable name: others may be able to write to the folder.
+                // The file is new and has an unpredictable name, because others may be able to write to the folder.
                 let mut file = tempfile::Builder::new().prefix("sdg-marks-").suffix(".json").tempfile()?;
                 file.write_all(text.as_bytes()).with_context(|| file.path().display().to_string())?;
                 Some(file.into_temp_path())
@@ -79,7 +79,7 @@ pub(super) struct Teaching {
     out: PathBuf,
     started: Instant,
     pub(super) is_used: bool,
-    /// The file of marks sent with the request; removed when dropped.
+    /// The file with the marks of the request; it is removed when dropped.
     _marks: Option<TempPath>,
 }
 
@@ -87,7 +87,7 @@ impl Teaching {
     /// Begins the teaching of a request.
     ///
     /// # Errors
-    /// The request is invalid.
+    /// An error for an invalid request.
     pub(super) fn of_request(request: &TeachRequest, teach: &Arc<Teach>) -> Result<Self> {
         let (job, marks) = TeachJob::read(request)?;
         Ok(Self { _marks: marks, ..Self::begin(job, teach) })
@@ -99,7 +99,7 @@ impl Teaching {
         Self { thread: Some(thread), out, started: Instant::now(), is_used, _marks: None }
     }
 
-    /// The model's file and the duration, or why there is no model; `None` while the teaching is running.
+    /// The model file and the duration, or the reason why there is no model; `None` while the teaching is running.
     pub(super) fn finished(&mut self) -> Option<Result<(PathBuf, f64), String>> {
         if !self.thread.as_ref().is_some_and(JoinHandle::is_finished) {
             return None;

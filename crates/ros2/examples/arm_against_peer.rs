@@ -1,7 +1,7 @@
-//! The arm behind ROS 2 with another implementation of the action server: prints one line for each test.
+//! Tests the ROS 2 arm against another implementation of the action server, and prints one line for each test.
 //!
-//! `make test-ros2` runs it with crates/ros2/tests/peers/arm_peer.py, which plays the arm: the peer chooses its
-//! reaction to the next goal by the motion's length.
+//! `make test-ros2` runs it with crates/ros2/tests/peers/arm_peer.py, which plays the arm and reacts to each goal in a
+//! fixed way.
 
 use std::time::{Duration, Instant};
 
@@ -19,7 +19,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arm = TrajectoryArm::connect(&mut node, ArmConfig::default(), Duration::from_secs(20))?;
     println!("connected, {}", arm.state()?.mode.name());
 
-    // The peer reaches this goal, aborts the next, refuses the third, and plays the fourth until it is cancelled.
+    // The peer reaches the first goal, aborts the second, refuses the third, and executes the fourth until it is
+    // cancelled.
     println!("first: {}", told(&follow(&mut arm, 0.1, Watch::default())));
     println!("feedback: {}", arm.num_feedback());
     println!("second: {}", told(&follow(&mut arm, 0.2, Watch::default())));
@@ -39,13 +40,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             if hand.is_grasping { "holds" } else { "holds nothing" }
         );
     }
-    // The peer now stops its joint states.
+    // The peer now stops sending joint states.
     std::thread::sleep(Duration::from_secs(2));
     println!("silent: {}", arm.state().map_or_else(|error| error.to_string(), |state| state.mode.name().to_owned()));
     Ok(())
 }
 
-/// Moves the last joint by this much from the arm's position, with the limits by which every motion is checked.
+/// Moves the last joint by `by_rad` from the arm's position, with the usual checks of every motion.
 fn follow(arm: &mut TrajectoryArm, by_rad: f64, watch: Watch) -> Result<(), RobotError> {
     let mut robot = Robot::new(arm, SafetyLimits::default(), watch);
     let start = robot.commanded()?;

@@ -1,7 +1,7 @@
-//! Passes messages of other implementations through our reader and writer: lines of `TYPE HEX` in, lines of hex or of
-//! `error: WHY` out.
+//! Passes messages of other implementations through this crate's reader and writer: reads lines `TYPE HEX`, and writes
+//! lines of hexadecimal digits or `error: WHY`.
 //!
-//! `make test-ros2` compares them with `rosbags`' bytes (crates/ros2/tests/peers/message_bytes.py).
+//! `make test-ros2` compares the output with the bytes of `rosbags` (crates/ros2/tests/peers/message_bytes.py).
 
 use std::io::{BufRead, Write};
 

@@ -5,23 +5,24 @@ use sdg_geometry::{PinholeCamera, PlumbBob};
 use crate::error::RosError;
 use crate::messages::{CameraInfo, Header};
 
-/// The first pixel's centre is (0, 0) in ROS and (0.5, 0.5) here.
+/// Centre of the first pixel in this project's convention; in ROS it is 0.
 const FIRST_CENTER_PX: f64 = 0.5;
-/// Focal lengths and centres that differ by more than this share of the picture belong to another camera.
+/// Largest difference of focal lengths and centres for the same camera, as a fraction of the picture's size.
 const MAX_DIFFERENCE: f64 = 0.01;
 
 fn refused(expected: impl Into<String>, found: impl ToString) -> RosError {
     RosError::CameraInfo { expected: expected.into(), found: found.to_string() }
 }
 
-/// The camera of a message, for unrectified pictures.
+/// Reads the camera of a message, for unrectified pictures.
 ///
 /// # Errors
-/// An uncalibrated camera, a lens that is not plumb_bob, binning and regions of interest.
+/// [`RosError::CameraInfo`] for an uncalibrated camera, a lens model other than plumb_bob, binning and regions of
+/// interest.
 pub fn read_camera_info(message: &CameraInfo) -> Result<PinholeCamera, RosError> {
     let CameraInfo { width, height, distortion_model, d, k, roi, .. } = message;
     if k[0] == 0.0 {
-        return Err(refused("a calibrated camera", "a camera matrix of zeros, as uncalibrated cameras send it"));
+        return Err(refused("a calibrated camera", "a camera matrix of zeros, which means an uncalibrated camera"));
     }
     if message.binning_x > 1 || message.binning_y > 1 {
         let found = format!("binning {} × {}", message.binning_x, message.binning_y);
@@ -60,15 +61,15 @@ pub fn read_camera_info(message: &CameraInfo) -> Result<PinholeCamera, RosError>
         .ok_or_else(|| refused("a camera matrix fx 0 cx 0 fy cy 0 0 1", format!("{k:?} for {width} × {height} pixels")))
 }
 
-/// Refuses a camera that differs from the one in a file: in picture size, or in intrinsics by more than a hundredth of
-/// the picture.
+/// Checks that a camera is the one in a file: that its picture size is the same, and that its intrinsics differ by at
+/// most a hundredth of the picture.
 ///
 /// # Errors
-/// The first difference.
+/// [`RosError::CameraInfo`] with the first difference.
 pub fn check_same_camera(of_file: &PinholeCamera, sent: &PinholeCamera) -> Result<(), RosError> {
     let size = |camera: &PinholeCamera| format!("{} × {} pixels", camera.width, camera.height);
     if (of_file.width, of_file.height) != (sent.width, sent.height) {
-        return Err(refused(format!("{}, as in the camera's file", size(of_file)), size(sent)));
+        return Err(refused(format!("{}, as in the camera file", size(of_file)), size(sent)));
     }
     let allowed = MAX_DIFFERENCE * f64::from(of_file.width.max(of_file.height));
     for (name, expected, found) in [
@@ -78,7 +79,7 @@ pub fn check_same_camera(of_file: &PinholeCamera, sent: &PinholeCamera) -> Resul
         ("cy", of_file.cy, sent.cy),
     ] {
         if (expected - found).abs() > allowed {
-            let expected = format!("{name} = {expected:.1} ± {allowed:.1} px, as in the camera's file");
+            let expected = format!("{name} = {expected:.1} ± {allowed:.1} px, as in the camera file");
             return Err(refused(expected, format!("{found:.1}")));
         }
     }
@@ -143,7 +144,7 @@ mod tests {
         let file = PinholeCamera::WRIST;
         let larger = PinholeCamera { width: 1280, height: 720, ..file };
         let error = check_same_camera(&file, &larger).unwrap_err().to_string();
-        assert_eq!(error, "camera_info: expected 640 × 480 pixels, as in the camera's file, found 1280 × 720 pixels");
+        assert_eq!(error, "camera_info: expected 640 × 480 pixels, as in the camera file, found 1280 × 720 pixels");
         check_same_camera(&file, &PinholeCamera { fx: 555.0, ..file }).unwrap();
         let error = check_same_camera(&file, &PinholeCamera { fy: 600.0, ..file }).unwrap_err().to_string();
         assert!(error.contains("fy = 550.0 ± 6.4 px") && error.contains("600.0"), "{error}");

@@ -1,8 +1,8 @@
 //! CDR, the encoding of messages on the network: plain XCDR1, as in every ROS 2 middleware.
 //!
-//! Numbers are aligned to their own size, counted from the message's start; texts contain their length and a final
-//! zero, sequences their number of elements, arrays neither. Messages come from the network and are not trusted: every
-//! length is compared with the available bytes before memory is allocated.
+//! Numbers are aligned to their own size, counted from the message's start. Texts consist of their length, their bytes
+//! and a final zero; sequences begin with their number of elements, arrays do not. Messages come from the network and
+//! are not trusted: every length is compared with the available bytes before memory is allocated.
 
 use std::fmt;
 
@@ -10,13 +10,13 @@ use std::fmt;
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("expected {expected} at byte {at} of {length}, found {found}")]
 pub struct CdrError {
-    /// The expected content.
+    /// The content that was expected.
     pub expected: String,
     /// The position, counted from the message's start.
     pub at: usize,
     /// The length of the message.
     pub length: usize,
-    /// The content found.
+    /// The content that was found.
     pub found: String,
 }
 
@@ -31,15 +31,15 @@ pub trait Cdr: Sized {
     /// Reads the value.
     ///
     /// # Errors
-    /// Bytes that are not such a value.
+    /// [`CdrError`] for bytes that are not such a value.
     fn read(from: &mut Reader<'_>) -> Result<Self, CdrError>;
 
-    /// Appends the elements of a sequence or an array; bytes in one copy.
+    /// Appends the elements of a sequence or an array; for bytes this is a single copy.
     fn write_all(values: &[Self], to: &mut Writer) {
         values.iter().for_each(|value| value.write(to));
     }
 
-    /// Reads this many elements; the reader has compared the number with the remaining bytes.
+    /// Reads `count` elements; the reader has compared the number with the remaining bytes.
     ///
     /// # Errors
     /// As for [`Cdr::read`].
@@ -48,7 +48,7 @@ pub trait Cdr: Sized {
     }
 }
 
-/// The whole message, little-endian, without the four bytes that name the encoding.
+/// Encodes a whole message, little-endian, without the four bytes that name the encoding.
 pub fn to_bytes(message: &impl Cdr) -> Vec<u8> {
     let mut writer = Writer::default();
     message.write(&mut writer);
@@ -58,7 +58,7 @@ pub fn to_bytes(message: &impl Cdr) -> Vec<u8> {
 /// Reads a little-endian message without the four bytes that name the encoding; further bytes are padding.
 ///
 /// # Errors
-/// Bytes that are not such a message.
+/// [`CdrError`] for bytes that are not such a message.
 pub fn from_bytes<T: Cdr>(bytes: &[u8]) -> Result<T, CdrError> {
     T::read(&mut Reader { bytes, at: 0 })
 }
@@ -75,7 +75,7 @@ impl Writer {
         self.bytes.extend_from_slice(&bytes);
     }
 
-    /// Writes a value as if it started one byte after an aligned position; only into an empty writer.
+    /// Writes a value with the alignment that it has one byte after an aligned position; the writer must be empty.
     pub(crate) fn shifted_by_one(&mut self, value: &impl Cdr) {
         let mut shifted = Self { bytes: vec![0] };
         value.write(&mut shifted);
@@ -83,7 +83,7 @@ impl Writer {
     }
 
     fn count(&mut self, count: usize) {
-        // Longer ones cannot occur here: messages have a far lower limit.
+        // The maximum size of messages is far below this limit.
         self.number(u32::try_from(count).unwrap_or(u32::MAX).to_le_bytes());
     }
 }
@@ -116,7 +116,7 @@ impl<'a> Reader<'a> {
         Ok(bytes)
     }
 
-    /// Reads a value that starts one byte after an aligned position.
+    /// Reads a value with the alignment that it has one byte after an aligned position.
     pub(crate) fn shifted_by_one<T: Cdr>(&mut self) -> Result<T, CdrError> {
         let left = self.bytes.get(self.at..).unwrap_or_default();
         let shifted = [&[0], left].concat();
@@ -124,7 +124,7 @@ impl<'a> Reader<'a> {
         T::read(&mut Reader { bytes: &shifted, at: 1 })
     }
 
-    /// A sequence's number of elements, at most what the remaining bytes can contain.
+    /// Reads a sequence's number of elements, which the remaining bytes must be able to contain.
     fn count(&mut self, min_bytes: usize) -> Result<usize, CdrError> {
         let count = u32::from_le_bytes(self.number("a sequence's length")?) as usize;
         let most = (self.bytes.len() - self.at) / min_bytes;
@@ -193,7 +193,7 @@ impl Cdr for String {
     const MIN_BYTES: usize = 4;
 
     fn write(&self, to: &mut Writer) {
-        // A zero ends a text at any position.
+        // A zero would end the text for the receiver, so that the rest is omitted.
         let text = self.split('\0').next().unwrap_or_default();
         to.count(text.len() + 1);
         to.bytes.extend_from_slice(text.as_bytes());
@@ -252,7 +252,7 @@ mod tests {
         0x0102_u16.write(&mut writer);
         true.write(&mut writer);
         1.0_f64.write(&mut writer);
-        // By hand: 7, a byte of padding, the u16, the bool, three bytes of padding, the f64 at 8.
+        // Computed by hand: 7, a byte of padding, the u16, the bool, three bytes of padding, and the f64 at byte 8.
         assert_eq!(writer.bytes, [7, 0, 2, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0xf0, 0x3f]);
     }
 
@@ -272,11 +272,11 @@ mod tests {
         assert_eq!(error.to_string(), "expected a sequence of at most 0 elements at byte 4 of 8, found 2147483647");
         let cut = from_bytes::<u32>(&[1, 2]).unwrap_err();
         assert_eq!(cut.to_string(), "expected 4 bytes of u32 at byte 0 of 2, found 2 bytes");
-        // Alignment leads beyond the end.
+        // The aligned position is beyond the end.
         assert!(from_bytes::<(u8, f64)>(&[1]).is_err());
     }
 
-    /// Two values, to test alignment.
+    /// A pair of values, for tests of alignment.
     impl<A: Cdr, B: Cdr> Cdr for (A, B) {
         const MIN_BYTES: usize = A::MIN_BYTES + B::MIN_BYTES;
 

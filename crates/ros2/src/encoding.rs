@@ -8,24 +8,24 @@ use crate::messages::{CompressedImage, Header, Image};
 
 /// Largest width or height in pixels.
 pub const MAX_SIDE: u32 = 1 << 14;
-/// Maximum number of bytes of a picture or of its message, 64 MiB: 21 megapixels of three bytes. RustDDS becomes slow
-/// far below this.
+/// Maximum number of bytes of a picture or its message, 64 MiB: 21 megapixels of three bytes. RustDDS is slow even for
+/// much smaller pictures.
 pub const MAX_BYTES: usize = 64 << 20;
 
 /// The layout of a message's pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Layout {
-    /// Bytes per pixel, and the positions of red, green and blue in them.
+    /// Bytes per pixel, and the positions of red, green and blue among them.
     Channels(usize, [usize; 3]),
-    /// Numbers of two bytes, of which the high one is used.
+    /// Numbers of two bytes, of which the high byte is used.
     Grey16,
-    /// Y0 U Y1 V.
+    /// Two pixels as the bytes Y0 U Y1 V.
     Yuyv,
-    /// U Y0 V Y1.
+    /// Two pixels as the bytes U Y0 V Y1.
     Uyvy,
 }
 
-/// Names as in `sensor_msgs/image_encodings.hpp`.
+/// The supported encodings, with their names in `sensor_msgs/image_encodings.hpp`.
 const LAYOUTS: [(&str, Layout); 14] = [
     ("rgb8", Layout::Channels(3, [0, 1, 2])),
     ("bgr8", Layout::Channels(3, [2, 1, 0])),
@@ -56,10 +56,10 @@ fn refused(expected: impl Into<String>, found: impl ToString) -> PictureError {
     PictureError { expected: expected.into(), found: found.to_string() }
 }
 
-/// A message's picture.
+/// Decodes the picture of a message.
 ///
 /// # Errors
-/// An unsupported encoding, an invalid size, and rows that do not match the bytes.
+/// [`PictureError`] for an unsupported encoding, an invalid size, and rows that do not match the bytes.
 pub fn read_image(message: &Image) -> Result<RgbImage, PictureError> {
     let Image { width, height, step, data, .. } = message;
     let Some((_, layout)) = LAYOUTS.iter().find(|(name, _)| *name == message.encoding) else {
@@ -109,10 +109,10 @@ pub fn read_image(message: &Image) -> Result<RgbImage, PictureError> {
     RgbImage::from_raw(*width, *height, pixels).ok_or_else(|| refused("as many pixels as its size states", "fewer"))
 }
 
-/// A compressed message's picture: JPEG or PNG, by its first bytes.
+/// Decodes the picture of a compressed message: JPEG or PNG, which is detected by the first bytes.
 ///
 /// # Errors
-/// Another format, and bytes that do not decode.
+/// [`PictureError`] for another format, and for bytes that cannot be decoded.
 pub fn read_compressed(message: &CompressedImage) -> Result<RgbImage, PictureError> {
     // image_transport's depth pictures have their own header before the PNG.
     if message.format.contains("compressedDepth") {
@@ -126,7 +126,7 @@ pub fn read_compressed(message: &CompressedImage) -> Result<RgbImage, PictureErr
     decode_picture(&message.data, PixelFrame::Sensor).map_err(|found| refused("a whole picture", found))
 }
 
-/// A picture as `rgb8`.
+/// Encodes a picture as `rgb8`.
 pub fn to_image(picture: &RgbImage, header: Header) -> Image {
     Image {
         header,
@@ -139,7 +139,7 @@ pub fn to_image(picture: &RgbImage, header: Header) -> Image {
     }
 }
 
-/// A picture as JPEG; `None` for one without pixels.
+/// Encodes a picture as JPEG; `None` for a picture without pixels.
 pub fn to_compressed(picture: &RgbImage, header: Header) -> Option<CompressedImage> {
     let mut data = std::io::Cursor::new(Vec::new());
     picture.write_to(&mut data, ImageFormat::Jpeg).ok()?;
@@ -174,7 +174,7 @@ mod tests {
 
     #[test]
     fn both_orders_of_yuv_are_the_same_picture() {
-        // Red of BT.601's bars.
+        // The red of BT.601's colour bars.
         let yuyv = read_image(&message("yuv422_yuy2", 2, 1, 4, &[81, 90, 81, 240])).unwrap();
         let uyvy = read_image(&message("yuv422", 2, 1, 4, &[90, 81, 240, 81])).unwrap();
         assert_eq!(yuyv, uyvy);

@@ -5,7 +5,7 @@ use crate::cdr::CdrError;
 /// Errors of this crate.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "the messages say what the fields are")]
+#[allow(missing_docs, reason = "the messages explain the fields")]
 pub enum RosError {
     /// Text that is not a valid name.
     #[error("a name of ROS: expected {expected}, found \"{found}\"")]
@@ -19,10 +19,10 @@ pub enum RosError {
     /// An unusable camera_info.
     #[error("camera_info: expected {expected}, found {found}")]
     CameraInfo { expected: String, found: String },
-    /// Frames without a connection, or with an outdated one.
+    /// Frames without a connection, or with an outdated transform.
     #[error("no transform from \"{source_frame}\" to \"{target_frame}\": {why}")]
     Transform { target_frame: String, source_frame: String, why: String },
-    /// The network.
+    /// The network reported an error.
     #[error("{what}: {why}")]
     Network { what: String, why: String },
 }
@@ -38,7 +38,7 @@ pub struct PictureError {
 }
 
 impl PictureError {
-    /// The received and the expected content: for faults of cameras, which expect a picture.
+    /// The received and the expected content as one text, for camera errors.
     #[cfg(feature = "dds")]
     pub(crate) fn found_in_words(&self) -> String {
         format!("{} where {} was expected", self.found, self.expected)

@@ -14,14 +14,15 @@ pub struct FoundPart {
     pub name: String,
     /// Score, 0 to 1; the threshold is 0.5.
     pub score: f64,
-    /// Upper left and lower right corner of its box, in pixels whose first centre is at (0.5, 0.5).
+    /// Upper left and lower right corner of the part's box, in pixels; the first pixel's centre is (0.5, 0.5).
     pub corners: [Point2<f64>; 2],
-    /// Pose of the tool centre point when closing, in the frame of the pictures' header or another, and the width of
-    /// the part between the fingers, m; `None` if the camera's pose is not known.
+    /// Pose of the tool centre point when the hand closes, and width of the part between the fingers, m; `None` if the
+    /// camera's pose is not known. The header of the published pose names its frame.
     pub grasp: Option<(Isometry3<f64>, f64)>,
 }
 
-/// Detections with the picture's stamp and frame. Pixels in ROS's convention: the first one's centre is (0, 0).
+/// Converts detections to a message with the picture's stamp and frame. Its pixels are in ROS's convention: the first
+/// pixel's centre is (0, 0).
 pub fn to_detections(header: &Header, found: &[FoundPart]) -> Detection2DArray {
     let detection = |part: &FoundPart| {
         let [from, to] = part.corners;
@@ -45,12 +46,12 @@ pub fn to_detections(header: &Header, found: &[FoundPart]) -> Detection2DArray {
     Detection2DArray { header: header.clone(), detections: found.iter().map(detection).collect() }
 }
 
-/// A part's grasp in the header's frame.
+/// A part's grasp as a pose in the header's frame.
 pub fn to_pose(header: &Header, frame_from_tcp: &Isometry3<f64>) -> PoseStamped {
     PoseStamped { header: header.clone(), pose: (*frame_from_tcp).into() }
 }
 
-/// The same as a frame of tf.
+/// A part's grasp as a frame of tf.
 pub fn to_transform(header: &Header, child: &str, frame_from_tcp: &Isometry3<f64>) -> TransformStamped {
     TransformStamped { header: header.clone(), child_frame_id: child.to_owned(), transform: (*frame_from_tcp).into() }
 }

@@ -4,7 +4,7 @@
 //! bytes ─ cdr ─ messages ─ encoding: pictures │ camera_info: PinholeCamera │ transforms: frames │ found: detections, poses
 //! feature dds:  Node ─ Subscription, Publisher, Server, ActionClient ─ RosCamera (camera's trait), TrajectoryArm (robot's trait)
 //! ```
-//! Data from the network are checked here, once: an invalid message causes a line of text, never a panic.
+//! This crate checks all data from the network: an invalid message causes an error text, never a panic.
 //!
 //! Not included: grasp models (crate `cli` connects them to the node), big-endian peers, ROS 2 itself.
 //!

@@ -1,10 +1,10 @@
-//! Names of topics, services and actions as ROS users write them: relative, private, absolute, and remapped.
+//! Names of topics, services and actions in the notation of ROS: relative, private, absolute, and remapped.
 
 use std::fmt;
 
 use crate::error::RosError;
 
-/// A node's name and namespace, and the replacements of its names.
+/// A node's name, namespace and remappings.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Naming {
     namespace: String,
@@ -12,12 +12,12 @@ pub struct Naming {
     remappings: Vec<Remapping>,
 }
 
-/// `FROM:=TO`.
+/// A remapping, `FROM:=TO`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Remapping {
-    /// A name in the node, or `__node`, `__ns`.
+    /// A name of the node, `__node` or `__ns`.
     pub from: String,
-    /// Its replacement.
+    /// The replacement of the name.
     pub to: String,
 }
 
@@ -41,10 +41,10 @@ impl fmt::Display for Remapping {
 }
 
 impl Naming {
-    /// A node's own name and namespace, which `__node` and `__ns` in the remappings replace.
+    /// Creates the naming of a node. `__node` and `__ns` in the remappings replace its name and namespace.
     ///
     /// # Errors
-    /// An invalid name, and a remapping with invalid sides.
+    /// [`RosError::Name`] for an invalid name or remapping.
     pub fn new(namespace: &str, node: &str, remappings: &[Remapping]) -> Result<Self, RosError> {
         let (mut namespace, mut node) = (namespace.to_owned(), node.to_owned());
         let mut names = Vec::new();
@@ -79,10 +79,10 @@ impl Naming {
         &self.node
     }
 
-    /// A name's absolute form, after the remappings: the first that matches counts.
+    /// The absolute form of a name after remapping; the first matching remapping is used.
     ///
     /// # Errors
-    /// An invalid name.
+    /// [`RosError::Name`] for an invalid name.
     pub fn resolve(&self, name: &str) -> Result<String, RosError> {
         let absolute = self.expand(name)?;
         for Remapping { from, to } in &self.remappings {
@@ -93,7 +93,7 @@ impl Naming {
         Ok(absolute)
     }
 
-    /// Before the remappings.
+    /// The absolute form of a name before remapping.
     fn expand(&self, name: &str) -> Result<String, RosError> {
         let absolute = match name.strip_prefix('~') {
             Some("") => format!("{}/{}", self.namespace, self.node),
@@ -102,7 +102,7 @@ impl Naming {
             None if name.starts_with('/') => name.to_owned(),
             None => format!("{}/{name}", self.namespace),
         };
-        // The first part is the text before the first slash.
+        // The first token, before the first slash, is empty.
         absolute.split('/').skip(1).try_for_each(|token| check_token(token, name))?;
         Ok(absolute)
     }
@@ -112,7 +112,7 @@ fn refused(expected: &str, found: &str) -> RosError {
     RosError::Name { expected: expected.to_owned(), found: found.to_owned() }
 }
 
-/// A part of a name between slashes.
+/// Checks a part of a name between slashes.
 fn check_token(token: &str, name: &str) -> Result<(), RosError> {
     let mut characters = token.chars();
     let begins = characters.next().is_some_and(|first| first.is_ascii_alphabetic() || first == '_');

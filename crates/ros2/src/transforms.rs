@@ -1,7 +1,7 @@
-//! tf: transforms between frames over the last seconds.
+//! tf: the transforms between frames over the last seconds.
 //!
 //! ```text
-//! /tf, /tf_static ─ TfMessage ─ Transforms: of each frame its parent, and when it was where in it ─ target_from_source at a time
+//! /tf, /tf_static ─ TfMessage ─ Transforms: each frame's parent, and its poses in the parent over time ─ target_from_source at a time
 //! ```
 
 use std::collections::{HashMap, VecDeque};
@@ -13,14 +13,14 @@ use crate::messages::{TfMessage, Time};
 
 /// Length of the stored history of a frame, s.
 const HISTORY_SECS: f64 = 10.0;
-/// Maximum number of its poses: 10 s at 400 Hz.
+/// Maximum number of stored poses of a frame: 10 s at 400 Hz.
 const MAX_POSES: usize = 4000;
-/// More frames than any cell has, as a limit for data from the network.
+/// Maximum number of frames, as a limit for data from the network; no cell has as many.
 const MAX_FRAMES: usize = 2000;
-/// Longer chains have a loop.
+/// Maximum length of a chain of frames; a longer chain contains a loop.
 const MAX_DEPTH: usize = 100;
 
-/// The transforms.
+/// The known transforms between frames.
 #[derive(Debug, Clone)]
 pub struct Transforms {
     frames: HashMap<String, Placed>,
@@ -36,12 +36,12 @@ struct Placed {
 #[derive(Debug, Clone)]
 enum Motion {
     Static(Isometry3<f64>),
-    /// Seconds and parent_from_child, the oldest first.
+    /// Time in seconds and `parent_from_child`, the oldest first.
     Moving(VecDeque<(f64, Isometry3<f64>)>),
 }
 
 impl Transforms {
-    /// Without any transform. A moving frame's last pose is valid for this many seconds before and after its time.
+    /// Starts without transforms. The pose of a moving frame is valid for `max_age_secs` before and after its time.
     pub fn new(max_age_secs: f64) -> Self {
         Self { frames: HashMap::new(), max_age_secs }
     }
@@ -87,10 +87,10 @@ impl Transforms {
         true
     }
 
-    /// The pose of a frame in another at a time.
+    /// `target_from_source` at a time.
     ///
     /// # Errors
-    /// Frames without a connection, and a pose that is too old or too new for the time.
+    /// [`RosError::Transform`] for frames without a connection, and for a pose that is too old or too new for the time.
     pub fn lookup(&self, target: &str, source: &str, time: Time) -> Result<Isometry3<f64>, RosError> {
         let refused =
             |why: String| RosError::Transform { target_frame: target.into(), source_frame: source.into(), why };
@@ -103,8 +103,8 @@ impl Transforms {
             };
             let unknown = [source, target].into_iter().find(|frame| !is_known(frame));
             return Err(refused(match unknown {
-                Some(frame) => format!("nothing was heard of \"{frame}\" on /tf and /tf_static"),
-                None => "nothing connects them".to_owned(),
+                Some(frame) => format!("no transform of \"{frame}\" was received on /tf and /tf_static"),
+                None => "the frames are not connected".to_owned(),
             }));
         };
         let common_from = |frames: &[String]| {
@@ -150,7 +150,7 @@ impl Transforms {
                 Ok(between.unwrap_or(if share < 0.5 { *pose } else { *next }))
             }
             (Some((known, pose)), None) | (None, Some((known, pose))) => stale(*known).map_or(Ok(*pose), Err),
-            (None, None) => Err(format!("nothing is known of \"{frame}\"")),
+            (None, None) => Err(format!("no pose of \"{frame}\" is known")),
         }
     }
 }
@@ -212,10 +212,10 @@ mod tests {
         );
         assert!(transforms.lookup("base", "camera", at(9.0)).unwrap_err().to_string().contains("after the picture"));
         let error = transforms.lookup("base", "lidar", at(10.0)).unwrap_err().to_string();
-        assert!(error.contains("nothing was heard of \"lidar\""), "{error}");
+        assert!(error.contains("no transform of \"lidar\" was received"), "{error}");
         let mut apart = known();
         apart.add(&transform("map", "odom", 0.0, along(0.0, 0.0)), true);
-        assert!(apart.lookup("odom", "hand", at(10.0)).unwrap_err().to_string().contains("nothing connects them"));
+        assert!(apart.lookup("odom", "hand", at(10.0)).unwrap_err().to_string().contains("frames are not connected"));
     }
 
     #[test]
@@ -226,7 +226,7 @@ mod tests {
         bad.transforms[0].transform = Default::default();
         assert_eq!(transforms.add(&bad, false), 1, "a quaternion of zeros");
         assert_eq!(transforms.add(&transform("a", "a", 0.0, along(0.0, 0.0)), true), 1);
-        // A loop ends.
+        // The search ends in spite of the loop.
         transforms.add(&transform("hand", "base", 10.0, along(0.0, 0.0)), false);
         assert!(transforms.lookup("base", "lidar", at(10.0)).is_err());
         for frame in 0..3000 {

@@ -1,4 +1,4 @@
-//! A Panda on the network without `sdg`: `fci_server IP [lockstep]`, until standard input ends.
+//! Serves a simulated Panda on the network, without `sdg`, until standard input ends: `fci_server IP [lockstep]`.
 
 use std::io::Read;
 

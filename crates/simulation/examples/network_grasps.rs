@@ -2,8 +2,8 @@
 //!
 //! `cargo run --release -p sdg-simulation --example network_grasps [lockstep|realtime] [ATTEMPTS] [PART]…`
 //!
-//! Ends with an error if other attempts hold in lockstep than in one process, or if in real time more than 5 of 240
-//! fewer hold.
+//! Ends with an error if an attempt in lockstep and the same one in one process differ in whether the part is held, or
+//! if in real time more than 5 of 240 fewer attempts hold the part.
 
 use sdg_fci::server::Pace;
 use sdg_robot::{GraspConfig, GraspOutcome, Robot, Watch, grasp};
@@ -23,7 +23,8 @@ fn cell(spec: &ObjectSpec, seed: u64) -> sdg_simulation::Result<Workcell> {
     Ok(cell)
 }
 
-/// Over the network: whether the part is held according to the hand and in truth, and the reason if not.
+/// Runs an attempt over the network. Returns whether the part is held by the hand's verdict and in the simulation, and
+/// the reason if it is not.
 fn over_network(cell: Workcell, pace: Pace) -> Result<(bool, bool, String), Box<dyn std::error::Error>> {
     let (server, positions) = network::serve(&cell, pace);
     let mount = cell.wrist_camera();

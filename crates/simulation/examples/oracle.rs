@@ -31,8 +31,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             successes += 1;
         }
         for (step, why) in &report.hand_verdicts {
-            // The last verdict is right if it agrees with the outcome of the grasp; the earlier ones are right if the
-            // part was held.
+            // The last verdict must agree with the outcome of the grasp; the earlier ones must say that the part is
+            // held.
             let is_last = Some(step) == report.hand_verdicts.last().map(|(step, _)| step);
             if why.is_none() != (!is_last || report.outcome.is_held()) {
                 println!("{name} seed {seed}: after {step} the hand says {why:?}, the truth {:?}", report.outcome);

@@ -1,4 +1,4 @@
-//! Renders the arm in its ready pose from outside and through the wrist camera.
+//! Renders the arm in its ready pose by an outside camera and by the wrist camera.
 //!
 //! `cargo run --release -p sdg-simulation --example panda FOLDER`
 

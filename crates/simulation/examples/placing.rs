@@ -1,13 +1,14 @@
-//! Places parts in a tray, and grasps from a table that is higher than the given height, with true poses instead of
+//! Places parts in a tray, and grasps parts on a table that is higher than the given height, with true poses instead of
 //! pictures and 1 Nm of friction per joint.
 //!
 //! ```text
-//! placing tray process|lockstep [PART [CELLS [X Y]]]      spring_clip 20 100 55: a part into each cell, X by Y mm from one to the next;
-//!                                                         those that lie stay in the scene
-//! placing heights process|lockstep [ATTEMPTS [SEED [PART]…]]   10 101: each part softly and in joint positions, the table 5 mm higher
+//! placing tray process|lockstep [PART [CELLS [X Y]]]      spring_clip 20 100 55: a part into each cell, at a pitch of X by Y mm;
+//!                                                         placed parts stay in the scene
+//! placing heights process|lockstep [ATTEMPTS [SEED [PART]…]]   10 101: each part compliantly and in joint positions, the table 5 mm higher
 //! ```
-//! Ends with an error if a part is dropped, lies more than 3 mm or 3° beside its cell, or moves another; or if fewer
-//! than 8 of 10 soft grasps hold, or press with more than 10 N at rest or 25 N at first.
+//! Ends with an error if a part is dropped, lies more than 3 mm or 3° beside its cell, or moves another part. Also ends
+//! with an error if fewer than 8 of 10 compliant grasps hold the part, or if they press with more than 10 N at rest or
+//! a peak of more than 25 N.
 
 use std::error::Error;
 
@@ -30,7 +31,7 @@ const MAX_MOVED_M: f64 = 0.5e-3;
 const MAX_OVER_REST_M: f64 = 0.005;
 const MAX_STATIC_N: f64 = 10.0;
 const MAX_PEAK_N: f64 = 25.0;
-/// Parts of the paper that a hand 5 mm too high can still hold.
+/// The paper's parts that the hand still holds if it grasps 5 mm too high.
 const PARTS: [&str; 4] = ["pendulum", "fuel_line", "rod_end", "common_line"];
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -78,7 +79,7 @@ fn fill_tray(at: Where, rest: &[&str]) -> Result<(), Box<dyn Error>> {
         num_right += u32::from(is_right);
         num_again += looks.saturating_sub(1);
         worst = (worst.0.max(distance_mm), worst.1.max(angle_deg));
-        // A part that stayed in the hand does not lie.
+        // A part that stayed in the hand is not an obstacle on the table.
         if placed.base_from_object.translation.z < spec.rest_height_m + MAX_OVER_REST_M {
             lying.push(placed.base_from_object);
         }

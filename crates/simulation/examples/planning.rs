@@ -4,8 +4,8 @@
 //! - `rate`: configurations that the collision model checks per second on one core.
 //! - `proof`: plans COUNT problems, times each plan at Franka's full limits, and follows the motion in MuJoCo at steps
 //!   of 1 ms: collisions; velocity, acceleration, jerk by differences, and torque by MuJoCo's inverse dynamics, as
-//!   shares of the limits; the tcp's speed and acceleration; the additional time with a stop at every waypoint, and the
-//!   time saved without a jerk limit.
+//!   fractions of the limits; the tcp's speed and acceleration; the additional time with a stop at every waypoint, and
+//!   the time saved without a jerk limit.
 //!
 //! - `checks`: configurations that the search checks before it reaches one given configuration of the goal, before
 //!   shortening; other planners are measured in the same way (benches/peers/ompl_planning.py).
@@ -13,11 +13,12 @@
 //!   repeated with other seeds, more searches, and a hundred times the attempts to shorten. COUNT (50) problems whose
 //!   goal no straight motion reaches.
 //!
-//!   The first two are timed by the clock and by the thread's processor time from Linux, which other programs on the
-//!   machine do not change.
-//! - `serve`: answers collision checks on standard input, for other planners (benches/peers/ompl_planning.py): a
-//!   problem's seed as u64 (u64::MAX ends), answered by start and goal configuration (14 f64); then any number of
-//!   configurations (7 f64), each answered by a byte (1 free), until seven NaN. Little-endian.
+//! `rate` and `proof` are timed by the clock and by the thread's processor time from Linux, which does not depend on
+//! other programs on the machine.
+//! - `serve`: answers collision checks on standard input, for other planners (benches/peers/ompl_planning.py). The
+//!   input is a problem's seed as u64 (u64::MAX ends the program), which is answered by the start and goal
+//!   configurations (14 f64). Then follow any number of configurations (7 f64), each answered by a byte (1 is free),
+//!   until a configuration of seven NaN. All numbers are little-endian.
 
 use std::error::Error;
 use std::io::{Read, Write};
@@ -46,7 +47,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
 }
 
-/// The clock, and the processor's time of this thread.
+/// Measures time by the clock and by this thread's processor time.
 struct Stopwatch {
     started: Instant,
     processor_ms: f64,
@@ -57,7 +58,7 @@ impl Stopwatch {
         Self { started: Instant::now(), processor_ms: processor_ms() }
     }
 
-    /// By the clock and by the processor, ms.
+    /// Time by the clock and by the processor, ms.
     fn elapsed_ms(&self) -> [f64; 2] {
         [self.started.elapsed().as_secs_f64() * 1e3, processor_ms() - self.processor_ms]
     }
@@ -71,7 +72,7 @@ fn processor_ms() -> f64 {
         .map_or(f64::NAN, |nanoseconds| nanoseconds * 1e-6)
 }
 
-/// Random configurations among eight obstacles.
+/// Measures the rate of collision checks of random configurations among eight obstacles.
 fn rate() -> Result<(), Box<dyn Error>> {
     const COUNT: usize = 200_000;
     let problem =
@@ -92,7 +93,7 @@ fn rate() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// The largest shares of limits at every millisecond.
+/// The largest fraction of each limit over all milliseconds of a motion.
 #[derive(Debug, Default)]
 struct Shares {
     largest: [f64; 7],
@@ -145,13 +146,14 @@ struct Bent {
     num_corners: usize,
     num_stops: usize,
     secs: Vec<f64>,
-    /// The motion's duration divided by that with a stop at every waypoint, and by that without a jerk limit.
+    /// Duration of the motion divided by the duration with a stop at every waypoint.
     over_stopping: Vec<f64>,
+    /// Duration divided by the duration without a jerk limit.
     over_jerkless: Vec<f64>,
-    /// Divided by the duration with the largest corners that fit on the straight parts, even if they collide.
+    /// Duration divided by the duration with the largest corners that fit on the straight parts, even if they collide.
     over_largest_corners: Vec<f64>,
-    /// Divided by the duration with a stop at every waypoint within only the joints' velocities, accelerations and
-    /// jerks.
+    /// Duration divided by the duration with a stop at every waypoint and only the joints' velocity, acceleration and
+    /// jerk limits.
     over_point_to_point: Vec<f64>,
 }
 
@@ -238,7 +240,7 @@ fn proof(count: u64, first_seed: u64) -> Result<(), Box<dyn Error>> {
         all_checks.push(plan.num_checks as f64);
         let watch = Stopwatch::start();
         let motions = plan.trajectories(&limits, &CartesianLimits::panda(), &dynamics)?;
-        // Linux may count processor time in steps longer than this; the sum is right.
+        // Linux may count processor time in steps longer than one timing; the sum is still correct.
         let [clock_ms, processor_ms] = watch.elapsed_ms();
         timing_millis.push(clock_ms);
         timing_processor_ms += processor_ms;
@@ -288,7 +290,7 @@ fn proof(count: u64, first_seed: u64) -> Result<(), Box<dyn Error>> {
 
 fn checks(count: u64, first_seed: u64) -> Result<(), Box<dyn Error>> {
     let panda = ArmGeometry::panda();
-    // One search: further ones look for shorter paths after the count has ended.
+    // Only one search: further searches look for shorter paths and are not counted.
     let mut options = PlanOptions::default();
     options.num_searches = 1;
     let mut checks = Vec::new();
@@ -313,7 +315,7 @@ fn checks(count: u64, first_seed: u64) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Limits violated by a larger share are reported.
+/// Largest excess over a limit that is not reported, as a fraction of the limit.
 const MAX_EXCESS: f64 = 1e-3;
 
 fn length(count: u64, first_seed: u64, seconds: u64) -> Result<(), Box<dyn Error>> {

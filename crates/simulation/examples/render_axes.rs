@@ -1,9 +1,9 @@
-//! Draws pictures of all axes of some parts, with the truth marked, onto one sheet per part, for inspection.
+//! Renders pictures of all axes of some parts, with the ground truth marked, onto one sheet per part, for inspection.
 //!
 //! `cargo run --release -p sdg-simulation --example render_axes FOLDER [SEED [PART …]]`
 //!
 //! Writes `PART.png` into FOLDER, with a row per axis, mild to hard from left to right, and prints each picture's
-//! parameter, the visible share of each instance, and the drawing time.
+//! parameter, the visible fraction of each instance, and the rendering time.
 
 use std::fs;
 use std::path::PathBuf;
@@ -15,8 +15,9 @@ use nalgebra::{Point2, Vector2};
 use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::views::{Axis, AxisView, PICTURES_PER_AXIS, axis_view};
 
-/// Pictures of each axis on the sheet, and their width there in pixels.
+/// Number of pictures of each axis on the sheet.
 const COLUMNS: u64 = 5;
+/// Width of a picture on the sheet, in pixels.
 const WIDTH: u32 = 400;
 const HEIGHT: u32 = 300;
 
@@ -35,7 +36,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         for (row, axis) in Axis::ALL.into_iter().enumerate() {
             let started = Instant::now();
             for column in 0..COLUMNS {
-                // Odd and even numbers alternate.
+                // Both odd and even numbers are shown.
                 let number = (column * (PICTURES_PER_AXIS - 1) / (COLUMNS - 1)).min(PICTURES_PER_AXIS - 1);
                 let shown = axis_view(&spec, axis, number, seed)?;
                 let shares: Vec<String> =

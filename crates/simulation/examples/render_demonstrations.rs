@@ -2,8 +2,8 @@
 //!
 //! `cargo run --release -p sdg-simulation --example render_demonstrations [FOLDER [CHECK_FOLDER]]`
 //!
-//! The pendulum is annotated in LabelMe's format, the others in COCO's, so that both formats are used. With
-//! a second folder, the annotations are also drawn over enlarged pictures there, to be checked by eye.
+//! The pendulum is annotated in LabelMe's format, the other parts in COCO's, so that both formats are used. If a second
+//! folder is given, it gets enlarged pictures with the annotations drawn on them, for inspection.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -47,7 +47,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// A tenth of a pixel, as annotation tools write it.
+/// Rounds to a tenth of a pixel, as annotation tools do.
 fn tenth(value: f64) -> f64 {
     (value * 10.0).round() / 10.0
 }

@@ -1,10 +1,11 @@
-//! Makes the look-alikes of every shipped part: a folder for each, and one sheet with all of them beside their part.
+//! Creates the look-alikes of every shipped part: a folder for each look-alike, and one sheet that shows all of them
+//! beside their part.
 //!
 //! `cargo run --release -p sdg-simulation --example render_look_alikes [FOLDER [PART …]]`
 //!
 //! FOLDER (`look_alikes` by default) gets `PART/KIND/` with files for `ObjectSpec::from_folder`, and `look_alikes.png`
-//! with a row per part: from left to right the part, its mirror image (empty where that equals the part), three with a
-//! feature moved, and the sizes 0.8, 0.9, 1.1 and 1.25.
+//! with a row per part: from left to right the part, its mirror image (empty if that equals the part), three
+//! look-alikes with a moved feature, and the sizes 0.8, 0.9, 1.1 and 1.25.
 
 use std::path::PathBuf;
 
@@ -78,7 +79,7 @@ fn picture(spec: &ObjectSpec, scale_m: f64) -> Result<RgbImage, Box<dyn std::err
     Ok(resize(&cut, SIDE, SIDE, FilterType::CatmullRom))
 }
 
-/// Side of a part's pictures, in metres, so that the largest look-alike fits.
+/// Side of a part's pictures, in metres; the largest look-alike fits into it.
 fn scale_m(spec: &ObjectSpec) -> f64 {
     let distances = spec.footprint.iter().flat_map(|a| spec.footprint.iter().map(move |b| (a - b).norm()));
     1.3 * distances.fold(0.0, f64::max)

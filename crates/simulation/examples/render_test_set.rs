@@ -1,9 +1,10 @@
-//! Draws test images of a part: unseen poses, changed light, other tables, distractors; and scenes without the part.
+//! Renders test images of a part with new poses, changed light, other tables and distractors, and scenes without the
+//! part.
 //!
 //! `cargo run --release -p sdg-simulation --example render_test_set OBJECT COUNT SEED FOLDER`
 //!
-//! Writes `with_000.png …`, `without_000.png …` and `truth.json` into FOLDER. A line of `truth.json` is an image:
-//! its file, and for the images with the part the grasp in pixels and in the base frame.
+//! Writes `with_000.png …`, `without_000.png …` and `truth.json` into FOLDER. Each line of `truth.json` describes an
+//! image: its file, and for images with the part the grasp in pixels and in the base frame.
 
 use std::fs;
 use std::path::PathBuf;

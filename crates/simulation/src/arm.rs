@@ -14,19 +14,20 @@ use crate::workcell::Workcell;
 
 type Result<T> = sdg_robot::Result<T>;
 
-/// Minimum distance of a joint from its reference that means a blocked arm, in radians.
+/// Distance of a joint from its reference above which the arm counts as blocked, in radians.
 const BLOCKED_RAD: f64 = 0.03;
 /// Interval of checks of a closing hand, in seconds.
 const HAND_PERIOD_SECS: f64 = 0.05;
-/// Fingers that do not move for this time have closed, in seconds.
+/// Time without movement after which the fingers count as closed, in seconds.
 const HAND_STILL_SECS: f64 = 0.2;
 /// Movement between two checks below which fingers count as not moving, in metres.
 const HAND_STILL_M: f64 = 1e-4;
-/// Up to 0.04 m of each finger at 0.05 m/s, and time for the force to build up.
+/// Maximum duration of a motion of the hand, in seconds: up to 0.04 m of each finger at 0.05 m/s, and time for the
+/// force to increase.
 const MAX_HAND_SECS: f64 = 1.6;
 /// Tolerance of the hand's opening, in metres.
 const HAND_THERE_M: f64 = 1e-3;
-/// Minimum share of the force of a pressing hand.
+/// Fraction of the commanded force above which the hand counts as pressing.
 const PRESSING_SHARE: f64 = 0.8;
 /// Error of the state in a jump fault, in radians.
 const JUMP_RAD: f64 = 1.0;
@@ -67,7 +68,7 @@ impl Workcell {
         self.observe_moving(watch)
     }
 
-    /// Shows the state of a cycle to `watch`; the arm may stop itself.
+    /// Passes the state of a cycle to `watch`; the arm may stop itself.
     pub(crate) fn observe_moving(&mut self, watch: &mut Watch) -> Result<Option<StopReason>> {
         if self.fault() == Some(ArmFaultKind::Reflex) && !self.is_in_reflex {
             self.is_in_reflex = true;
@@ -183,8 +184,8 @@ impl Arm for Workcell {
         Ok(())
     }
 
-    /// Control of joint positions needs no load: at its stiffness a part costs a fraction of a millimetre. Torque
-    /// control needs it.
+    /// Stores the load for torque control. Position control does not need it: at its stiffness a part causes an error
+    /// of a fraction of a millimetre.
     fn set_load(&mut self, load: Load) -> Result<()> {
         self.load = load;
         Ok(())

@@ -21,7 +21,7 @@ const SHAKE_SECS: f64 = 1.0;
 /// A hand that swings along a horizontal line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shake {
-    /// Amplitude, in metres; less if the arm's limits require it.
+    /// Amplitude, in metres; reduced if the arm's limits require it.
     pub amplitude_m: f64,
     /// Frequency, Hz.
     pub frequency_hz: f64,
@@ -47,7 +47,7 @@ pub enum ArmFaultKind {
 /// A fault of the arm from a given time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ArmFault {
-    /// Its start, in seconds of simulated time.
+    /// Start of the fault, in seconds of simulated time.
     pub at_secs: f64,
     /// Kind of the fault.
     pub kind: ArmFaultKind,
@@ -58,14 +58,14 @@ pub struct ArmFault {
 pub struct AttemptErrors {
     /// The error of the camera pose given to perception, in the camera's own frame.
     pub camera_from_assumed: Option<Isometry3<f64>>,
-    /// Sliding friction of the pads. They then lose their priority: MuJoCo takes the larger of the pad's and the part's.
+    /// Sliding friction of the pads. The pads then have no priority, so that MuJoCo uses the larger friction of pad and
+    /// part.
     pub pad_friction: Option<f64>,
     /// The arm's motion between lifting and holding.
     pub shake: Option<Shake>,
     /// The arm's fault.
     pub arm_fault: Option<ArmFault>,
-    /// Dry friction in every joint while the arm is driven by torques, N·m. Its control of joint positions compensates
-    /// it.
+    /// Dry friction in every joint while the arm is driven by torques, N·m; position control compensates friction.
     pub joint_friction_nm: f64,
 }
 
@@ -84,7 +84,7 @@ impl AttemptErrors {
         Self { pad_friction: Some(rng.random_range(PAD_FRICTIONS)), ..Self::default() }
     }
 
-    /// A hand shaken for a second after lifting: 20 to 30 mm to either side, at 2 to 3 Hz.
+    /// A hand that is shaken for a second after lifting, by 20 to 30 mm to each side, at 2 to 3 Hz.
     pub fn shake(seed: u64) -> Self {
         let rng = &mut Pcg64Mcg::seed_from_u64(seed ^ 0x5348_414b_4531_3233);
         let shake = Shake {

@@ -1,7 +1,7 @@
 //! A camera of the model in the project's conventions: a picture with the camera's pose in the world.
 //!
-//! MuJoCo's camera frame has x right, y up and looks along -z; the optical frame used everywhere
-//! else has x right, y down and looks along z. The two differ by half a turn about x.
+//! MuJoCo's camera frame has x right, y up and looks along -z; the optical frame used everywhere else has x right, y
+//! down and looks along z. The two differ by a rotation of 180° about x.
 
 use std::f64::consts::PI;
 
@@ -17,7 +17,7 @@ use crate::render::Renderer;
 /// Focal length of the wrist camera in pixels, as in the paper.
 pub const WRIST_FOCAL_LENGTH_PX: f64 = 550.0;
 
-/// A picture and the camera that took it, posed in the world (the robot's base frame).
+/// A picture and its camera with its pose in the world (the robot's base frame).
 #[derive(Debug, Clone, PartialEq)]
 pub struct CameraView {
     /// The picture.
@@ -30,14 +30,14 @@ impl CameraView {
     /// Takes a picture with a camera of the model, in the present state of `data`.
     ///
     /// # Errors
-    /// As [`Renderer::image`].
+    /// As for [`Renderer::image`].
     pub fn capture(renderer: &mut Renderer, data: &mut Data, camera: Id<Camera>) -> Result<Self> {
         let image = renderer.image(data, camera)?;
         Ok(Self { image, camera: posed_camera(renderer, data, camera) })
     }
 }
 
-/// A model camera with the intrinsics that the renderer's picture size gives it.
+/// Pose and intrinsics of a camera of the model for the renderer's picture size.
 pub fn posed_camera(renderer: &Renderer, data: &Data, camera: Id<Camera>) -> PosedCamera {
     let (width, height) = (renderer.config().width, renderer.config().height);
     let focal_px = 0.5 * f64::from(height) / (0.5 * data.model().vertical_field_of_view_rad(camera)).tan();
@@ -47,12 +47,13 @@ pub fn posed_camera(renderer: &Renderer, data: &Data, camera: Id<Camera>) -> Pos
     }
 }
 
-/// The vertical field of view, in radians, for which a picture has a focal length.
+/// The vertical field of view, in radians, of a picture with a given focal length and height.
 pub fn vertical_field_of_view_rad(focal_px: f64, height_px: u32) -> f64 {
     2.0 * (0.5 * f64::from(height_px) / focal_px).atan()
 }
 
-/// From MuJoCo's camera frame to the optical one, or back: half a turn is its own inverse.
+/// The transform between MuJoCo's camera frame and the optical frame. It is a rotation by 180° and thus its own
+/// inverse.
 pub(crate) fn optical_from_mujoco_camera() -> Isometry3<f64> {
     Isometry3::from_parts(Translation3::identity(), UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI))
 }

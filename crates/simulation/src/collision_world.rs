@@ -1,5 +1,5 @@
-//! MuJoCo's own collisions of every shape of the arm with itself and with obstacles: the reference for the
-//! collision model of `sdg-kinematics`.
+//! MuJoCo's collisions of all shapes of the arm with each other and with obstacles, as a reference for the collision
+//! model of `sdg-kinematics`.
 
 use std::sync::Arc;
 
@@ -21,10 +21,10 @@ pub struct Overlap {
     pub depth_m: f64,
 }
 
-/// The simulated Panda among obstacles, without time.
+/// The simulated Panda among obstacles, without dynamics.
 ///
-/// All visible shapes of the arm collide with each other and with the obstacles; the simpler collision shapes of
-/// attempts collide with the obstacles.
+/// All visible shapes of the arm collide with each other and with the obstacles; the simpler collision shapes of grasp
+/// attempts collide with the obstacles only.
 pub struct CollisionWorld {
     data: Data,
     ids: PandaIds,
@@ -40,9 +40,9 @@ impl CollisionWorld {
     /// The arm with its fingers at an opening (m), among obstacles.
     ///
     /// # Errors
-    /// As [`Model::from_xml`].
+    /// As for [`Model::from_xml`].
     pub fn new(obstacles: &[Obstacle], opening_m: f64) -> Result<Self> {
-        // Bits: obstacles 1, visible shapes of the arm 2.
+        // Collision bits: 1 for obstacles, 2 for visible shapes of the arm.
         let text = String::from_utf8_lossy(&panda_asset().bytes)
             .replace("contype=\"2\" conaffinity=\"1\"", "contype=\"0\" conaffinity=\"1\"")
             .replace("contype=\"0\" conaffinity=\"0\"", "contype=\"2\" conaffinity=\"3\"");
@@ -84,7 +84,7 @@ impl CollisionWorld {
     /// The deepest overlap at a configuration, if there is any.
     ///
     /// # Errors
-    /// As [`CollisionWorld::overlaps`].
+    /// As for [`CollisionWorld::overlaps`].
     pub fn deepest(&mut self, q: &JointVector) -> Result<Option<Overlap>> {
         Ok(self.overlaps(q)?.into_iter().max_by(|a, b| a.depth_m.total_cmp(&b.depth_m)))
     }

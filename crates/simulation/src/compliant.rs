@@ -1,4 +1,4 @@
-//! The simulated Panda driven by torques, and its force measurement: for compliant descents.
+//! The simulated Panda driven by torques, with force measurement, for compliant descents.
 
 use nalgebra::{SMatrix, Vector3, Vector6};
 use sdg_kinematics::dynamics::GRAVITY_M_S2;
@@ -11,11 +11,11 @@ use crate::error::Result;
 use crate::panda::{NUM_ARM_JOINTS, PandaIds};
 use crate::workcell::Workcell;
 
-/// Velocity above which most of the friction acts, rad/s: for a lower one the simulation's step would be too long.
+/// Velocity above which most of the friction acts, rad/s; a lower one would require a shorter step of the simulation.
 const FULL_FRICTION_RAD_S: f64 = 0.02;
-/// Cut-off of the measured force, Hz: a robot's own estimate is filtered.
+/// Cut-off frequency of the measured force, Hz, because a robot also filters its estimate.
 const CUTOFF_HZ: f64 = 30.0;
-/// Keeps the least squares bounded at singular poses.
+/// Damping that keeps the least squares bounded at singular poses.
 const DAMPING: f64 = 1e-4;
 
 /// Dry friction of a joint's torque at a velocity (rad/s), N·m.
@@ -48,19 +48,19 @@ fn felt_n(panda: &ArmGeometry, ids: &PandaIds, data: &Data) -> f64 {
 }
 
 impl Workcell {
-    /// Records the present force on the hand.
+    /// Updates the filtered vertical force on the hand and its largest value.
     pub(crate) fn feel(&mut self) {
         let gain = PERIOD_SECS / (PERIOD_SECS + 1.0 / (std::f64::consts::TAU * CUTOFF_HZ));
         self.felt_n += (felt_n(&self.panda, &self.panda_ids, &self.data) - self.felt_n) * gain;
         self.peak_felt_n = self.peak_felt_n.max(self.felt_n.abs());
     }
 
-    /// The largest vertical force on the hand since the last call, as a robot estimates it, N, including its load.
+    /// The largest vertical force on the hand since the last call, N, as a robot estimates it; it includes the load.
     pub fn take_peak_felt_n(&mut self) -> f64 {
         std::mem::take(&mut self.peak_felt_n)
     }
 
-    /// One period under torques in addition to those that hold the arm and its load, minus friction.
+    /// Advances one period under torques in addition to those that hold the arm and its load; friction is subtracted.
     fn torque_tick(&mut self, torque: &JointVector) -> Result<()> {
         let q = self.panda_ids.position(&self.data);
         let dq = self.panda_ids.velocity(&self.data);
@@ -89,7 +89,7 @@ impl CompliantArm for Workcell {
             let (q, dq) = (self.panda_ids.position(&self.data), self.panda_ids.velocity(&self.data));
             let (torque, is_last) = descent.next(&panda, &q, &dq, self.felt_n);
             self.torque_tick(&torque)?;
-            // The controller of joint positions takes over at the arm's position.
+            // Position control continues at the arm's present position.
             self.set_reference(ArmReference::at_rest(self.panda_ids.position(&self.data)));
             if let Some(reason) = self.observe_moving(watch)? {
                 return Err(RobotError::Stopped(reason));

@@ -1,9 +1,9 @@
 //! Computed torque control: the arm follows a reference in joint space.
 //!
-//! `tau = M(q) (qdd_ref + Kp (q_ref - q) + Kd (qd_ref - qd)) + bias(q, qd) - passive(q, qd)`, clamped at
-//! the motors' limits. With the model's own mass matrix the error of every joint then decays like a
-//! critically damped oscillator in any posture. A grasped part is not in the bias; at this stiffness it
-//! causes an error of a fraction of a millimetre.
+//! `tau = M(q) (qdd_ref + Kp (q_ref - q) + Kd (qd_ref - qd)) + bias(q, qd) - passive(q, qd)`, clamped at the motors'
+//! limits. With the model's own mass matrix, the error of every joint decays like a critically damped oscillator in any
+//! posture. The bias does not include a grasped part; at this stiffness a part causes an error of a fraction of a
+//! millimetre.
 
 use crate::data::Data;
 use crate::panda::{ArmVector, NUM_ARM_JOINTS, PandaIds};
@@ -20,7 +20,7 @@ pub struct ArmReference {
 }
 
 impl ArmReference {
-    /// Standing still at a configuration.
+    /// A reference at rest at a configuration.
     pub fn at_rest(position: ArmVector) -> Self {
         Self { position, velocity: ArmVector::zeros(), acceleration: ArmVector::zeros() }
     }

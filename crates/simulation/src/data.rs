@@ -18,7 +18,7 @@ pub struct Data {
     ptr: *mut mj::mjData,
 }
 
-// SAFETY: the data is owned by this value and MuJoCo ties it to no thread.
+// SAFETY: this value owns the data, and MuJoCo does not bind it to a thread.
 unsafe impl Send for Data {}
 
 /// Two geoms that touch.
@@ -26,18 +26,18 @@ unsafe impl Send for Data {}
 pub struct Contact {
     /// One of the two geoms; MuJoCo defines the order.
     pub geom1: Id<Geom>,
-    /// The other.
+    /// The other geom.
     pub geom2: Id<Geom>,
-    /// Middle of the contact in the world frame, in metres.
+    /// Centre of the contact in the world frame, in metres.
     pub position: Vector3<f64>,
-    /// Distance between the surfaces in metres, negative where they overlap.
+    /// Distance between the surfaces in metres; negative if they overlap.
     pub distance_m: f64,
     /// Force along the contact's normal, in newtons, never negative.
     pub normal_force_n: f64,
 }
 
 impl Data {
-    /// The initial state of a model, positions of all things computed.
+    /// The initial state of a model; the positions of all its objects are computed.
     ///
     /// # Errors
     /// [`SimulationError::MuJoCo`] if memory runs out.
@@ -72,7 +72,7 @@ impl Data {
         unsafe { mj::mj_resetData(self.model.as_ptr(), self.ptr) };
     }
 
-    /// Computes everything that follows from `qpos`, `qvel` and `ctrl`, without moving in time.
+    /// Computes everything that follows from `qpos`, `qvel` and `ctrl`, without a time step.
     ///
     /// # Errors
     /// [`SimulationError::MuJoCo`] or [`SimulationError::Unstable`].
@@ -95,7 +95,7 @@ impl Data {
         self.check()
     }
 
-    /// Pairs of overlapping geoms, and the depths (m), after [`Data::collide`].
+    /// Pairs of overlapping geoms with their depths (m), after [`Data::collide`].
     pub(crate) fn overlaps(&self) -> impl Iterator<Item = (Id<Geom>, Id<Geom>, f64)> + '_ {
         let raw = self.raw();
         // SAFETY: the array has `ncon` valid entries and lives as long as the data.
@@ -137,8 +137,8 @@ impl Data {
         self.check()
     }
 
-    /// MuJoCo reports invalid numbers and a full contact list by a warning and, for the former, a
-    /// silent reset; both must become errors.
+    /// Returns an error for invalid numbers and for a full contact list. MuJoCo only warns of them, and resets the
+    /// state after invalid numbers.
     fn check(&self) -> Result<()> {
         let bad = [
             mj::mjWARN_BADQPOS,
@@ -166,7 +166,7 @@ impl Data {
         unsafe { std::slice::from_raw_parts(self.raw().qpos, self.model.raw().nq as usize) }
     }
 
-    /// Generalised positions, to be set.
+    /// Generalised positions, for changing them.
     pub fn qpos_mut(&mut self) -> &mut [f64] {
         // SAFETY: the array has `nq` entries, lives as long as the data, and `self` is borrowed mutably.
         unsafe { std::slice::from_raw_parts_mut(self.raw().qpos, self.model.raw().nq as usize) }
@@ -178,19 +178,19 @@ impl Data {
         unsafe { std::slice::from_raw_parts(self.raw().qvel, self.model.raw().nv as usize) }
     }
 
-    /// Generalised velocities, to be set.
+    /// Generalised velocities, for changing them.
     pub fn qvel_mut(&mut self) -> &mut [f64] {
         // SAFETY: the array has `nv` entries, lives as long as the data, and `self` is borrowed mutably.
         unsafe { std::slice::from_raw_parts_mut(self.raw().qvel, self.model.raw().nv as usize) }
     }
 
-    /// The controls of the motors, in the units of the actuators.
+    /// Controls, one per actuator (N·m and N for motors).
     pub fn ctrl(&self) -> &[f64] {
         // SAFETY: the array has `nu` entries and lives as long as the data.
         unsafe { std::slice::from_raw_parts(self.raw().ctrl, self.model.raw().nu as usize) }
     }
 
-    /// Controls, one per actuator, to be set (N·m and N for motors).
+    /// Controls, one per actuator, for changing them (N·m and N for motors).
     pub fn ctrl_mut(&mut self) -> &mut [f64] {
         // SAFETY: the array has `nu` entries, lives as long as the data, and `self` is borrowed
         // mutably.
@@ -203,7 +203,7 @@ impl Data {
         unsafe { std::slice::from_raw_parts(self.raw().qfrc_bias, self.model.raw().nv as usize) }
     }
 
-    /// Springs and dampers of the joints (N·m, N).
+    /// Forces of springs and dampers of the joints (N·m, N).
     pub fn qfrc_passive(&self) -> &[f64] {
         // SAFETY: the array has `nv` entries and lives as long as the data.
         unsafe { std::slice::from_raw_parts(self.raw().qfrc_passive, self.model.raw().nv as usize) }
@@ -252,14 +252,14 @@ impl Data {
         unsafe { isometry_at(self.raw().cam_xpos, self.raw().cam_xmat, camera.index()) }
     }
 
-    /// The centre of a geom.
+    /// Pose of a geom in the world.
     pub fn world_from_geom(&self, geom: Id<Geom>) -> Isometry3<f64> {
         assert!(geom.index() < Geom::count(&self.model), "{geom:?} is not of this model");
         // SAFETY: the arrays have 3 and 9 entries per geom.
         unsafe { isometry_at(self.raw().geom_xpos, self.raw().geom_xmat, geom.index()) }
     }
 
-    /// Sets the pose of a free joint (its body's pose in the world) and sets its velocity to zero.
+    /// Sets the pose of a free joint (its body's pose in the world), with zero velocity.
     pub fn place(&mut self, free_joint: Id<Joint>, world_from_body: &Isometry3<f64>) {
         let (position, velocity) = (self.model.qpos_index(free_joint), self.model.qvel_index(free_joint));
         let (p, q) = (world_from_body.translation.vector, world_from_body.rotation);
@@ -267,7 +267,7 @@ impl Data {
         self.qvel_mut()[velocity..velocity + 6].fill(0.0);
     }
 
-    /// The contacts of the last step that carry force.
+    /// The contacts of the last step that transmit a force.
     pub fn contacts(&self) -> impl Iterator<Item = Contact> + '_ {
         let raw = self.raw();
         // SAFETY: the array has `ncon` valid entries and lives as long as the data.
@@ -377,7 +377,7 @@ mod tests {
         );
         // m l^2 + 2/5 m r^2.
         assert!((data.mass_matrix()[(0, 0)] - (2.0 * 0.25 + 0.4 * 2.0 * 0.01)).abs() < 1e-9);
-        // Held level, gravity pulls with m g l.
+        // In the horizontal position, the torque of gravity is m g l.
         assert!((data.qfrc_bias()[0].abs() - 2.0 * 9.81 * 0.5).abs() < 1e-9);
     }
 }

@@ -11,8 +11,8 @@ const PLATFORM_SURFACELESS_MESA: egl::Enum = 0x31DD;
 
 type Egl = egl::DynamicInstance<egl::EGL1_5>;
 
-/// EGL and its display: opened once per process and never closed, because MuJoCo keeps pointers to
-/// functions of the driver.
+/// EGL and its display. They are opened once per process and never closed, because MuJoCo keeps pointers to functions
+/// of the driver.
 struct Surfaceless {
     egl: Egl,
     display: egl::Display,
@@ -59,11 +59,11 @@ struct Unused(egl::Context);
 // SAFETY: an EGL context may be made current on any thread as long as it is current on no other (EGL 1.5, section 3.7.3).
 unsafe impl Send for Unused {}
 
-/// Unused contexts. The driver compiles its shaders for each new context, which takes longer than a picture;
-/// a used one already has them.
+/// Contexts that are ready for reuse. The driver compiles its shaders for each new context, which takes longer than
+/// rendering a picture.
 static UNUSED: Mutex<Vec<Unused>> = Mutex::new(Vec::new());
 
-/// A separate OpenGL context, current on no thread except while a [`Current`] lives.
+/// A separate OpenGL context. It is current on a thread only while a [`Current`] exists.
 pub(crate) struct OffscreenContext {
     egl: &'static Surfaceless,
     context: egl::Context,
@@ -108,7 +108,7 @@ pub(crate) struct Current {
 
 impl Drop for Current {
     fn drop(&mut self) {
-        // On failure the context stays current here and the next `make_current` reports it.
+        // If this fails, the context stays current on this thread, and the next `make_current` reports the error.
         let _ = self.egl.egl.make_current(self.egl.display, None, None, None);
     }
 }

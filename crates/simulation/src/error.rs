@@ -7,13 +7,13 @@ use sdg_robot::RobotError;
 /// An error of the simulation; a failed grasp is not one (see `sdg_robot::GraspOutcome`).
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "the messages say what the fields are")]
+#[allow(missing_docs, reason = "the messages explain the fields")]
 pub enum SimulationError {
     /// libmujoco is missing, or its version differs from that of the bindings.
     #[error(transparent)]
     Library(#[from] sdg_mujoco_sys::LibraryError),
 
-    /// MuJoCo refused an MJCF model.
+    /// MuJoCo rejected an MJCF model.
     #[error("MuJoCo could not load the model: {message}")]
     Model {
         /// MuJoCo's own message, with the line of the XML if it gives one.
@@ -25,7 +25,7 @@ pub enum SimulationError {
     Asset {
         /// File name in the MJCF.
         name: String,
-        /// Its error.
+        /// The error.
         reason: String,
     },
 
@@ -40,7 +40,7 @@ pub enum SimulationError {
     /// The simulation diverged (not a number, or huge, positions, velocities or accelerations).
     #[error("the simulation became unstable at {time_secs:.3} s of simulated time: {message}")]
     Unstable {
-        /// Simulated time at which it was noticed, in seconds.
+        /// Simulated time at which the error was detected, in seconds.
         time_secs: f64,
         message: String,
     },
@@ -66,7 +66,7 @@ pub enum SimulationError {
     #[error("{}: {reason}", path.display())]
     File {
         path: PathBuf,
-        /// Its error: expected and found.
+        /// The error: what was expected and what was found.
         reason: String,
     },
 
@@ -81,7 +81,7 @@ pub enum SimulationError {
         found: String,
     },
 
-    /// Perception itself failed (which differs from finding nothing).
+    /// Perception itself failed; a picture without the part is not such an error.
     #[error("perception failed: {0}")]
     Perception(String),
 

@@ -8,8 +8,8 @@ use crate::model::{Body, Geom, Id};
 
 /// Height of the lowest point of a body's solid shapes in the world, in metres.
 ///
-/// Solid shapes are those that can touch something; shapes that are only visible do not count. A
-/// body without solid shapes has its origin's height.
+/// Solid shapes are those that can have contacts; shapes that are only visible do not count. For a body without solid
+/// shapes, this is the height of its origin.
 pub fn lowest_point_m(data: &Data, body: Id<Body>) -> f64 {
     let model = data.model();
     let raw = model.raw();
@@ -22,7 +22,7 @@ pub fn lowest_point_m(data: &Data, body: Id<Body>) -> f64 {
         })
         .map(|geom| {
             let pose = data.world_from_geom(geom);
-            // Downwards as seen from the geom.
+            // The downward direction in the geom's frame.
             let down = pose.rotation.inverse() * -Vector3::z();
             pose.translation.z - reach(raw, geom.index(), &down)
         })
@@ -55,7 +55,7 @@ fn reach(raw: &mj::mjModel, geom: usize, direction: &Vector3<f64>) -> f64 {
                 .map(|v| direction.x * f64::from(v[0]) + direction.y * f64::from(v[1]) + direction.z * f64::from(v[2]))
                 .fold(0.0, f64::max)
         }
-        // Planes and height fields do not move; no part has one.
+        // No part contains a plane or a height field.
         _ => 0.0,
     }
 }
@@ -91,8 +91,8 @@ mod tests {
         }
     }
 
-    /// Every visible shape of the arm lies within one capsule of its link, so that links with separate capsules are
-    /// separate.
+    /// Tests that every visible shape of the arm is inside one capsule of its link, so that links with separate
+    /// capsules are separate.
     #[test]
     fn the_capsules_of_the_robot_hold_the_simulated_arm() {
         use crate::panda::{FINGER_TRAVEL_M, PandaIds, panda_asset};
@@ -146,17 +146,18 @@ mod tests {
     }
 
     /// Tests the fit of the planner's capsules: they contain all visible shapes of a link, and extend beyond the link's
-    /// shapes, visible and colliding ones, by at most the given distance.
+    /// visible and collision shapes by at most a given distance.
     #[test]
     fn the_capsules_of_the_planner_fit_the_simulated_arm() {
         use crate::panda::{PandaIds, panda_asset};
         use nalgebra::Point3;
         use sdg_kinematics::collision::{Body as ArmBody, Capsule, CollisionModel};
 
-        /// The joints' blunt ends are flat, those of capsules round.
+        /// Largest distance by which capsules extend beyond shapes: the ends of joints are flat, those of capsules
+        /// round.
         const MAX_EXCESS_M: f64 = 0.045;
-        /// Surface points are computed from directions two degrees apart, which moves those of large flat faces
-        /// outwards by this distance.
+        /// Error of the surface points: they are computed from directions two degrees apart, which moves points on
+        /// large flat faces outwards.
         const ROUNDING_M: f64 = 0.0015;
         const OPENING_M: f64 = 0.05;
         let directions = |count: usize| -> Vec<Vector3<f64>> {
@@ -177,9 +178,9 @@ mod tests {
         ids.set_finger_position_m(&mut data, 0.5 * OPENING_M);
         data.forward().unwrap();
         let planner = CollisionModel::new(&sdg_kinematics::ArmGeometry::panda(), Vec::new(), OPENING_M).unwrap();
-        /// A geom: a point inside, support values along the normals from there, and whether it is seen.
+        /// A geom: a point inside it, its extent from this point along each normal, and whether it is visible.
         type Solid = (Point3<f64>, Vec<f64>, bool);
-        // Those of each body.
+        // The solids of each body.
         let mut solids: Vec<Vec<Solid>> = vec![Vec::new(); 9];
         for geom in model.ids::<Geom>() {
             // SAFETY: the array has `ngeom` entries.
@@ -218,7 +219,7 @@ mod tests {
                         .map(|(n, h)| h / n.dot(ray))
                         .fold(f64::INFINITY, f64::min);
                     let p = centre + ray * to_surface;
-                    // The foot's underside is on the table.
+                    // The underside of the foot, which is on the table, need not be covered.
                     if body > 0 || p.z > 0.02 {
                         uncovered_m = uncovered_m.max(to_capsules(&p));
                     }

@@ -1,4 +1,4 @@
-//! The workcell's Panda behind the Franka Control Interface: `sdg_fci`'s server commands its torques and its hand.
+//! The workcell's Panda for the Franka Control Interface: `sdg_fci`'s server commands its torques and its hand.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -33,14 +33,14 @@ impl SharedPositions {
     }
 }
 
-/// A Panda with its hand at a table, moved by torques.
+/// A Panda with its hand at a table, driven by torques.
 pub struct PandaPlant {
     data: Data,
     ids: PandaIds,
     panda: ArmGeometry,
     gripper: Gripper,
     capsules: LinkCapsules,
-    /// Arm and hand alone, at rest: the torques of gravity.
+    /// Arm and hand alone, at rest, for computing the torques of gravity.
     standing: (Data, PandaIds),
     positions: SharedPositions,
     /// Friction of each joint's motor torque during motion, N·m.
@@ -48,10 +48,10 @@ pub struct PandaPlant {
 }
 
 impl PandaPlant {
-    /// A scene at its start: the arm at rest in its ready pose, the hand open.
+    /// Creates a scene with the arm at rest in its ready pose and the hand open.
     ///
     /// # Errors
-    /// `Model` if MuJoCo refuses the scene, `Library` for the wrong libmujoco, `Unstable` for an impossible scene.
+    /// `Model` if MuJoCo rejects the scene, `Library` for the wrong libmujoco, `Unstable` for an impossible scene.
     pub fn new(config: &WorkcellConfig) -> Result<Self> {
         let model = build_model(config, "")?;
         let ids = PandaIds::find(&model)?;
@@ -65,7 +65,7 @@ impl PandaPlant {
     /// at rest.
     ///
     /// # Errors
-    /// As [`PandaPlant::new`].
+    /// As for [`PandaPlant::new`].
     pub fn with_positions(config: &WorkcellConfig, qpos: &[f64]) -> Result<Self> {
         let model = build_model(config, "")?;
         let ids = PandaIds::find(&model)?;
@@ -96,13 +96,13 @@ impl PandaPlant {
         })
     }
 
-    /// The same with dry friction in every joint that the robot does not compensate, N·m.
+    /// Adds dry friction (N·m) to every joint, which the robot does not compensate.
     #[must_use]
     pub fn with_friction_nm(self, friction_nm: f64) -> Self {
         Self { friction_nm, ..self }
     }
 
-    /// The positions of everything, updated while the plant moves.
+    /// The positions of all objects, updated while the plant moves.
     pub fn positions(&self) -> SharedPositions {
         self.positions.clone()
     }
@@ -111,7 +111,7 @@ impl PandaPlant {
         let (alone, ids) = &mut self.standing;
         let q = self.ids.position(&self.data);
         ids.set_position(alone, &q);
-        // The same posture cannot be unstable here and stable in the scene.
+        // The error is ignored: a posture that is stable in the scene is stable here.
         let _ = alone.step1();
         JointVector::from_fn(|joint, _| alone.qfrc_bias()[ids.qvel_indices()[joint]])
     }

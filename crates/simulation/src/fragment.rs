@@ -24,7 +24,7 @@ impl MjcfFragment {
         self.files.extend(other.files);
     }
 
-    /// Wraps the fragment alone into a model, for a viewer or a test.
+    /// A complete model of this fragment alone, for a viewer or a test.
     pub fn to_standalone_mjcf(&self) -> String {
         format!("<mujoco>\n{}</mujoco>\n", self.sections)
     }

@@ -1,21 +1,21 @@
 //! The hand: its opening is controlled, and its pressing force is limited.
 //!
-//! Each finger follows a reference that moves at a limited speed towards the wanted opening, held by
-//! a stiff spring and a damper whose sum is clamped at the allowed force. In free space that is
-//! position control; against a part the spring saturates and it is force control.
+//! Each finger follows a reference that moves at a limited speed towards the wanted opening. A stiff spring and a
+//! damper act between them; the sum of their forces is clamped at the allowed force. In free space this is position
+//! control; on a part the spring saturates, which is force control.
 
 use crate::data::Data;
 use crate::panda::{FINGER_TRAVEL_M, PandaIds};
 
-/// Force that the hand can hold permanently, each finger, in newtons.
+/// Largest permanent force of each finger, in newtons.
 pub const MAX_FINGER_FORCE_N: f64 = 70.0;
 
-/// Stiffness of a finger in N/m, and its damping in N·s/m: 22 Hz and nearly critical with the
-/// finger's mass and armature of 0.26 kg.
+/// Stiffness of a finger in N/m: 22 Hz with the finger's mass and armature of 0.26 kg.
 const STIFFNESS_N_M: f64 = 5000.0;
+/// Nearly critical damping of a finger, in N·s/m.
 const DAMPING_N_S_M: f64 = 65.0;
 
-/// The present action of the hand.
+/// The state of the hand's control.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gripper {
     /// Wanted position of each finger in metres.
@@ -40,16 +40,16 @@ impl Gripper {
         *self = Self { target_m: finger_position_m(opening_m), speed_m_s: 0.1, max_force_n: 30.0, ..*self };
     }
 
-    /// Starts to close until it meets a resistance of `force_n` newtons on each finger.
+    /// Starts to close until each finger presses with `force_n` newtons.
     pub fn grasp(&mut self, force_n: f64) {
-        // The reference may move into the part as far as the spring needs to reach the force.
+        // The reference may move into the part as far as the spring needs for the force.
         let beyond = MAX_FINGER_FORCE_N / STIFFNESS_N_M;
         *self =
             Self { target_m: -beyond, speed_m_s: 0.05, max_force_n: force_n.clamp(0.0, MAX_FINGER_FORCE_N), ..*self };
     }
 
-    /// Starts to move to an opening (m) at a speed of the opening (m/s), each finger pressing with `force_n` at most; openings
-    /// below zero press on an object between the fingers.
+    /// Starts to move to an opening (m), which changes at a speed (m/s), with at most `force_n` at each finger. An
+    /// opening below zero presses on an object between the fingers.
     pub fn drive(&mut self, opening_m: f64, speed_m_s: f64, force_n: f64) {
         let beyond = MAX_FINGER_FORCE_N / STIFFNESS_N_M;
         *self = Self {
@@ -66,8 +66,7 @@ impl Gripper {
         let velocity = (self.target_m - self.reference_m).clamp(-step, step) / period_secs;
         self.reference_m += velocity * period_secs;
         let (position, speed) = (panda.finger_position_m(data), panda.finger_velocity_m_s(data));
-        // The reference waits for a blocked finger, so that the force does not remain after the
-        // obstacle is gone.
+        // The reference stays close to a blocked finger, so that no force remains after the obstacle is gone.
         let lead = self.max_force_n / STIFFNESS_N_M;
         let mean = 0.5 * (position[0] + position[1]);
         self.reference_m = self.reference_m.clamp(mean - lead, mean + lead);

@@ -1,10 +1,9 @@
 //! MuJoCo's error and warning handlers, made safe for Rust.
 //!
-//! By default MuJoCo writes its errors to a file and ends the process. Here an error unwinds from
-//! the handler through MuJoCo (which is built with unwind tables, and whose functions are bound as
-//! `C-unwind`) to [`guarded`], which turns it into a [`SimulationError::MuJoCo`]. Memory that
-//! MuJoCo allocated in between is leaked, and its data stays half-computed; callers return the
-//! error and do not use that data again.
+//! By default MuJoCo writes its errors to a file and ends the process. With these handlers, an error unwinds from the
+//! handler through MuJoCo (which is built with unwind tables, and whose functions are bound as `C-unwind`) to
+//! [`guarded`], which converts it to a [`SimulationError::MuJoCo`]. Memory that MuJoCo allocated during the call is
+//! leaked, and its data is incomplete; callers return the error and do not use that data again.
 
 use std::any::Any;
 use std::cell::RefCell;
@@ -16,25 +15,25 @@ use sdg_mujoco_sys as mj;
 
 use crate::error::{Result, SimulationError};
 
-/// The payload thrown by the error handler.
+/// The payload with which the error handler unwinds.
 struct MuJoCoError(String);
 
 thread_local! {
-    /// MuJoCo's warnings on this thread since they were last taken.
+    /// MuJoCo's warnings on this thread since the last [`take_warnings`].
     static WARNINGS: RefCell<Vec<String>> = const { RefCell::new(Vec::new()) };
 }
 
 /// Loads the library and installs the handlers, once per process.
 ///
 /// # Errors
-/// [`SimulationError::Library`] if libmujoco is missing, or of another version than the bindings.
+/// [`SimulationError::Library`] if libmujoco is missing, or if its version differs from that of the bindings.
 pub(crate) fn initialise() -> Result<()> {
     static INITIALISED: OnceLock<std::result::Result<(), mj::LibraryError>> = OnceLock::new();
     INITIALISED
         .get_or_init(|| {
             mj::load()?;
-            // SAFETY: inside `get_or_init`, and before any function of MuJoCo: every constructor of this crate comes through
-            // here first.
+            // SAFETY: this runs once (`get_or_init`) and before any function of MuJoCo, because every constructor of
+            // this crate calls `initialise` first.
             unsafe { mj::set_handlers(on_error, on_warning) };
             Ok(())
         })
@@ -42,9 +41,9 @@ pub(crate) fn initialise() -> Result<()> {
         .map_err(SimulationError::from)
 }
 
-/// Runs a call of MuJoCo and turns its error handler's unwinding into an error.
+/// Runs a call of MuJoCo and converts the unwinding of its error handler to an error.
 pub(crate) fn guarded<T>(call: &'static str, body: impl FnOnce() -> T) -> Result<T> {
-    // Unwind safety: after an error the closure leaves only C memory, which the caller no longer uses.
+    // Unwind safety: an error leaves only C memory in an undefined state, and the caller no longer uses it.
     catch_unwind(AssertUnwindSafe(body)).map_err(|payload: Box<dyn Any + Send>| {
         match payload.downcast::<MuJoCoError>() {
             Ok(error) => SimulationError::MuJoCo { call, message: error.0 },
@@ -53,7 +52,7 @@ pub(crate) fn guarded<T>(call: &'static str, body: impl FnOnce() -> T) -> Result
     })
 }
 
-/// Takes MuJoCo's warnings on this thread.
+/// Removes and returns MuJoCo's warnings on this thread.
 pub(crate) fn take_warnings() -> Vec<String> {
     WARNINGS.with_borrow_mut(std::mem::take)
 }
@@ -61,7 +60,7 @@ pub(crate) fn take_warnings() -> Vec<String> {
 unsafe extern "C-unwind" fn on_error(message: *const c_char) {
     // SAFETY: MuJoCo passes a string that ends in NUL and lives during this call.
     let message = unsafe { CStr::from_ptr(message) }.to_string_lossy().into_owned();
-    // Not `panic!`: this is an ordinary error and must not print a panic message.
+    // `panic!` would print a message, but this is an ordinary error.
     resume_unwind(Box::new(MuJoCoError(message)));
 }
 

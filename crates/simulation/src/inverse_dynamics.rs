@@ -1,4 +1,4 @@
-//! MuJoCo's own inverse dynamics of the arm: the reference for the torques of `sdg-kinematics`.
+//! MuJoCo's inverse dynamics of the arm, as a reference for the torques of `sdg-kinematics`.
 
 use std::sync::Arc;
 
@@ -7,7 +7,7 @@ use crate::error::Result;
 use crate::model::{Asset, Body, Model};
 use crate::panda::{ArmVector, NUM_ARM_JOINTS, PANDA_FILE, PandaIds, panda_asset};
 
-/// The simulated Panda alone, without time, the fingers at rest in the hand.
+/// The simulated Panda alone, with fingers at rest in the hand; there are no time steps.
 pub struct InverseDynamics {
     data: Data,
     ids: PandaIds,
@@ -17,20 +17,20 @@ impl InverseDynamics {
     /// The arm with its fingers at an opening (m).
     ///
     /// # Errors
-    /// As [`Model::from_xml`].
+    /// As for [`Model::from_xml`].
     pub fn new(opening_m: f64) -> Result<Self> {
         Self::with_load(opening_m, 0.0, [0.0; 3])
     }
 
-    /// The same with a load as a point: its mass (kg) and its position in the flange's frame (m).
+    /// The arm with a point load: its mass (kg) and its position in the flange's frame (m).
     ///
     /// # Errors
-    /// As [`Model::from_xml`].
+    /// As for [`Model::from_xml`].
     pub fn with_load(opening_m: f64, mass_kg: f64, center_in_flange_m: [f64; 3]) -> Result<Self> {
         let mut text = String::from_utf8_lossy(&panda_asset().bytes).into_owned();
         if mass_kg > 0.0 {
             let [x, y, z] = center_in_flange_m;
-            // The smallest inertia that MuJoCo accepts is negligible beside the mass.
+            // MuJoCo requires an inertia; this one is negligible.
             let load = format!(
                 "<body name=\"load\" pos=\"0 0 {}\"><inertial mass=\"{mass_kg}\" pos=\"{x} {y} {z}\" diaginertia=\"1e-12 1e-12 1e-12\"/></body>",
                 sdg_kinematics::ArmGeometry::panda().flange_offset_m
@@ -83,7 +83,7 @@ mod tests {
 
     #[test]
     fn torques_are_mujocos() {
-        // Rounding of seven links: MuJoCo stores quaternions, and rotations in its XML have 16 digits.
+        // Allows for rounding over seven links: MuJoCo stores quaternions, and rotations in its XML have 16 digits.
         const TOLERANCE: f64 = 1e-9;
         let mut rng = Pcg64::seed_from_u64(71);
         for load in [None, Some((0.7, [0.02, -0.01, 0.15])), Some((3.0, [0.0, 0.0, 0.1034]))] {

@@ -1,7 +1,7 @@
-//! Pictures of cameras that MuJoCo cannot draw: with distortion, or with the optical axis away from the centre.
+//! Pictures of cameras that MuJoCo cannot render: with distortion, or with the optical axis off the centre.
 //!
 //! ```text
-//! PinholeCamera with its lens ─ Frustum: a symmetric pinhole picture that holds all of it, finer ─ drawn ─ resampled
+//! PinholeCamera with its lens ─ Frustum: a larger, finer and symmetric pinhole picture ─ rendered ─ resampled
 //! ```
 
 use image::{Rgb, RgbImage};
@@ -12,19 +12,19 @@ use crate::camera::vertical_field_of_view_rad;
 use crate::error::{Result, SimulationError};
 use crate::render::RenderConfig;
 
-/// Resolution of the drawn picture relative to the result, so that resampling keeps the sharpness.
+/// Resolution of the rendered picture relative to the result; above 1 so that resampling keeps the sharpness.
 const FINENESS: f64 = 1.5;
-/// Samples per side for each pixel.
+/// Number of samples per pixel along each axis.
 const SAMPLES: u32 = 2;
 
-/// MuJoCo's picture: its axis is in the centre, and it has no distortion.
+/// A picture that MuJoCo can render: the optical axis is in the centre, and there is no distortion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Frustum {
-    /// Pixels in a row.
+    /// Width, in pixels.
     pub width: u32,
-    /// Rows.
+    /// Height, in pixels.
     pub height: u32,
-    /// In pixels, for x and y.
+    /// Focal length for x and y, in pixels.
     pub focal_px: f64,
 }
 
@@ -32,7 +32,7 @@ impl Frustum {
     /// The frustum that contains the camera's whole view.
     ///
     /// # Errors
-    /// [`SimulationError::Configuration`] for a lens that does not reach the corners of its own picture.
+    /// [`SimulationError::Configuration`] for a lens whose model does not cover the corners of its own picture.
     pub(crate) fn around(camera: &PinholeCamera) -> Result<Self> {
         Self::holding(camera).ok_or_else(|| SimulationError::Configuration {
             field: "camera.lens",
@@ -53,22 +53,22 @@ impl Frustum {
             }
         }
         let focal_px = FINENESS * camera.fx.max(camera.fy);
-        // A pixel more on each side for the interpolation.
+        // The interpolation needs one more pixel on each side.
         let side = |half: f64| (2.0 * (half * focal_px).ceil() + 2.0) as u32;
         Some(Self { width: side(half.x), height: side(half.y), focal_px })
     }
 
-    /// The settings of MuJoCo's camera for drawing it.
+    /// The vertical field of view of MuJoCo's camera for this picture.
     pub(crate) fn vertical_field_of_view_rad(&self) -> f64 {
         vertical_field_of_view_rad(self.focal_px, self.height)
     }
 
-    /// The drawing settings, otherwise as `like`.
+    /// The settings for rendering this picture, otherwise as in `like`.
     pub(crate) fn render_config(&self, like: &RenderConfig) -> RenderConfig {
         RenderConfig { width: self.width, height: self.height, ..*like }
     }
 
-    /// Converts the drawn picture to the camera's picture.
+    /// Converts the rendered picture to the camera's picture.
     pub(crate) fn resample(&self, drawn: &RgbImage, camera: &PinholeCamera) -> RgbImage {
         let middle = Vector2::new(f64::from(self.width), f64::from(self.height)) * 0.5;
         let color = |at: Point2<f64>| -> [f32; 3] {
@@ -94,7 +94,7 @@ mod tests {
     use super::*;
     use sdg_geometry::PlumbBob;
 
-    /// A drawn bright disc is at the position given by the camera's own projection.
+    /// A rendered bright disc is at the position that the camera's own projection gives.
     #[test]
     fn a_disc_appears_where_the_camera_projects_it() {
         let lens = PlumbBob { k1: -0.25, k2: 0.07, p1: 0.002, p2: -0.001, k3: 0.0 };

@@ -1,4 +1,4 @@
-//! A Franka Panda with a wrist camera at a table, in MuJoCo: pictures, motion, and grasp attempts.
+//! A Franka Panda with a wrist camera at a table, in MuJoCo: pictures, motions, and grasp attempts.
 //!
 //! ```text
 //! objects ─┐                      ┌─> Renderer ─> CameraView ─> PartFinder ─> GraspTarget ─┐
@@ -6,7 +6,7 @@
 //!                                 └<── controller, gripper <── Arm <── sdg_robot::grasp <──┘
 //! ```
 //!
-//! The picture of an MJCF model takes four lines:
+//! This renders a picture of an MJCF model:
 //!
 //! ```
 //! use std::sync::Arc;
@@ -83,7 +83,7 @@ pub use record::RecordConfig;
 pub use render::{RenderConfig, Renderer, Segmentation};
 pub use workcell::{Workcell, WorkcellConfig};
 
-/// Loads MuJoCo and EGL, which the simulator and its pictures need. Called before long work, it reports missing
+/// Loads MuJoCo and EGL, which the simulator and its pictures need. A call before a long computation reports missing
 /// libraries at once.
 ///
 /// # Errors

@@ -1,4 +1,4 @@
-//! A compiled MuJoCo model: the data that do not change during the simulation.
+//! A compiled MuJoCo model: the data that does not change during the simulation.
 
 use std::ffi::{CStr, CString, c_char, c_int};
 use std::marker::PhantomData;
@@ -22,7 +22,7 @@ pub struct Asset {
 pub trait Kind {
     /// MuJoCo's number of the kind.
     const TYPE: u32;
-    /// The kind in words.
+    /// The name of the kind, for messages.
     const NAME: &'static str;
     /// Number of objects of the kind in the model.
     fn count(model: &Model) -> usize;
@@ -100,7 +100,7 @@ impl<K: Kind> std::fmt::Debug for Id<K> {
 
 /// A model compiled from MJCF.
 ///
-/// It is never changed after construction, so that threads may share it.
+/// A model is never changed after construction, so that threads may share it.
 pub struct Model {
     ptr: *mut mj::mjModel,
 }
@@ -108,14 +108,14 @@ pub struct Model {
 // SAFETY: the model is owned by this value, is not bound to the thread that made it, and after
 // `from_xml` it is only read.
 unsafe impl Send for Model {}
-// SAFETY: after `from_xml` nothing writes to the model: MuJoCo takes `const mjModel*` wherever we pass it.
+// SAFETY: after `from_xml` nothing writes to the model: all calls pass it as `const mjModel*`.
 unsafe impl Sync for Model {}
 
 /// MuJoCo keeps the last XML in a global, and its XML reader is not known to be reentrant.
 static XML_LOCK: Mutex<()> = Mutex::new(());
 
 impl Model {
-    /// Compiles an MJCF model; its files come only from `assets`, on purpose.
+    /// Compiles an MJCF model. Files that the MJCF names are read only from `assets`, never from disk.
     ///
     /// # Errors
     /// [`SimulationError::Model`] with MuJoCo's message, [`SimulationError::Asset`] for a repeated
@@ -134,8 +134,7 @@ impl Model {
         let mut message: [c_char; 1024] = [0; 1024];
         let _one_at_a_time = XML_LOCK.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
         let ptr = guarded("mj_loadXML", || {
-            // SAFETY: the name ends in NUL, the file system is initialised, and the buffer is as
-            // long as we say.
+            // SAFETY: the name ends in NUL, the file system is initialised, and the buffer has the given length.
             unsafe { mj::mj_loadXML(name.as_ptr(), files.as_ptr(), message.as_mut_ptr(), message.len() as c_int) }
         })
         .map_err(|error| match error {
@@ -219,7 +218,7 @@ impl Model {
         (kind == mj::mjGEOM_CAPSULE as i32).then_some((size[0], size[1]))
     }
 
-    /// Whether a geom is in MuJoCo's visual group of a number.
+    /// Whether a geom is in MuJoCo's visual group with this number.
     pub fn is_in_group(&self, geom: Id<Geom>, group: i32) -> bool {
         assert!(geom.index < Geom::count(self), "{geom:?} is not of this model");
         // SAFETY: the array has `ngeom` entries.
@@ -257,8 +256,8 @@ impl Model {
 
 impl Drop for Model {
     fn drop(&mut self) {
-        // SAFETY: the pointer came from `mj_loadXML` and is freed once; every `Data` holds the
-        // model through an `Arc` and is gone by now.
+        // SAFETY: the pointer came from `mj_loadXML` and is freed once; every `Data` holds the model by an `Arc`, so
+        // that none exists any more.
         unsafe { mj::mj_deleteModel(self.ptr) };
     }
 }
@@ -274,14 +273,14 @@ impl std::fmt::Debug for Model {
     }
 }
 
-/// MuJoCo's file system in memory: a fixed table of 2000 names of 1000 bytes (2 MB), hence boxed.
+/// MuJoCo's file system in memory. It is boxed because it is a fixed table of 2000 names of 1000 bytes (2 MB).
 struct VirtualFiles {
     vfs: Box<mj::mjVFS>,
 }
 
 impl VirtualFiles {
     fn new() -> Self {
-        // SAFETY: `mjVFS` holds integers, bytes and raw pointers only, so all zeros is a value;
+        // SAFETY: `mjVFS` contains only integers, bytes and raw pointers, so that all zeros is a valid value;
         // `new_zeroed` avoids 2 MB on the stack.
         let mut vfs = unsafe { Box::<mj::mjVFS>::new_zeroed().assume_init() };
         // SAFETY: the pointer is to a whole `mjVFS`.
@@ -311,8 +310,8 @@ impl VirtualFiles {
             code => return Err(problem(format!("mj_makeEmptyFileVFS returned {code}"))),
         }
         let slot = self.vfs.nfile as usize - 1;
-        // SAFETY: MuJoCo appended the file in the last slot, with a buffer of `size` bytes of its
-        // own, which cannot overlap ours.
+        // SAFETY: MuJoCo appended the file in the last slot, with a buffer of `size` bytes of its own, which cannot
+        // overlap `bytes`.
         unsafe {
             std::ptr::copy_nonoverlapping(bytes.as_ptr(), self.vfs.filedata[slot].cast::<u8>(), bytes.len());
         }
@@ -339,7 +338,7 @@ mod tests {
         let part = model.id::<Body>("part").unwrap();
         assert_eq!(model.name(part).as_deref(), Some("part"));
         assert_eq!(model.body_of(model.id::<Geom>("ball").unwrap()), part);
-        // A ball joint takes four positions and three velocities.
+        // A ball joint has four positions and three velocities.
         let slide = model.id::<Joint>("slide").unwrap();
         assert_eq!((model.qpos_index(slide), model.qvel_index(slide)), (4, 3));
         // 4/3 pi 0.1^3 m^3 at 1000 kg/m^3.

@@ -9,7 +9,7 @@ use sdg_kinematics::collision::{Obstacle, Shape};
 
 use crate::scene::pose_attributes;
 
-/// Geoms of the world body for obstacles, with the same names, and with further attributes for each.
+/// Geoms of the world body for obstacles, with the obstacles' names; `attributes` is added to each geom.
 pub fn obstacles_mjcf(obstacles: &[Obstacle], attributes: &str) -> String {
     let mut geoms = String::new();
     for obstacle in obstacles {
@@ -31,12 +31,12 @@ pub fn obstacles_mjcf(obstacles: &[Obstacle], attributes: &str) -> String {
     geoms
 }
 
-/// A name as an attribute of XML.
+/// A name, escaped for an XML attribute.
 fn escaped(name: &str) -> String {
     name.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;")
 }
 
-/// Minimum distance of an obstacle from the base's axis, m, as space for the arm's base.
+/// Minimum distance of an obstacle from the base's axis, m, to leave room for the base.
 const KEPT_FREE_M: f64 = 0.2;
 
 /// Boxes, cylinders, capsules and spheres of 4 to 40 cm at random places within the arm's reach; deterministic for a

@@ -8,8 +8,7 @@ use crate::error::Result;
 use crate::objects::ObjectSpec;
 use crate::workcell::Workcell;
 
-/// The grasp of a part's marks, for the part at a pose: x of the tcp along the marks, y across
-/// them, z down.
+/// The grasp at the marks of a part at a pose: x of the tcp along the marks, y across them, z down.
 pub fn marked_grasp(spec: &ObjectSpec, base_from_object: &Isometry3<f64>) -> GraspTarget {
     let (point, direction_rad) = spec.grasp_in_base(base_from_object);
     let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
@@ -21,19 +20,19 @@ pub fn marked_grasp(spec: &ObjectSpec, base_from_object: &Isometry3<f64>) -> Gra
     }
 }
 
-/// The part's shape in the sequence's form.
+/// The part's shape in the format of the grasp sequence.
 ///
 /// # Errors
-/// Numbers that describe no shape.
+/// An error for numbers that do not describe a shape.
 pub fn part_shape(spec: &ObjectSpec) -> Result<PartShape> {
     let part_from_object = marked_grasp(spec, &Isometry3::identity()).base_from_tcp.inverse();
     let outline = spec.footprint.iter().map(|p| (part_from_object * Point3::new(p.x, p.y, 0.0)).xy());
-    // Marks are at the axis of a round bar and on top of others.
+    // The marks of a round bar are at the height of its axis, those of other parts on top.
     let top_m = spec.mark_height_m.max(2.0 * spec.grasp_height_m);
     Ok(PartShape::new(outline, spec.jaw_width_m, top_m, spec.grasp_height_m)?)
 }
 
-/// Returns the part's true pose.
+/// Perception that returns the part's true pose.
 struct Oracle;
 
 impl PartFinder<Workcell> for Oracle {
@@ -44,8 +43,7 @@ impl PartFinder<Workcell> for Oracle {
 }
 
 impl Workcell {
-    /// Makes one attempt with the part's true pose instead of a picture's: the upper bound for any
-    /// perception.
+    /// Runs one attempt with the part's true pose instead of a detection, as the upper bound for any perception.
     ///
     /// # Errors
     /// Errors of the simulation.

@@ -13,7 +13,7 @@ pub const NUM_ARM_JOINTS: usize = 7;
 /// Joint positions, velocities or torques of the arm, joint 1 first.
 pub type ArmVector = SVector<f64, NUM_ARM_JOINTS>;
 
-/// File name with which a model includes the arm.
+/// File name by which a model includes the arm.
 pub const PANDA_FILE: &str = "panda.xml";
 
 /// Travel of each finger in metres; the hand opens twice as far.
@@ -22,8 +22,8 @@ pub const FINGER_TRAVEL_M: f64 = 0.5 * sdg_kinematics::HAND_OPENING_MAX_M;
 /// Distance of the finger tips beyond the tcp, in metres.
 pub const FINGERTIP_BEYOND_TCP_M: f64 = 0.004;
 
-/// The MJCF of the arm, to be included by a model: base frame = world frame, hand and wrist camera
-/// mounted, one motor per joint.
+/// The MJCF of the arm with hand and wrist camera, to be included by a model. The base frame is the world frame, and
+/// each joint has one motor.
 pub fn panda_asset() -> Asset {
     Asset { name: PANDA_FILE.to_owned(), bytes: include_bytes!("../assets/panda.xml").to_vec() }
 }
@@ -34,11 +34,11 @@ const PAD_FRICTION: &str = "friction=\"1.0 ";
 const WRIST_PLACE: &str = "pos=\"0.072 0 0.050\" xyaxes=\"0 1 0 1 0 0\"";
 const WRIST_FOVY: &str = "fovy=\"47.149412403825\"";
 
-/// As [`panda_asset`] with changes:
-/// - `pad_friction`: pads of another sliding friction and without priority, so that MuJoCo combines it with the part's by its
-///   usual rule, the larger of the two;
+/// As [`panda_asset`], with changes:
+/// - `pad_friction`: another sliding friction of the pads, without priority, so that MuJoCo uses the larger friction of
+///   pad and part;
 /// - `wrist_fovy_deg`: another vertical field of view of the wrist camera;
-/// - `hand_from_camera`: another pose of it, in MuJoCo's camera frame.
+/// - `hand_from_camera`: another pose of the wrist camera, in MuJoCo's camera frame.
 pub(crate) fn changed_panda_asset(
     pad_friction: Option<f64>,
     wrist_fovy_deg: Option<f64>,
@@ -180,7 +180,8 @@ mod tests {
         (Data::new(model).unwrap(), ids)
     }
 
-    /// `fci` sees no other crate and the MJCF no constant: all three contain the hand's opening.
+    /// Tests that the hand's opening is the same in `fci`, which depends on no other crate, in `kinematics`, and in the
+    /// MJCF.
     #[test]
     fn the_hand_opens_as_far_everywhere() {
         assert_eq!(sdg_fci::server::HAND_MAX_WIDTH_M, kinematics::HAND_OPENING_MAX_M);
@@ -268,7 +269,7 @@ mod tests {
         for (side, name) in [(1.0, "left_pad_3"), (-1.0, "right_pad_3")] {
             let pad = data.world_from_geom(data.model().id(name).unwrap());
             let in_tcp = tcp.inverse_transform_point(&pad.translation.vector.into());
-            // The pad is 6 mm thick: its inner face lies in the plane between the fingers.
+            // The pad is 6 mm thick; its inner face is in the plane between the fingers.
             assert!((in_tcp.y - side * 0.003).abs() < 1e-9, "{name} at {in_tcp}");
             let tip = in_tcp.z + 0.0045;
             assert!((tip - FINGERTIP_BEYOND_TCP_M - 0.0016).abs() < 0.002, "{name}: tip {tip} m beyond the tcp");

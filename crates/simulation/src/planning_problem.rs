@@ -9,12 +9,12 @@ use sdg_kinematics::{ArmGeometry, HAND_OPENING_MAX_M, JointLimits, JointVector};
 
 use crate::obstacles::random_obstacles;
 
-/// A start and a goal among random obstacles, both free.
+/// A free start and a free goal among random obstacles.
 #[derive(Debug, Clone)]
 pub struct PlanningProblem {
     /// The obstacles, one to eight.
     pub obstacles: Vec<Obstacle>,
-    /// The same as a model, with the hand open.
+    /// The collision model of arm and obstacles, with the hand open.
     pub model: CollisionModel,
     /// The start configuration, rad.
     pub start: JointVector,
@@ -25,15 +25,17 @@ pub struct PlanningProblem {
 }
 
 impl PlanningProblem {
-    /// Distance of start and goal from everything, m: more than planners keep.
+    /// Minimum distance of start and goal from all obstacles, m: larger than the planners' margin.
     const FREE_M: f64 = 0.01;
-    /// Maximum number of obstacles added to a problem, and their size, m.
+    /// Maximum number of obstacles that are added to a problem.
     const MAX_ADDED: usize = 4;
+    /// Radius of these obstacles, m.
     const BALL_RADIUS_M: f64 = 0.08;
-    /// Distance of start and goal from the joints' limits, rad.
+    /// Minimum distance of start and goal from the joints' limits, rad.
     const INSIDE_RAD: f64 = 0.05;
 
-    /// The problem of a seed, deterministic. Start and goal are drawn from the joints' full ranges.
+    /// The problem of a seed; the same seed gives the same problem. Start and goal are sampled from the joints' full
+    /// ranges.
     pub fn random(seed: u64) -> Self {
         let mut rng = Pcg64Mcg::seed_from_u64(seed);
         let obstacles = random_obstacles(rng.random_range(1..=8), rng.random());
@@ -53,8 +55,9 @@ impl PlanningProblem {
         Self { obstacles, base_from_goal: ArmGeometry::panda().forward(&goal), start, goal, model }
     }
 
-    /// The same with up to [`Self::MAX_ADDED`] more obstacles, each a ball at the midpoint of the tcp's path during the
-    /// straight motion found before. Without them nearly all random problems are solved by a straight motion.
+    /// The problem of a seed with up to [`Self::MAX_ADDED`] more obstacles: each is a ball at the midpoint of the tcp's
+    /// path, as long as a straight motion solves the problem. Without these balls, a straight motion solves nearly all
+    /// random problems.
     pub fn obstructed(seed: u64) -> Self {
         let panda = ArmGeometry::panda();
         let mut problem = Self::random(seed);

@@ -1,4 +1,4 @@
-//! Pictures from outside at regular intervals of simulated time, for an animation.
+//! Pictures by an outside camera at regular intervals of simulated time, for an animation.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! A workcell driven from outside, millisecond by millisecond.
+//! Control of a workcell by its caller, millisecond by millisecond.
 
 use sdg_kinematics::JointVector;
 

@@ -1,4 +1,4 @@
-//! Pictures of a scene, made without a display.
+//! Rendering of scenes without a display.
 //!
 //! ```text
 //! EGL (surfaceless) ── desktop OpenGL context ── mjrContext (offscreen framebuffer)
@@ -6,8 +6,8 @@
 //!             Data ── mjv_updateScene ── mjvScene ── mjr_render ── mjr_readPixels ── RgbImage
 //! ```
 //!
-//! A renderer may be used from any thread. The process draws one picture at a time, because MuJoCo
-//! keeps OpenGL's function table in globals.
+//! A renderer may be used from any thread. The process renders one picture at a time, because MuJoCo keeps OpenGL's
+//! function table in global variables.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -31,15 +31,15 @@ pub struct RenderConfig {
     pub samples: u32,
     /// Side of the shadow map in texels; 0 for no shadows.
     pub shadow_size: u32,
-    /// Whether reflective surfaces mirror the scene, which draws it a second time.
+    /// Whether reflective surfaces show the scene, which is then rendered twice.
     pub reflections: bool,
-    /// Geom groups to draw; MuJoCo's convention, which the workcell follows, has visible shapes in
-    /// groups 0 to 2 and collision shapes in group 3.
+    /// Geom groups to render. By MuJoCo's convention, which the workcell follows, visible shapes are in groups 0 to 2
+    /// and collision shapes in group 3.
     pub geom_groups: [bool; 6],
 }
 
 impl Default for RenderConfig {
-    /// The wrist camera's 640 x 480 with smooth edges and shadows.
+    /// The wrist camera's 640 x 480 pixels, with antialiasing and shadows.
     fn default() -> Self {
         Self {
             width: 640,
@@ -67,7 +67,7 @@ impl Segmentation {
         (self.width, self.height)
     }
 
-    /// The geom at a pixel, `None` for background.
+    /// The geom at a pixel; `None` for the background.
     pub fn geom_at(&self, x: u32, y: u32) -> Option<Id<Geom>> {
         assert!(x < self.width && y < self.height, "({x}, {y}) is outside {}x{}", self.width, self.height);
         self.geoms[(y * self.width + x) as usize]
@@ -85,11 +85,11 @@ impl Segmentation {
 static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
 
 fn drawing_lock() -> MutexGuard<'static, ()> {
-    // The lock guards no data of ours, so that a panic elsewhere corrupts nothing.
+    // The lock protects no data of this crate, so that a panic in another thread does no harm.
     ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Draws states of one model.
+/// Renders states of one model.
 pub struct Renderer {
     context: OffscreenContext,
     model: Arc<Model>,
@@ -100,12 +100,12 @@ pub struct Renderer {
     config: RenderConfig,
 }
 
-// SAFETY: the OpenGL context is current on a thread only while that thread holds the drawing lock
-// inside one of our methods; between calls nothing is tied to a thread.
+// SAFETY: the OpenGL context is current on a thread only while that thread holds the drawing lock inside a method of
+// `Renderer`; between calls nothing is bound to a thread.
 unsafe impl Send for Renderer {}
 
 impl Renderer {
-    /// Makes an OpenGL context and uploads the model's textures and meshes.
+    /// Creates an OpenGL context and uploads the model's textures and meshes.
     ///
     /// # Errors
     /// [`SimulationError::Rendering`] if EGL or OpenGL is missing or fails,
@@ -121,8 +121,7 @@ impl Renderer {
             }
         }
 
-        // A bitwise copy of the struct (its arrays stay the model's own) that differs in the
-        // renderer's settings.
+        // A bitwise copy of the struct with the renderer's settings; its arrays are still those of the model.
         let mut adjusted = *model.raw();
         adjusted.vis.global.offwidth = config.width as i32;
         adjusted.vis.global.offheight = config.height as i32;
@@ -133,7 +132,7 @@ impl Renderer {
         let context = OffscreenContext::new()?;
         let _current = context.make_current()?;
 
-        // SAFETY: these structs are plain C data for which all zeros is a value.
+        // SAFETY: these structs are plain C data for which all zeros is a valid value.
         let (mut scene, mut gl, mut option, mut perturb) = unsafe {
             (
                 Box::<mj::mjvScene>::new_zeroed().assume_init(),
@@ -175,7 +174,7 @@ impl Renderer {
         &self.config
     }
 
-    /// The picture that a camera of the model sees, y down.
+    /// The picture of a camera of the model, with y down.
     ///
     /// # Errors
     /// [`SimulationError::MuJoCo`] or [`SimulationError::Rendering`].
@@ -184,10 +183,10 @@ impl Renderer {
         Ok(RgbImage::from_raw(self.config.width, self.config.height, bytes).expect("three bytes a pixel"))
     }
 
-    /// The geom that each pixel of that picture shows.
+    /// The geom that each pixel of the camera's picture shows.
     ///
     /// # Errors
-    /// As [`Renderer::image`].
+    /// As for [`Renderer::image`].
     pub fn segmentation(&mut self, data: &mut Data, camera: Id<Camera>) -> Result<Segmentation> {
         let flags = self.scene.flags;
         self.scene.flags[mj::mjRND_SEGMENT as usize] = 1;
@@ -196,8 +195,8 @@ impl Renderer {
         self.scene.flags = flags;
         let bytes = drawn?;
 
-        // Colours are indices of the scene's list plus one; the list contains the objects. SAFETY:
-        // the scene's buffer has `ngeom` filled entries.
+        // Colours are indices into the scene's list of objects, plus one. SAFETY: the scene's buffer has `ngeom` filled
+        // entries.
         let shown = unsafe { std::slice::from_raw_parts(self.scene.geoms, self.scene.ngeom as usize) };
         let mut geom_of_color = vec![None; shown.len() + 1];
         for geom in shown {
@@ -216,13 +215,13 @@ impl Renderer {
         Ok(Segmentation { width: self.config.width, height: self.config.height, geoms })
     }
 
-    /// Draws with the present flags and reads the pixels, rows from the top.
+    /// Renders with the present flags and reads the pixels, row by row from the top.
     fn draw(&mut self, data: &mut Data, camera: Id<Camera>) -> Result<Vec<u8>> {
         let (width, height) = (self.config.width as usize, self.config.height as usize);
         let viewport = mj::mjrRect { left: 0, bottom: 0, width: width as i32, height: height as i32 };
         let mut bytes = vec![0_u8; 3 * width * height];
 
-        // SAFETY: the struct is plain C data for which all zeros is a value.
+        // SAFETY: the struct is plain C data for which all zeros is a valid value.
         let mut view = unsafe { std::mem::zeroed::<mj::mjvCamera>() };
         // SAFETY: the pointer is to a whole struct.
         unsafe { mj::mjv_defaultCamera(&raw mut view) };
@@ -233,9 +232,9 @@ impl Renderer {
         let _lock = drawing_lock();
         let _current = self.context.make_current()?;
         guarded("mjr_render", || {
-            // SAFETY: model, data, scene and context are live and were made for this model
-            // (asserted above); our OpenGL context is current; the buffer holds three
-            // bytes a pixel of the viewport, which is the framebuffer's own size.
+            // SAFETY: model, data, scene and context are live and were made for this model (asserted above); this
+            // renderer's OpenGL context is current; the buffer holds three bytes a pixel of the viewport, which is the
+            // framebuffer's own size.
             unsafe {
                 mj::mjv_updateScene(
                     self.model.as_ptr(),
@@ -251,7 +250,7 @@ impl Renderer {
             }
         })?;
 
-        // OpenGL's first row is the lowest.
+        // OpenGL's first row is the bottom row.
         let mut top_down = Vec::with_capacity(bytes.len());
         for row in bytes.chunks_exact(3 * width).rev() {
             top_down.extend_from_slice(row);
@@ -263,7 +262,7 @@ impl Renderer {
 impl Drop for Renderer {
     fn drop(&mut self) {
         let _lock = drawing_lock();
-        // Without a current context OpenGL's objects are freed with the context itself.
+        // If the context cannot be made current, OpenGL's objects are freed together with it.
         if let Ok(_current) = self.context.make_current() {
             // SAFETY: the context was made by `mjr_makeContext` and is freed once.
             unsafe { mj::mjr_freeContext(&raw mut *self.gl) };

@@ -1,4 +1,4 @@
-//! Distances between the arm's links, by the capsules of their collisions.
+//! Distances between the arm's links, by their collision capsules.
 
 use nalgebra::{Point3, Vector3};
 use sdg_kinematics::collision::Capsule;
@@ -10,7 +10,8 @@ use crate::model::{Geom, Id, Kind, Model};
 const CHAIN: [&str; 9] = ["link0", "link1", "link2", "link3", "link4", "link5", "link6", "link7", "hand"];
 /// MuJoCo's group of collision shapes.
 const COLLISION_GROUP: i32 = 3;
-/// Bodies separated by fewer joints share an elbow or the wrist, where their capsules overlap in every posture.
+/// Minimum number of joints between two bodies that are compared: with fewer, both are at the elbow or the wrist, where
+/// their capsules overlap in every posture.
 const MIN_JOINTS_APART: usize = 4;
 
 #[derive(Debug, Clone, Copy)]
@@ -26,7 +27,7 @@ struct LinkCapsule {
 pub(crate) struct LinkCapsules(Vec<LinkCapsule>);
 
 impl LinkCapsules {
-    /// Finds them in a model with the arm.
+    /// Finds the capsules in a model with the arm.
     pub(crate) fn find(model: &Model) -> Self {
         let capsules = (0..Geom::count(model)).map(Id::<Geom>::new).filter_map(|geom| {
             let body = model.name(model.body_of(geom))?;
@@ -38,7 +39,8 @@ impl LinkCapsules {
         Self(capsules.collect())
     }
 
-    /// The smallest distance between two of them that are not joined, in metres; negative if they overlap.
+    /// The smallest distance between the capsules of two bodies that are at least [`MIN_JOINTS_APART`] joints apart, in
+    /// metres; negative if they overlap.
     pub(crate) fn distance_m(&self, data: &Data) -> f64 {
         let placed: Vec<Capsule> = self
             .0
@@ -84,7 +86,7 @@ mod tests {
             capsules.distance_m(&data)
         };
         assert!(at(ready_pose()) > 0.05);
-        // The forearm folded back, the hand turned towards the column.
+        // The forearm is folded back, and the hand points towards the column.
         let folded = JointVector::from([0.0, 0.4, 0.0, -3.0, 0.0, 1.2, 0.785]);
         assert!(at(folded) < 0.0);
     }

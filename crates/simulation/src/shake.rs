@@ -1,4 +1,4 @@
-//! Shakes the arm on purpose, around its position.
+//! Shakes the arm around its position, to test a grasp.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -14,10 +14,10 @@ use crate::workcell::Workcell;
 /// Rise and fall time of the swing, in seconds.
 const RAMP_SECS: f64 = 0.2;
 
-/// Largest share of the arm's velocity and acceleration limits used by a shake.
+/// Largest fraction of the arm's velocity and acceleration limits that a shake uses.
 const SHARE_OF_LIMITS: f64 = 0.9;
 
-/// Keeps the inverse of the Jacobian finite near singular postures, in square metres.
+/// Damping that keeps the inverse of the Jacobian finite near singular postures, in square metres.
 const DAMPING: f64 = 1e-6;
 
 impl Shake {
@@ -25,7 +25,7 @@ impl Shake {
     fn at(&self, time_secs: f64) -> [f64; 3] {
         let omega = TAU * self.frequency_hz;
         let (sin, cos) = (omega * time_secs).sin_cos();
-        // A squared sine from rest to full swing, and back at the end.
+        // The amplitude rises along a squared sine from rest, and falls in the same way at the end.
         let (since, sign) = match time_secs < 0.5 * self.duration_secs {
             true => (time_secs, 1.0),
             false => (self.duration_secs - time_secs, -1.0),
@@ -40,16 +40,16 @@ impl Shake {
 }
 
 impl Workcell {
-    /// Swings the hand without turning it, and ends at the start; returns the amplitude that the arm's limits
-    /// allowed, in metres.
+    /// Swings the hand without rotating it, and ends at the start; returns the amplitude that the arm's limits allowed,
+    /// in metres.
     ///
     /// # Errors
     /// [`crate::SimulationError::Unstable`] or a renderer's error while recording.
     pub(crate) fn shake(&mut self, shake: &Shake) -> Result<f64> {
         let start = self.commanded();
         let along = Vector3::new(shake.direction_rad.cos(), shake.direction_rad.sin(), 0.0);
-        // Joint motion per metre along the line, with a constant orientation of the hand. Over some centimetres the
-        // arm's posture, and with it the Jacobian, hardly changes.
+        // Joint motion per metre along the line, with a constant orientation of the hand. The Jacobian hardly changes
+        // over some centimetres.
         let jacobian = self.panda.jacobian(&start);
         let damped = jacobian * jacobian.transpose() + nalgebra::Matrix6::identity() * DAMPING;
         let twist = Vector6::new(along.x, along.y, along.z, 0.0, 0.0, 0.0);
@@ -88,7 +88,7 @@ mod tests {
         const STEP: f64 = 1e-5;
         for time in [0.05, 0.1, 0.31, 0.55, 0.85, 0.95] {
             let [before, here, after] = [time - STEP, time, time + STEP].map(|time| SHAKE.at(time));
-            // The third derivative is below (2 pi 2.5)^3 and the ramp's own: central differences have an error of 1e-6.
+            // The third derivative is about (2 pi 2.5)^3, so that central differences have an error of 1e-6.
             assert!(((after[0] - before[0]) / (2.0 * STEP) - here[1]).abs() < 1e-4, "{time}");
             assert!(((after[1] - before[1]) / (2.0 * STEP) - here[2]).abs() < 1e-2, "{time}");
         }

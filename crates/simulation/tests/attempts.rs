@@ -1,6 +1,6 @@
-//! Whole grasp attempts: the success of the robot alone with the true pose, and every kind of failure.
+//! Whole grasp attempts: the success of the robot with the true pose of the part, and every kind of failure.
 //!
-//! `examples/oracle.rs` runs twenty attempts per part; here are only a few, for time.
+//! `examples/oracle.rs` runs twenty attempts per part; these tests run only a few, to save time.
 
 use std::fs;
 
@@ -15,7 +15,7 @@ use sdg_simulation::{
     WorkcellConfig, marked_grasp,
 };
 
-/// Finds by the function, and stores the camera's poses.
+/// Perception by a function, which also stores the pictures.
 struct Looking<F> {
     find: F,
     views: Vec<CameraView>,
@@ -42,7 +42,7 @@ fn bar() -> ObjectSpec {
 /// The bar with another mass in kilograms.
 fn bar_of(mass_kg: f64) -> ObjectSpec {
     let with_mass = |text: &str| text.replace("MASS_KG", &mass_kg.to_string());
-    // Each test runs in its own process or thread.
+    // The folder has a unique name, because each test runs in its own process or thread.
     let folder = std::env::temp_dir().join(format!("sdg-bar-{}-{:?}", std::process::id(), std::thread::current().id()));
     fs::create_dir_all(&folder).unwrap();
     fs::write(
@@ -71,13 +71,13 @@ fn bar_cell(x: f64, y: f64, yaw_rad: f64) -> Workcell {
     unlit_cell(SceneVariation::nominal(Some((&spec, pose))))
 }
 
-/// A workcell whose pictures are drawn fast, since these tests do not use them.
+/// A workcell with fast rendering, because these tests do not use its pictures.
 fn unlit_cell(scene: SceneVariation) -> Workcell {
     let wrist_render = RenderConfig { shadow_size: 0, samples: 0, ..RenderConfig::default() };
     Workcell::new(&WorkcellConfig { wrist_render, ..WorkcellConfig::new(scene) }).unwrap()
 }
 
-/// The step and the reason of a failure.
+/// The step of a failure and the reason.
 fn failure(report: AttemptReport) -> (GraspStep, String) {
     match report.outcome {
         GraspOutcome::Failed { step, why } => (step, why),
@@ -106,7 +106,7 @@ fn a_bar_of_known_pose_is_lifted() {
         // Lifted by 0.45 m, or by the smallest allowed height if the arm's reach ends.
         assert!(report.object_height_m.unwrap() > 0.2, "{:?}", report.object_height_m);
         assert_eq!((looking.views.len(), report.targets.len()), (2, 2));
-        // At the second look the camera is over the part.
+        // The second picture is taken from above the part.
         let camera = looking.views[1].camera.world_from_camera.translation;
         assert!((camera.x - x).hypot(camera.y - y) < 0.003 && (camera.z - LOOK_HEIGHT_M).abs() < 0.003, "{camera}");
     }
@@ -116,7 +116,7 @@ fn a_bar_of_known_pose_is_lifted() {
 fn every_part_of_known_pose_is_lifted() {
     for name in ObjectSpec::names() {
         let spec = ObjectSpec::by_name(name).unwrap();
-        // Light and table take time and change nothing for a finder without pictures.
+        // Light and table take time, and do not matter for perception without pictures.
         let config = VariationConfig { appearance: false, distractors: 0..=2, ..VariationConfig::default() };
         let scene = SceneVariation::sample(Some(&spec), &config, 101);
         let mut cell = unlit_cell(scene);
@@ -159,7 +159,7 @@ fn who_does_not_find_the_part_looks_from_elsewhere() {
     let mut looks = 0;
     let mut blind_twice = Looking::new(|| {
         looks += 1;
-        // The first look and the first from above find nothing.
+        // The first picture, and the first one from above, do not show the part.
         (looks != 1 && looks != 3).then(true_target)
     });
     let report = cell.run_attempt(&mut blind_twice, &AttemptConfig::default(), 1).unwrap();
@@ -265,7 +265,7 @@ fn a_recording_has_a_picture_for_each_period() {
     assert!(report.frames.iter().all(|frame| frame.dimensions() == (64, 48)));
 }
 
-/// A cell with a bar whose pictures are drawn fast, and errors.
+/// A cell with a bar and errors, with fast rendering.
 fn bar_cell_with(errors: AttemptErrors, mass_kg: f64) -> Workcell {
     let spec = bar_of(mass_kg);
     let scene = SceneVariation::nominal(Some((&spec, spec.base_from_object(0.48, 0.05, 0.6))));
@@ -285,7 +285,7 @@ fn a_wrong_hand_eye_calibration_changes_the_told_place_of_the_camera_and_nothing
     let (with, views_with, told_place) = run(AttemptErrors::hand_eye(5));
     assert_eq!((without.outcome, without.looks), (GraspOutcome::Held, [1, 1]));
     assert_eq!(without.shake_amplitude_m, None);
-    // The robot itself does the same, bit for bit.
+    // The motion of the robot is the same, bit for bit.
     assert_eq!(without.simulated_secs, with.simulated_secs);
     assert_eq!(without.object_height_m, with.object_height_m);
     assert_eq!(views, views_with);

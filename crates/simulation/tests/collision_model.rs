@@ -1,4 +1,4 @@
-//! The collision model of `sdg-kinematics` compared with MuJoCo's own collisions.
+//! Comparison of the collision model of `sdg-kinematics` with MuJoCo's collisions.
 
 use std::collections::BTreeMap;
 
@@ -8,9 +8,9 @@ use sdg_kinematics::collision::{Checker, CollisionModel};
 use sdg_kinematics::{ArmGeometry, JointLimits, JointVector};
 use sdg_simulation::{CollisionWorld, random_obstacles};
 
-/// Largest depth of an overlap that MuJoCo finds and the model does not, m.
+/// Largest depth of an overlap in MuJoCo that the model misses, m.
 const MAX_MISSED_M: f64 = 0.003;
-/// Largest share of the configurations that are free in MuJoCo but not in the model.
+/// Largest fraction of the configurations that are free in MuJoCo but not in the model.
 const MAX_FALSE_COLLISIONS: f64 = 0.05;
 
 fn random_configurations(count: usize, rng: &mut Pcg64Mcg) -> Vec<JointVector> {

@@ -12,11 +12,11 @@ use sdg_simulation::{FINGERTIP_BEYOND_TCP_M, PandaPlant, Workcell, WorkcellConfi
 
 /// Friction of each joint's gears.
 const FRICTION_NM: f64 = 1.0;
-/// Height of the table above the limits' table.
+/// Height of the table above the table of the limits.
 const HIGHER_M: f64 = 0.005;
-/// Start of the tcp's descent: about 20 mm over the table.
+/// Start of the tcp's descent: about 20 mm above the table.
 const ABOVE_M: [f64; 3] = [0.45, 0.0, 0.024];
-/// Largest force that a part and a table withstand.
+/// Largest static force that does not damage part or table.
 const MAX_STATIC_N: f64 = 10.0;
 const MAX_PEAK_N: f64 = 25.0;
 /// Largest deviation of the tcp from its reference in free air.
@@ -67,7 +67,7 @@ fn a_soft_tcp_finds_a_table_that_is_higher_than_told_and_presses_little() {
         assert!(beside_m.abs() < 1e-3, "friction {friction_nm}: {touched:?}");
         assert!((touched.force_n - told.press_n).abs() < 2.0, "friction {friction_nm}: {touched:?}");
         assert!(touched.force_n < MAX_STATIC_N && touched.peak_n < MAX_PEAK_N, "friction {friction_nm}: {touched:?}");
-        // It is at rest, without an error, and the next motion starts there.
+        // The arm is at rest, without an error, and the next motion starts at its position.
         let state = robot.state().unwrap();
         assert_eq!(state.mode, ArmMode::Idle);
         assert!((state.q - state.q_commanded).amax() < 2e-3);
@@ -83,7 +83,7 @@ fn joint_positions_press_on_the_same_table_until_the_robot_stops() {
     let mut robot = Robot::new(&mut arm, limits(), Watch::default());
     go_above(&mut robot);
     robot.set_contact_sensitivity(ContactSensitivity::Contact).unwrap();
-    // To the contact with the table at the given height.
+    // The motion ends at the contact with a table at the given height.
     let motion = line_to(&mut robot, [ABOVE_M[0], ABOVE_M[1], FINGERTIP_BEYOND_TCP_M - HIGHER_M + 0.0015]);
     let error = robot.follow(motion).unwrap_err();
     assert!(matches!(error, RobotError::Reflex(_)), "{error}");
@@ -124,7 +124,7 @@ fn ctrl_c_on_the_way_down_stops_the_arm_and_what_makes_no_sense_is_refused() {
     assert_eq!(robot.latched(), None);
 
     let error = robot.touch_down(&TouchDown::default()).unwrap_err();
-    assert_eq!(error.to_string(), "the arm was stopped: a person asked for it");
+    assert_eq!(error.to_string(), "the arm was stopped: a person requested it");
     assert!(matches!(robot.touch_down(&TouchDown::default()), Err(RobotError::Latched(_))));
     let before = robot.arm().state().unwrap();
     robot.arm().wait(0.3, &mut Watch::default()).unwrap();

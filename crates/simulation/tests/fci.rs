@@ -1,4 +1,4 @@
-//! Our client drives our server on MuJoCo, in lockstep: every generator and controller, and every limit.
+//! The client of `sdg-fci` drives its server with MuJoCo, in lockstep: every generator and controller, and every limit.
 
 use std::f64::consts::PI;
 use std::ops::ControlFlow;
@@ -17,12 +17,12 @@ use sdg_kinematics::{ArmGeometry, JointVector};
 const LAG_RAD: f64 = 2e-3;
 const LAG_M: f64 = 2e-3;
 
-/// From 0 to 1 and back at rest.
+/// A value that moves from 0 to 1 and back, at rest at both ends.
 fn swing(secs: f64, duration: f64) -> f64 {
     0.5 * (1.0 - (2.0 * PI * (secs / duration).min(1.0)).cos())
 }
 
-/// Time of a motion, and whether every state followed the last by a millisecond.
+/// Measures the time of a motion, and checks that every state follows the last one by a millisecond.
 #[derive(Default)]
 struct Clock {
     secs: f64,
@@ -82,7 +82,7 @@ fn every_generator_moves_the_arm_with_either_controller() {
             .control_joint_velocities(controller, |state, step| {
                 let secs = clock.tick(state, step);
                 let mut dq = [0.0; 7];
-                // The area under half a wave of 0.3 rad/s and 1 s is 0.6 / pi.
+                // The integral of half a sine of 0.3 rad/s over 1 s is 0.6 / pi.
                 dq[4] = 0.3 * (PI * secs.min(1.0)).sin();
                 until(dq, secs, 1.0)
             })
@@ -123,7 +123,7 @@ fn torques_move_the_arm_and_gravity_is_the_robots() {
     let floating = robot.control_torques(|state, step| until([0.0; 7], clock.tick(state, step), 1.0)).unwrap();
     let drift = (0..7).map(|joint| (floating.q[joint] - start.q[joint]).abs()).fold(0.0, f64::max);
     assert!(drift < 5e-3, "{drift}");
-    // A spring of the client's own.
+    // The client commands the torques of a spring.
     let mut clock = Clock::default();
     let moved = robot
         .control_torques(|state, step| {
@@ -142,7 +142,7 @@ fn torques_move_the_arm_and_gravity_is_the_robots() {
 #[test]
 fn a_load_that_is_not_told_of_is_felt_and_one_that_is_told_of_is_carried() {
     let (_server, mut robot) = serve_panda();
-    // Told of an absent load of 0.5 kg, the robot pushes up with 4.9 N, and measures no force against it.
+    // With a load of 0.5 kg that does not exist, the robot pushes up with 4.9 N, and measures no force against it.
     robot.set_load(&Load { mass: 0.5, center: [0.0, 0.0, 0.1], inertia: [0.0; 9] }).unwrap();
     assert_eq!(robot.read_state().unwrap().load_mass, 0.5);
     let start = robot.state().q_desired;
@@ -173,14 +173,15 @@ fn the_hand_homes_moves_and_tells_what_it_holds() {
 
 #[test]
 fn each_limit_stops_the_motion_outside_of_it_and_none_inside() {
-    // Within the Cartesian limits the joints may exceed theirs: to test the former alone, the joints get higher limits.
+    // Within the Cartesian limits the joints may exceed their limits: to test the Cartesian limits alone, the joints
+    // get higher limits.
     let limits = Limits::PANDA;
     let agile = Limits {
         acceleration: limits.acceleration.map(|value| 3.0 * value),
         jerk: limits.jerk.map(|value| 3.0 * value),
         ..limits
     };
-    // The wait for an answer that is omitted on purpose is as long as for a late one.
+    // The server waits `max_wait` for each answer that the test omits.
     let pace = Pace::Lockstep { max_wait: Duration::from_millis(100) };
     for (limits_of_server, is_cartesian) in [(limits, false), (agile, true)] {
         let server = serve(pace, limits_of_server);
@@ -202,25 +203,25 @@ fn each_limit_stops_the_motion_outside_of_it_and_none_inside() {
     }
 }
 
-/// Distance of the end effector's motion from a direction that the joints cannot execute.
+/// Smallest singular value of the Jacobian at a configuration.
 fn smallest_singular_value(q: &[f64; 7]) -> f64 {
     ArmGeometry::panda().jacobian(&JointVector::from(*q)).svd(false, false).singular_values.min()
 }
 
 #[test]
 fn no_cartesian_motion_starts_at_a_singular_pose_and_one_does_just_beside_it() {
-    /// The server's condition, as in franka-sim.
+    /// The server's minimum, as in franka-sim.
     const MIN_SINGULAR_VALUE: f64 = 0.05;
     let (_server, mut robot) = serve_panda();
     let home = robot.read_state().unwrap().q_desired;
-    // Nearly stretched out.
+    // The arm is nearly stretched out.
     let mut stretched = home;
     (stretched[1], stretched[3], stretched[5]) = (0.0, -0.1, 1.6);
     let between = |share: f64| -> [f64; 7] {
         std::array::from_fn(|joint| home[joint] + share * (stretched[joint] - home[joint]))
     };
     assert!(smallest_singular_value(&home) > 0.06 && smallest_singular_value(&stretched) < 0.04);
-    // The share of the path at which the smallest singular value reaches its allowed minimum.
+    // Bisects the fraction of the path at which the smallest singular value reaches its allowed minimum.
     let (mut beside, mut singular) = (0.0, 1.0);
     while singular - beside > 1e-6 {
         let middle = 0.5 * (beside + singular);
@@ -244,7 +245,7 @@ fn no_cartesian_motion_starts_at_a_singular_pose_and_one_does_just_beside_it() {
                 }
             }
         }
-        // It is not an error: the joints may continue.
+        // The refusal is not an error: joint motions are still possible.
         assert_eq!(robot.read_state().unwrap().robot_mode, RobotMode::Idle);
     }
     limit_cases::go_to(&mut robot, &home).unwrap();
@@ -263,7 +264,7 @@ fn the_arm_stops_before_it_touches_itself() {
     robot.automatic_error_recovery().unwrap();
     let share = (stopped[3] - home[3]) / (folded[3] - home[3]);
     assert!((0.5..1.0).contains(&share), "{share}");
-    // It may move out, to just before that point, but not in again.
+    // The arm may move out, to just before that point, but not in again.
     let just_before = std::array::from_fn(|joint| home[joint] + (share - 0.02) * (folded[joint] - home[joint]));
     limit_cases::go_to(&mut robot, &just_before).unwrap();
     let error = limit_cases::go_to(&mut robot, &folded).unwrap_err();

@@ -17,11 +17,11 @@ use sdg_fci::wire::{
 };
 use sdg_fci::{FciError, Limits, RobotError, read_message};
 
-/// The Panda's slowest joint brakes from its full speed in 0.29 s, this one in 0.03 s; includes the controller's
-/// settling time.
+/// Largest time until the arm is at rest. A joint of a Panda brakes from its full speed in at most 0.29 s, this one in
+/// 0.03 s from the test's speed; the rest allows for the controller to settle.
 const STOPPING_TIME: Duration = Duration::from_millis(200);
 
-/// Waits until the arm stands still, within the robot's time, and checks that it stays so.
+/// Waits until the arm is at rest, at most [`STOPPING_TIME`] of the robot's clock, and checks that it stays at rest.
 fn assert_stands(robot: &mut Robot) {
     let stopped = robot.read_state().unwrap().clone();
     let begin = stopped.message_id;
@@ -37,7 +37,7 @@ fn assert_stands(robot: &mut Robot) {
     }
 }
 
-/// Refused until the recovery, possible after it.
+/// Checks that a motion is refused until the recovery, and possible after it.
 fn assert_waits_for_recovery(robot: &mut Robot) {
     let hold = |state: &RobotState, _| ControlFlow::Break(state.q_desired);
     assert_eq!(robot.read_state().unwrap().robot_mode, RobotMode::Reflex);
@@ -123,7 +123,7 @@ fn lost_commands_in_the_middle_of_a_motion_are_made_up_for_in_every_generator() 
                     if [250, 251, 252, 500, 501, 502].contains(&ms) {
                         return Ok(None);
                     }
-                    // There and back in two seconds.
+                    // The motion goes forward and back in two seconds.
                     let phase = std::f64::consts::PI * (ms as f64 / 1000.0).min(2.0);
                     let (shape, rate) = (0.5 * (1.0 - phase.cos()), 0.5 * std::f64::consts::PI * phase.sin());
                     let mut motion = MotionCommand {
@@ -171,7 +171,7 @@ fn the_table_is_felt_and_stops_the_arm() {
 #[test]
 fn what_is_no_number_is_neither_sent_nor_followed() {
     let (_server, mut robot) = serve_panda();
-    // The client refuses it and stops the motion.
+    // The client rejects the number and stops the motion.
     let error = robot
         .control_joint_positions(InternalController::JointImpedance, |state, _| {
             let mut q = state.q_desired;
@@ -181,7 +181,7 @@ fn what_is_no_number_is_neither_sent_nor_followed() {
         .unwrap_err();
     assert_eq!(error.to_string(), "q: expected finite numbers, found NaN");
     assert_eq!(robot.read_state().unwrap().robot_mode, RobotMode::Idle);
-    // The server refuses it from a client without checks.
+    // The server rejects the number of a client without checks.
     for (controller, generator) in [
         (ControllerMode::JointImpedance, MotionGeneratorMode::JointPosition),
         (ControllerMode::JointImpedance, MotionGeneratorMode::JointVelocity),
@@ -331,7 +331,7 @@ fn a_hand_that_fails_or_is_stopped_says_so() {
         thread::sleep(Duration::from_millis(20));
         handle.stop().unwrap();
     });
-    // 3 cm at 2 mm/s: 15 s of simulated time.
+    // 3 cm at 2 mm/s take 15 s of simulated time.
     let stopped = hand.move_to(0.05, 0.002);
     stopper.join().unwrap();
     assert_eq!(stopped.unwrap_err().to_string(), "hand: move: aborted");
@@ -350,7 +350,7 @@ fn what_is_no_request_ends_the_connection_and_not_the_robot() {
         &[0xff; 12][..],
         &Header::message(HeaderKind::Robot, 99, 0, &[]),
         &Header::message(HeaderKind::Robot, 0, 0, &[1]),
-        // A request before Connect.
+        // This is a request before Connect.
         &Request::StopMove.encode(0, Version::V5).unwrap(),
     ] {
         let mut stream = TcpStream::connect(server.robot_address()).unwrap();

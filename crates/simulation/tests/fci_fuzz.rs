@@ -1,5 +1,5 @@
-//! A hundred thousand cycles of the simulated robot with many invalid requests and commands: no panic, and no NaN in a
-//! state.
+//! Runs a hundred thousand cycles of the simulated robot with many invalid requests and commands: there must be no
+//! panic, and no NaN in a state.
 
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -116,7 +116,8 @@ fn mistakes_stop_the_robot_and_nothing_else() {
             num_motions += u32::from(outgoing.response.status == Status::MotionStarted);
             num_finished += u32::from(outgoing.command == Command::Move && outgoing.response.status == Status::Success);
         }
-        // An arm set in motion by an error is soon near the end of a joint, where no further cases are tested.
+        // An arm that an error set in motion is soon near the end of a joint's range, where it would test no further
+        // cases.
         let q = plant.observe().q;
         if (q - nalgebra::SVector::<f64, 7>::from(sdg_kinematics::READY_RAD)).amax() > 0.5 {
             plant = PandaPlant::new(&WorkcellConfig::new(SceneVariation::nominal(None))).unwrap();

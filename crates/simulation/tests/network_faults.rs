@@ -1,6 +1,6 @@
-//! Faults of the network: the arm stops, one line gives the reason, and nothing moves by itself afterwards.
+//! Faults of the network: the arm stops, one line states the reason, and nothing moves by itself afterwards.
 //!
-//! Faults of the robot itself (NaN and jumps in commands, another version, a failing hand) are in fci_faults.rs, those
+//! Faults of the robot itself (NaN and jumps in commands, another version, a failing hand) are in fci_faults.rs, faults
 //! of an arm in this process in robot_faults.rs.
 
 use std::thread;
@@ -16,9 +16,9 @@ use sdg_robot::{
 };
 use sdg_simulation::{SharedPositions, Workcell};
 
-/// Time passes and nothing moves: neither the arm nor the held part.
+/// Checks that neither the arm nor the held part moves while time passes.
 fn assert_stands_still(arm: &mut FrankaArm, positions: &SharedPositions) {
-    // The remaining motion of a stop decays.
+    // First, the remaining motion of the stop decays.
     arm.wait(0.2, &mut Watch::default()).ok();
     let before = positions.get();
     arm.wait(0.3, &mut Watch::default()).ok();
@@ -26,13 +26,13 @@ fn assert_stands_still(arm: &mut FrankaArm, positions: &SharedPositions) {
     assert!(moved < 2e-3, "{moved}");
 }
 
-/// A motion is refused, and nothing moves.
+/// Checks that a motion is refused, and nothing moves.
 fn assert_latched(robot: &mut Robot<FrankaArm>, motion: Trajectory, positions: &SharedPositions) {
     assert!(matches!(robot.follow(motion), Err(RobotError::Latched(_))));
     assert_stands_still(robot.arm(), positions);
 }
 
-/// After a requested recovery, the arm moves again.
+/// Checks that the arm moves again after a requested recovery.
 fn assert_recovers(robot: &mut Robot<FrankaArm>) {
     robot.recover().unwrap();
     let motion = some_motion(robot.arm());
@@ -51,7 +51,7 @@ fn stalling(stalls: Vec<(u32, Duration)>) -> Watch {
     }))
 }
 
-/// A command that has not arrived after this time is lost.
+/// Time after which a command that has not arrived counts as lost.
 const MAX_WAIT: Duration = Duration::from_millis(20);
 
 #[test]
@@ -103,7 +103,7 @@ fn a_table_that_is_higher_than_its_file_says_stops_the_arm() {
     arm.set_contact_sensitivity(sdg_robot::ContactSensitivity::Free).unwrap();
     let wrong = SafetyLimits { table_height_m: -0.6, ..Workcell::safety_limits() };
     let mut robot = Robot::new(&mut arm, SafetyLimits { workspace: None, ..wrong }, Watch::default());
-    // Straight down, 5 cm into the table.
+    // The motion goes straight down, 5 cm into the table.
     let panda = ArmGeometry::panda();
     let mut base_from_tcp = panda.forward(&start);
     base_from_tcp.translation.z = -0.05;
@@ -118,7 +118,7 @@ fn a_table_that_is_higher_than_its_file_says_stops_the_arm() {
     assert_latched(&mut robot, motion, &positions);
 }
 
-/// Finds the part in a picture of this age.
+/// Perception with a picture of a given age.
 struct OldPicture(Twin, Duration);
 
 impl PartFinder<FrankaArm> for OldPicture {
@@ -154,7 +154,7 @@ fn a_part_that_slips_is_told_by_the_hand() {
     let mount = cell.wrist_camera();
     let mut twin = Twin { cell, positions: positions.clone() };
     let mut robot = Robot::new(&mut arm, Workcell::safety_limits(), Watch::default());
-    // A force that is too small for this weight.
+    // The force is too small for the part's weight.
     let config = GraspConfig { grasp_force_n: 0.3, ..GraspConfig::default() };
     let report = grasp(&mut robot, &mut twin, &mut (), mount, &config).unwrap();
     let GraspOutcome::Failed { step, why } = report.outcome else { panic!("0.3 N hold nothing") };
@@ -210,8 +210,8 @@ fn a_person_stops_the_arm_on_the_network() {
     let mut robot = Robot::new(&mut arm, Workcell::safety_limits(), watch);
     let motion = some_motion(robot.arm());
     let error = robot.follow(motion.clone()).unwrap_err();
-    assert_eq!(error.to_string(), "the arm was stopped: a person asked for it");
-    // It ended by itself, at rest and without an error of the robot.
+    assert_eq!(error.to_string(), "the arm was stopped: a person requested it");
+    // The motion ended at rest and without an error of the robot.
     let state = robot.arm().state().unwrap();
     assert_eq!(state.mode, ArmMode::Idle);
     assert_latched(&mut robot, motion, &positions);

@@ -1,6 +1,6 @@
-//! A whole grasp over TCP and UDP: the sequence, our client, the server, MuJoCo. Faults are in network_faults.rs.
+//! A whole grasp over TCP and UDP: the sequence, the client, the server, MuJoCo. Faults are in network_faults.rs.
 //!
-//! The table of all parts is made by `examples/network_grasps.rs` (`make network-grasps`).
+//! `examples/network_grasps.rs` (`make network-grasps`) produces the table of all parts.
 
 use crate::network::{Twin, cell, connect, serve};
 use sdg_fci::client::{Robot as Client, RobotConfig};
@@ -24,12 +24,12 @@ fn a_part_is_grasped_over_the_network_in_lockstep() {
     let load = Some(Load { mass_kg, center_in_flange_m: TIPS_IN_FLANGE_M });
     let config = GraspConfig { load, ..GraspConfig::default() };
     let report = grasp(&mut robot, &mut twin, &mut (), mount, &config).unwrap();
-    // The hand's verdict and the truth agree.
+    // The hand's verdict and the true state agree.
     assert_eq!(report.outcome, GraspOutcome::Held, "{report:?}");
     assert!(twin.is_lifted());
     assert_eq!(report.looks, [1, 1]);
     drop(arm);
-    // The load was given to the robot, which measures no further force.
+    // The robot knows the load, and measures no further force.
     let client = Client::connect(&server.robot_address().to_string(), &RobotConfig::default()).unwrap();
     let state = client.state();
     assert_eq!((state.load_mass, state.load_center), (mass_kg, TIPS_IN_FLANGE_M));

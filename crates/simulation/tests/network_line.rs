@@ -1,5 +1,5 @@
-//! A relay that loses, repeats and changes data between robot and program: the arm continues, or it stops with one
-//! line.
+//! A relay that drops, repeats and changes data between robot and program: the arm continues, or it stops with an error
+//! of one line.
 //!
 //! Faults of the programs at both ends are in network_faults.rs.
 
@@ -14,11 +14,11 @@ use sdg_robot::{
 };
 use sdg_simulation::{SharedPositions, Workcell};
 
-/// A command that has not arrived after this time is lost.
+/// Lockstep in which a command counts as lost if it has not arrived after 20 ms.
 const LOCKSTEP: Pace = Pace::Lockstep { max_wait: Duration::from_millis(20) };
 /// Number of states after the motion's start at which a fault occurs, while the arm moves.
 const FAULT_AT: u64 = 500;
-/// A client that receives nothing new gives up after 3 s.
+/// Maximum time of a test; a client that receives no new state gives up after 3 s.
 const MAX_WAIT: Duration = Duration::from_secs(20);
 
 fn all_pass() -> PassCommand {
@@ -37,7 +37,7 @@ fn changing(num_states: u64, mut change: impl FnMut(&mut RobotState) + Send + 's
 }
 
 struct Line {
-    // Ends with the test.
+    // The server runs until the end of the test.
     server: Server,
     positions: SharedPositions,
     arm: FrankaArm,
@@ -54,7 +54,8 @@ impl Line {
         Robot::new(&mut self.arm, Workcell::safety_limits(), Watch::default())
     }
 
-    /// The line of the error that ended a motion, after which nothing moves, and the observed states of the arm.
+    /// Runs a motion that ends with an error, and checks that nothing moves afterwards; returns the error's line and
+    /// the observed states of the arm.
     fn stopped(&mut self) -> (String, Vec<ArmState>) {
         let positions = self.positions.clone();
         let mut robot = self.robot();
@@ -68,7 +69,7 @@ impl Line {
         let open = HandCommand::Move { opening_m: 0.02, speed_m_s: 0.1 };
         assert!(matches!(robot.start_hand(open), Err(RobotError::Latched(_))), "{line}");
         let states = robot.watch().states().copied().collect();
-        // The remaining motion of a stop decays; the simulated time passes even if the client does not hear of it.
+        // First, the remaining motion of the stop decays; simulated time passes even if the client receives no states.
         self.let_time_pass();
         let before = positions.get();
         self.let_time_pass();
@@ -82,7 +83,7 @@ impl Line {
         std::thread::sleep(Duration::from_millis(300));
     }
 
-    /// The motion reaches its end in spite of the relay.
+    /// Checks that the motion reaches its end in spite of the relay.
     fn arrives(&mut self) {
         let mut robot = self.robot();
         let motion = some_motion(robot.arm());
@@ -92,7 +93,7 @@ impl Line {
     }
 }
 
-/// After the fault the arm moves for no longer than a controlled stop takes.
+/// Checks that the arm moves after the fault for no longer than a controlled stop takes.
 fn assert_stops_in_time(states: &[ArmState], is_faulty: impl Fn(&ArmState) -> bool) {
     let fault = states.iter().find(|state| is_faulty(state)).expect("the fault was seen");
     let last = states.last().unwrap();
@@ -127,12 +128,12 @@ fn a_reference_that_cannot_be_stops_the_arm_and_is_not_followed() {
         let mut line = Line::new(changing(20, move |state| state.q_desired[3] += value), all_pass());
         let (text, _) = line.stopped();
         assert!(text.starts_with(expected), "{text}");
-        // No command resulted from it: the robot ended the motion itself, without an error.
+        // The wrong reference led to no command: the motion ended without an error of the robot.
         assert_eq!(line.arm.state().unwrap().mode, ArmMode::Idle);
     }
 }
 
-/// The first lost state of a run, and the first one after it.
+/// Loses `num` states in a row.
 fn lost(num: u64) -> ChangeState {
     Box::new(move |number, state| match (FAULT_AT..FAULT_AT + num).contains(&number) {
         true => Vec::new(),
@@ -169,7 +170,7 @@ fn twenty_lost_states_or_commands_stop_the_arm() {
 fn a_line_that_goes_dead_stops_the_arm_at_both_ends() {
     let mut line = Line::new(lost(u64::MAX / 2), Box::new(|number| number < FAULT_AT));
     let (text, states) = line.stopped();
-    // The robot reports its own end over TCP, which is still forwarded.
+    // The robot reports the end of the motion over TCP, which the relay still forwards.
     assert!(text.starts_with("the arm stopped itself: communication_constraints_violation ("), "{text}");
     let gaps = states.windows(2).map(|pair| pair[1].time_secs - pair[0].time_secs);
     assert!(gaps.fold(0.0, f64::max) <= MAX_SILENCE_SECS + PERIOD_SECS);
@@ -181,7 +182,7 @@ fn repeated_and_late_states_change_nothing() {
     let repeating: ChangeState = Box::new(move |_, state| {
         let datagram = unchanged(state);
         let earlier = before.replace(datagram.clone());
-        // The one before again, then this one twice.
+        // Each datagram follows a repetition of the one before, and is sent twice.
         earlier.into_iter().chain([datagram.clone(), datagram]).collect()
     });
     Line::new(repeating, all_pass()).arrives();
@@ -189,7 +190,7 @@ fn repeated_and_late_states_change_nothing() {
 
 #[test]
 fn what_is_no_state_ends_the_motion() {
-    for (length, expected) in [(100, "100 were found"), (STATE_SIZE_V5 + 1, "a state of 2373 bytes")] {
+    for (length, expected) in [(100, "found 100"), (STATE_SIZE_V5 + 1, "a state of 2373 bytes")] {
         let broken: ChangeState = Box::new(move |number, state| {
             let mut datagram = unchanged(state);
             if number == FAULT_AT {
@@ -200,7 +201,7 @@ fn what_is_no_state_ends_the_motion() {
         let mut line = Line::new(broken, all_pass());
         let (text, _) = line.stopped();
         assert!(text.starts_with("the connection to the robot at 127.0.0.1") && text.contains(expected), "{text}");
-        // The robot no longer heard its client and stopped.
+        // The robot received no more commands and stopped.
         assert_eq!(line.arm.state().unwrap().mode, ArmMode::Reflex);
     }
 }

@@ -1,5 +1,5 @@
-//! A planned path around a wall over TCP and UDP, in lockstep: followed without stopping at its waypoints, and stopped
-//! in its corner.
+//! A planned path around a wall over TCP and UDP, in lockstep: it is followed without stops at its waypoints, and
+//! stopped in a corner.
 
 use crate::network::{connect, serve};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
@@ -12,7 +12,7 @@ use sdg_robot::{
 use sdg_simulation::scene::SceneVariation;
 use sdg_simulation::{CollisionWorld, Workcell, WorkcellConfig};
 
-/// Largest distance of the arm from its reference during motion, rad: a stiff arm lags by at most 30 ms.
+/// Largest distance between the arm and its reference during motion, rad: a stiff arm lags by at most 30 ms.
 const TRACKING_RAD: f64 = 0.02;
 
 fn wall() -> Obstacle {
@@ -35,7 +35,7 @@ fn cell() -> Workcell {
     cell
 }
 
-/// The single motion to one side of the wall.
+/// Plans a path to the other side of the wall, which must be a single motion.
 fn plan(robot: &mut Robot<FrankaArm>, y: f64) -> Trajectory {
     let obstacles = [wall()];
     let surroundings = Surroundings {
@@ -84,7 +84,7 @@ fn a_way_over_a_wall_is_followed_in_one_motion() {
         let q = JointVector::from_column_slice(&positions.get()[..7]);
         assert!((q - motion.end()).amax() < TRACKING_RAD, "{q}");
     }
-    // One of the two may be straight, from the other's end configuration.
+    // One of the two motions may be straight, from the end configuration of the other.
     assert!(most_bent_rad > 0.1, "{most_bent_rad}");
     drop(arm);
     server.stop().unwrap();

@@ -1,25 +1,25 @@
-//! Parts put down into cells of a tray, by contact, with 1 Nm of friction in every joint.
+//! Places parts in cells of a tray, by contact, with 1 Nm of friction in every joint.
 //!
-//! The whole tray is `make placing` (examples/placing.rs).
+//! `make placing` (examples/placing.rs) fills the whole tray.
 
 use crate::placing::{Where, beside, cell, config, place, tray};
 use nalgebra::Isometry3;
 use sdg_robot::{PlacingConfig, PlacingOutcome};
 use sdg_simulation::objects::ObjectSpec;
 
-/// Of the parts of the tray.
+/// Largest offset of a part from its cell.
 const MAX_BESIDE_M: f64 = 0.003;
 const MAX_TURNED_DEG: f64 = 3.0;
-/// Settling of a lying part that is not touched stays below this.
+/// Largest movement of a lying part that is not touched, which may settle.
 const MAX_MOVED_M: f64 = 0.5e-3;
-/// Largest force that a part and a table withstand.
+/// Largest static force that does not damage part or table.
 const MAX_STATIC_N: f64 = 10.0;
 const MAX_PEAK_N: f64 = 25.0;
 /// Largest deviation of the tcp from its reference with the part in free air.
 const MAX_FREE_AIR_M: f64 = 1.5e-3;
 const MAX_FREE_AIR_DEG: f64 = 0.5;
 
-/// Places parts into cells one after the other; the placed ones stay in the scene.
+/// Places parts in cells one after the other; placed parts stay in the scene.
 fn fill(at: Where, cells: &[u32]) {
     let spec = ObjectSpec::by_name("spring_clip").unwrap();
     let mut lying: Vec<Isometry3<f64>> = Vec::new();

@@ -1,4 +1,5 @@
-//! Plans on random problems, followed in MuJoCo at every millisecond; `make bench-planning` does the same with a thousand.
+//! Plans for random problems, followed in MuJoCo at every millisecond; `make bench-planning` does the same with a
+//! thousand problems.
 
 use sdg_kinematics::dynamics::ArmDynamics;
 use sdg_kinematics::planning::PlanOptions;
@@ -8,7 +9,7 @@ use sdg_simulation::{CollisionWorld, PlanningProblem};
 #[test]
 fn no_path_of_fifty_collides_in_mujoco() {
     const COUNT: u64 = 50;
-    /// A free start and a free goal do not imply that a path exists; all of these problems have one.
+    /// Minimum number of paths that are found: a free start and a free goal do not imply that a path exists.
     const MIN_FOUND: usize = 49;
     let (mut num_found, mut num_bent, mut num_steps) = (0, 0, 0);
     for seed in 0..COUNT {

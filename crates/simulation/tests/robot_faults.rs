@@ -12,7 +12,7 @@ use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::scene::SceneVariation;
 use sdg_simulation::{ArmFault, ArmFaultKind, AttemptErrors, RenderConfig, Workcell, WorkcellConfig, marked_grasp};
 
-/// Knows the part's pose, and takes no picture.
+/// Perception that knows the part's pose and takes no picture.
 struct Truth;
 
 impl PartFinder<Workcell> for Truth {
@@ -35,14 +35,14 @@ fn run(robot: &mut Robot<'_, Workcell>) -> sdg_robot::Result<GraspReport> {
     grasp(robot, &mut Truth, &mut (), mount, &GraspConfig::default())
 }
 
-/// A motion that is safe from the arm's position.
+/// A safe motion from the arm's position.
 fn some_motion(robot: &mut Robot<'_, Workcell>) -> Trajectory {
     let start = robot.arm().state().unwrap().q_commanded;
     let end = start + JointVector::from([0.1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
     Trajectory::point_to_point(&start, &end, &JointLimits::panda().scaled(0.1, 0.1, 0.1).unwrap()).unwrap()
 }
 
-/// Nothing moves: motions and the hand are refused, and the arm stands still while time passes.
+/// Checks that motions and commands of the hand are refused, and that the arm does not move while time passes.
 fn assert_stands_still(robot: &mut Robot<'_, Workcell>) {
     let motion = some_motion(robot);
     assert!(matches!(robot.follow(motion), Err(RobotError::Latched(_))));
@@ -77,7 +77,7 @@ fn a_state_that_cannot_be_stops_the_arm_for_good() {
         (ArmFaultKind::NotANumber, "the arm was stopped: its state is implausible: joint 4 is at NaN"),
         (ArmFaultKind::Jump, "the arm was stopped: its state is implausible: joint 4 jumped by 1.00"),
     ] {
-        // In the first motion.
+        // The fault occurs in the first motion.
         let mut cell = cell(Some(ArmFault { at_secs: 0.3, kind }));
         let mut robot = Robot::new(&mut cell, Workcell::safety_limits(), Watch::default());
         let error = run(&mut robot).unwrap_err();
@@ -87,7 +87,7 @@ fn a_state_that_cannot_be_stops_the_arm_for_good() {
         let stopped_after_secs = robot.arm().data().time_secs() - 0.3;
         assert!(stopped_after_secs <= STOP_SECS + 0.002, "{stopped_after_secs} s");
         assert_stands_still(&mut robot);
-        // The last states are available for a file.
+        // The last states are available for writing to a file.
         assert!(robot.watch().states().len() > 500);
     }
 }
@@ -100,7 +100,7 @@ fn after_a_reflex_a_person_decides() {
     assert_eq!(error.to_string(), "the arm stopped itself: an injected reflex");
     assert_stands_still(&mut robot);
     assert!(robot.latched().unwrap().contains("an injected reflex"));
-    // Its cause persists.
+    // The cause of the reflex persists.
     assert!(robot.recover().is_err());
     assert_stands_still(&mut robot);
 }
@@ -116,7 +116,7 @@ fn a_program_that_starts_anew_finds_the_arm_in_reflex() {
 
 #[test]
 fn a_hand_that_does_nothing_is_noticed() {
-    // It fails before it opens to the part's width, and after that, before it closes.
+    // The hand fails before it opens to the part's width, or later, before it closes.
     for (at_secs, expected) in [(0.5, "the hand failed: the opening should be"), (3.0, "do not press")] {
         let mut cell = cell(Some(ArmFault { at_secs, kind: ArmFaultKind::HandStuck }));
         let mut robot = Robot::new(&mut cell, Workcell::safety_limits(), Watch::default());
@@ -137,7 +137,7 @@ fn a_hand_that_does_nothing_is_noticed() {
 fn a_part_that_slips_is_felt_by_the_hand() {
     let mut cell = cell(None);
     let mut robot = Robot::new(&mut cell, Workcell::safety_limits(), Watch::default());
-    // A force that is too small for this weight.
+    // The force is too small for the part's weight.
     let config = GraspConfig { grasp_force_n: 0.3, ..GraspConfig::default() };
     let mount = robot.arm().wrist_camera();
     let report = grasp(&mut robot, &mut Truth, &mut (), mount, &config).unwrap();
@@ -158,11 +158,11 @@ fn a_person_stops_the_arm_on_its_path() {
     }));
     let mut robot = Robot::new(&mut cell, Workcell::safety_limits(), watch);
     let error = run(&mut robot).unwrap_err();
-    assert_eq!(error.to_string(), "the arm was stopped: a person asked for it");
+    assert_eq!(error.to_string(), "the arm was stopped: a person requested it");
     let state = robot.arm().state().unwrap();
     assert!(state.dq.amax() < 0.02, "{}", state.dq);
     assert_stands_still(&mut robot);
-    // A person has checked it: it moves again.
+    // A person has checked the arm, so that it moves again.
     pressed.store(false, Ordering::SeqCst);
     robot.recover().unwrap();
     let motion = some_motion(&mut robot);
@@ -181,7 +181,7 @@ fn a_motion_from_elsewhere_is_not_begun() {
     let motion = Trajectory::point_to_point(&start, &ready_pose(), &slow).unwrap();
     let error = robot.follow(motion).unwrap_err().to_string();
     assert!(error.contains("starts 1.000 rad from the position of joint 2"), "{error}");
-    // It was not started, so that no person needs to check it.
+    // The motion was not started, so that no person needs to check the arm.
     assert_eq!(robot.latched(), None);
     let motion = some_motion(&mut robot);
     robot.follow(motion).unwrap();

@@ -14,10 +14,10 @@ use crate::wire::{
     RobotMode, RobotState, Status, Transform, Version,
 };
 
-/// Deviations larger than any of our motions: 10 m, 3.12 rad (libfranka's own default).
+/// Allowed deviations that no motion of this client exceeds: 10 m, 3.12 rad (libfranka's default).
 const ANY_DEVIATION: Deviation = Deviation { translation: 10.0, rotation: 3.12, elbow: 2.0 * std::f64::consts::PI };
 
-/// The robot's own controller that follows the references.
+/// The robot's internal controller, which follows the references.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum InternalController {
     /// Impedance in the joints.
@@ -39,10 +39,10 @@ impl From<InternalController> for ControllerMode {
 pub type Answer<T> = ControlFlow<T, T>;
 
 impl Robot {
-    /// Follows joint positions (rad), one for each state.
+    /// Commands joint positions (rad), one command for each state.
     ///
-    /// The closure gets the state and the robot's time since the last one (zero at first); the first command may
-    /// differ from `state.q_desired` only by a small step.
+    /// The closure gets the state and the time since the last one by the robot's clock (zero at first). The first
+    /// command may differ from `state.q_desired` only by a small step.
     ///
     /// # Errors
     /// [`FciError::Motion`] if the robot ended the motion, with its errors; [`FciError::Refused`] if it did not start;
@@ -57,10 +57,10 @@ impl Robot {
         })
     }
 
-    /// Follows joint velocities (rad/s); see [`Robot::control_joint_positions`].
+    /// Commands joint velocities (rad/s); see [`Robot::control_joint_positions`].
     ///
     /// # Errors
-    /// As [`Robot::control_joint_positions`].
+    /// As for [`Robot::control_joint_positions`].
     pub fn control_joint_velocities(
         &mut self,
         controller: InternalController,
@@ -71,11 +71,11 @@ impl Robot {
         })
     }
 
-    /// Follows poses of the end effector in the base frame, from `state.base_from_ee_commanded` on; see
+    /// Commands poses of the end effector in the base frame, starting at `state.base_from_ee_commanded`; see
     /// [`Robot::control_joint_positions`].
     ///
     /// # Errors
-    /// As [`Robot::control_joint_positions`], and [`FciError::Command`] for a matrix that is not a pose.
+    /// As for [`Robot::control_joint_positions`], and [`FciError::Command`] for a matrix that is not a pose.
     pub fn control_poses(
         &mut self,
         controller: InternalController,
@@ -88,10 +88,10 @@ impl Robot {
         })
     }
 
-    /// Follows twists of the end effector in the base frame (m/s, rad/s); see [`Robot::control_joint_positions`].
+    /// Commands twists of the end effector in the base frame (m/s, rad/s); see [`Robot::control_joint_positions`].
     ///
     /// # Errors
-    /// As [`Robot::control_joint_positions`].
+    /// As for [`Robot::control_joint_positions`].
     pub fn control_twists(
         &mut self,
         controller: InternalController,
@@ -105,7 +105,7 @@ impl Robot {
     /// Commands torques (N·m), to which the robot adds gravity compensation; see [`Robot::control_joint_positions`].
     ///
     /// # Errors
-    /// As [`Robot::control_joint_positions`].
+    /// As for [`Robot::control_joint_positions`].
     pub fn control_torques(
         &mut self,
         mut controller: impl FnMut(&RobotState, Duration) -> Answer<[f64; 7]>,
@@ -120,11 +120,11 @@ impl Robot {
         })
     }
 
-    /// Any generator with any controller; the closure fills the fields that they read. `message_id` and the flags of the end
-    /// are set here.
+    /// Commands any generator with any controller; the closure sets the fields that both use. This function sets
+    /// `message_id` and the flags that end the motion.
     ///
     /// # Errors
-    /// As [`Robot::control_joint_positions`].
+    /// As for [`Robot::control_joint_positions`].
     pub fn control(
         &mut self,
         controller: ControllerMode,
@@ -139,8 +139,8 @@ impl Robot {
         })
     }
 
-    /// As [`Robot::control`] without checks of the commands; `None` leaves a state without an answer: for tests of
-    /// servers. An error of the closure ends the motion.
+    /// As [`Robot::control`] without checks of the commands, for tests of servers. `None` leaves a state without an
+    /// answer; an error of the closure ends the motion.
     #[doc(hidden)]
     pub fn control_unchecked(
         &mut self,
@@ -169,7 +169,7 @@ impl Robot {
         }
     }
 
-    /// Sends the Move, and waits for its start and the first state that shows it.
+    /// Sends the Move, and waits for its acceptance and for the first state within the motion.
     fn start_motion(&mut self, controller: ControllerMode, generator: MotionGeneratorMode) -> Result<u32> {
         self.session.forget_responses();
         let request = Request::Move(MoveRequest {
@@ -206,7 +206,7 @@ impl Robot {
             && state.motion_generator_mode == generator
     }
 
-    /// A robot that has left the motion gives the reason in a second answer to the Move.
+    /// Fails if the robot has left the motion, with the reason from its second answer to the Move.
     fn check_motion(&mut self, id: u32, controller: ControllerMode, generator: MotionGeneratorMode) -> Result<()> {
         if self.runs(controller, generator) {
             return Ok(());
@@ -220,14 +220,14 @@ impl Robot {
             Ok(response) => response,
             Err(error) => return error,
         };
-        // The last state is outside the motion, and its rate is zero; commands lost since the state before reduce that
-        // state's rate.
+        // The last state is outside the motion and has a rate of zero. The rate comes from the last state within the
+        // motion, reduced by the commands lost since then.
         let success_rate =
             self.recent.iter().rev().find(|state| state.robot_mode == RobotMode::Move).map_or(0.0, |last| {
                 let num_lost = self.state.message_id.saturating_sub(last.message_id + 1);
                 last.control_command_success_rate * (1.0 - num_lost as f64 / 100.0).max(0.0)
             });
-        // On a Panda both are equal; some servers accumulate the reasons over several motions.
+        // On a Panda, `errors` and `reflex_reason` are equal; some servers accumulate the latter over several motions.
         let errors = if self.state.errors.is_empty() { self.state.reflex_reason } else { self.state.errors };
         FciError::Motion { status: response.status, errors, success_rate }
     }
@@ -259,7 +259,7 @@ impl Robot {
         }
     }
 
-    /// Ends a motion whose closure failed; the robot's answer is ignored because of that failure.
+    /// Ends a motion whose closure failed. The robot's answer is ignored, because the closure's error is reported.
     fn cancel_motion(&mut self, id: u32) {
         if self.stop().is_ok() {
             let _ = self.session.wait_for(id, "answer to the end of a motion", Some(self.session.timeout()));
@@ -278,7 +278,7 @@ fn with_motion(motion: MotionCommand) -> RobotCommand {
     RobotCommand { motion, ..RobotCommand::default() }
 }
 
-/// Refuses commands that no robot may receive.
+/// Rejects commands that must not be sent to a robot.
 fn check(command: &RobotCommand, controller: ControllerMode, generator: MotionGeneratorMode) -> Result<()> {
     let finite = |field: &'static str, values: &[f64]| match values.iter().find(|value| !value.is_finite()) {
         None => Ok(()),

@@ -7,17 +7,17 @@ use super::session::{Sending, Session};
 use crate::error::{FciError, Result};
 use crate::wire::{HAND_PORT, HAND_VERSION, HandRequest, HandState, HandStatus, HeaderKind, Status};
 
-/// Size of the hand's state.
+/// Size of the hand's state in bytes.
 const STATE_SIZE: usize = 23;
-/// A homing opens and closes at its own speed.
+/// Timeout of a motion: homing opens and closes the fingers at the hand's own speed.
 const MOTION_TIMEOUT: Duration = Duration::from_secs(60);
 
-/// How to connect to a hand.
+/// Parameters of a connection to a hand.
 #[derive(Debug, Clone)]
 pub struct HandConfig {
     /// TCP port of the hand.
     pub port: u16,
-    /// Limits every wait for a state.
+    /// Maximum duration of every wait for a state.
     pub timeout: Duration,
 }
 
@@ -27,7 +27,7 @@ impl Default for HandConfig {
     }
 }
 
-/// A connected hand. Its calls return when the fingers have stopped.
+/// A connected hand. Calls return when the fingers have stopped.
 #[derive(Debug)]
 pub struct Hand {
     session: Session,
@@ -40,7 +40,7 @@ pub struct HandStopHandle {
 }
 
 impl HandStopHandle {
-    /// Asks the hand to stop; the call that waits for its motion returns.
+    /// Asks the hand to stop; a call that waits for the end of a motion returns.
     ///
     /// # Errors
     /// [`FciError::Socket`] if the hand is disconnected.
@@ -53,7 +53,7 @@ impl Hand {
     /// Connects to the hand of a robot by name or IP address.
     ///
     /// # Errors
-    /// [`FciError::Socket`], [`FciError::Version`] for a hand of another version.
+    /// [`FciError::Socket`], or [`FciError::Version`] for a hand with another protocol version.
     pub fn connect(host: &str, config: &HandConfig) -> Result<Self> {
         let mut session = Session::connect(resolve(host, config.port)?, HeaderKind::Hand, config.timeout)?;
         let request = HandRequest::Connect { version: HAND_VERSION, udp_port: session.udp_port()? };
@@ -80,7 +80,7 @@ impl Hand {
         self.session.receive(STATE_SIZE, true, HandState::decode)
     }
 
-    /// Finds the fingers' range.
+    /// Finds the range of the fingers by opening and closing them.
     ///
     /// # Errors
     /// [`FciError::Refused`] if the hand fails or is stopped, and the errors of the connection.
@@ -91,16 +91,16 @@ impl Hand {
     /// Moves the fingers to a width (m) at a speed (m/s).
     ///
     /// # Errors
-    /// As [`Hand::homing`].
+    /// As for [`Hand::homing`].
     pub fn move_to(&mut self, width: f64, speed: f64) -> Result<bool> {
         self.execute(&HandRequest::Move { width, speed })
     }
 
-    /// Closes or opens towards a width (m) at a speed (m/s) and presses with a force (N); true if the fingers then
-    /// press on something at a width between `width - epsilon_inner` and `width + epsilon_outer`.
+    /// Moves the fingers towards a width (m) at a speed (m/s) and presses with a force (N). Returns true if the fingers
+    /// then press on an object at a width between `width - epsilon_inner` and `width + epsilon_outer`.
     ///
     /// # Errors
-    /// As [`Hand::homing`].
+    /// As for [`Hand::homing`].
     pub fn grasp(
         &mut self,
         width: f64,
@@ -115,12 +115,12 @@ impl Hand {
     /// Stops the fingers and releases the part.
     ///
     /// # Errors
-    /// As [`Hand::homing`].
+    /// As for [`Hand::homing`].
     pub fn stop(&mut self) -> Result<bool> {
         self.execute(&HandRequest::Stop)
     }
 
-    /// For another thread, to stop the motion for which this one waits.
+    /// A handle with which another thread can stop the motion for which this one waits.
     pub fn stop_handle(&self) -> HandStopHandle {
         HandStopHandle { sending: self.session.sending.clone() }
     }

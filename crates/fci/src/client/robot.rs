@@ -17,14 +17,14 @@ const NUM_RECENT_STATES: usize = 1000;
 /// Maximum duration of a recovery.
 const RECOVERY_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// How to connect.
+/// Parameters of a connection to a robot.
 #[derive(Debug, Clone)]
 pub struct RobotConfig {
     /// TCP port of the robot.
     pub port: u16,
-    /// The protocol version; `None` asks the robot, first with 5, then with its answer.
+    /// The protocol version. With `None`, the client tries version 5, then the version that the robot answers.
     pub version: Option<Version>,
-    /// Limits every wait for a response or a state.
+    /// Maximum duration of every wait for a response or a state.
     pub timeout: Duration,
 }
 
@@ -36,7 +36,7 @@ impl Default for RobotConfig {
 
 /// A connected robot. Motions are in `control`: [`Robot::control_joint_positions`] and the related functions.
 ///
-/// Dropping it closes the connection, and the robot stops a running motion.
+/// Dropping a `Robot` closes the connection, and the robot stops a running motion.
 #[derive(Debug)]
 pub struct Robot {
     pub(super) session: Session,
@@ -67,8 +67,8 @@ impl Robot {
     /// Connects to a robot by name or IP address (`HOST` or `HOST:PORT`) and waits for its first state.
     ///
     /// # Errors
-    /// [`FciError::Socket`], [`FciError::Version`] for a robot of another version, [`FciError::Timeout`] if no state
-    /// arrives (often because a firewall blocks UDP).
+    /// [`FciError::Socket`]; [`FciError::Version`] for a robot with an unsupported protocol version;
+    /// [`FciError::Timeout`] if no state arrives (often because a firewall blocks UDP).
     pub fn connect(host: &str, config: &RobotConfig) -> Result<Self> {
         let address = resolve(host, config.port)?;
         match config.version {
@@ -90,7 +90,7 @@ impl Robot {
             [low, high, ..] => u16::from_le_bytes([low, high]),
             _ => 0,
         };
-        // Some servers accept every version and continue in their own.
+        // Some servers accept every version and then use their own.
         if response.status != Status::Success || found != version.number() {
             return Err(FciError::Version { peer: "robot", expected: "5 (Panda) or 10 (FR3)".into(), found });
         }
@@ -110,7 +110,7 @@ impl Robot {
         self.version
     }
 
-    /// The last state that was received.
+    /// The last received state.
     pub fn state(&self) -> &RobotState {
         &self.state
     }
@@ -135,7 +135,7 @@ impl Robot {
         Ok(&self.state)
     }
 
-    /// For another thread, to stop the motion that this one controls.
+    /// A handle with which another thread can stop the motion that this one controls.
     pub fn stop_handle(&self) -> StopHandle {
         StopHandle { sending: self.session.sending.clone(), version: self.version }
     }
@@ -180,7 +180,7 @@ impl Robot {
         self.set(&Request::SetCartesianImpedance(*stiffness))
     }
 
-    /// Tells the robot its load besides its end effector.
+    /// Sets the robot's load in addition to its end effector.
     ///
     /// # Errors
     /// [`FciError::Refused`] and the errors of the connection.
@@ -214,7 +214,7 @@ impl Robot {
         accept(&response, request.command())
     }
 
-    /// Takes the newest state that is newer than the last one; repeated or late datagrams are ignored.
+    /// Receives a state that is newer than the last one; repeated and late datagrams are ignored.
     pub(super) fn receive(&mut self, discard_waiting: bool) -> Result<()> {
         let version = self.version;
         let size = match version {
@@ -222,7 +222,7 @@ impl Robot {
             Version::V10 => STATE_SIZE_V10,
         };
         let mut discard_waiting = discard_waiting;
-        // A number that is too large by error would make all later states look old.
+        // The deadline is needed because, after a state with a wrong, too large number, all later states look old.
         let deadline = Instant::now() + self.session.timeout();
         loop {
             let state = self.session.receive(size, discard_waiting, |bytes| RobotState::decode(bytes, version))?;

@@ -13,12 +13,13 @@ use crate::message::read_message;
 use crate::wire::{Header, HeaderKind};
 use crate::wire_error::WireError;
 
-/// Responses that have arrived and were not looked at; the next ones wait in the network. A robot sends one for each request.
+/// Maximum number of received responses that are not yet processed; further ones wait in the network. A robot sends one
+/// response for each request.
 const MAX_WAITING: usize = 16;
-/// Responses that were looked at and belong to another request than the one that is waited for; the oldest are dropped.
+/// Maximum number of kept responses to requests for which no call waits yet; the oldest are dropped.
 const MAX_KEPT: usize = 16;
 
-/// The sending half, which any thread may use.
+/// The sending half of a connection, which any thread may use.
 #[derive(Debug, Clone)]
 pub(crate) struct Sending {
     address: SocketAddr,
@@ -27,7 +28,7 @@ pub(crate) struct Sending {
 }
 
 impl Sending {
-    /// Sends the message that `encode` makes with a new command number, and returns the number.
+    /// Sends the message that `encode` creates for a new command number, and returns the number.
     pub(crate) fn send(&self, encode: impl FnOnce(u32) -> Vec<u8>) -> Result<u32> {
         let id = self.next_id.fetch_add(1, Ordering::Relaxed);
         let mut stream = self.stream.lock().unwrap_or_else(PoisonError::into_inner);
@@ -36,10 +37,10 @@ impl Sending {
     }
 }
 
-/// The output of the reading thread: a response, or the reason for its end.
+/// The output of the reading thread: a response, or the error that ended the thread.
 type Incoming = std::result::Result<(Header, Vec<u8>), WireError>;
 
-/// A connection; dropping it closes it.
+/// A connection, which is closed when it is dropped.
 #[derive(Debug)]
 pub(crate) struct Session {
     pub(crate) address: SocketAddr,
@@ -53,7 +54,7 @@ pub(crate) struct Session {
 }
 
 impl Session {
-    /// Connects; `timeout` limits every wait for a response or a state.
+    /// Connects. `timeout` is the maximum duration of every wait for a response or a state.
     pub(crate) fn connect(address: SocketAddr, kind: HeaderKind, timeout: Duration) -> Result<Self> {
         let stream = TcpStream::connect_timeout(&address, timeout)
             .map_err(|source| socket_error("connect to", address, source))?;
@@ -84,13 +85,13 @@ impl Session {
         })
     }
 
-    /// The port to which states are sent.
+    /// The UDP port to which the peer sends its states.
     pub(crate) fn udp_port(&self) -> Result<u16> {
         let local = self.udp.local_addr().map_err(|source| socket_error("open sockets for", self.address, source))?;
         Ok(local.port())
     }
 
-    /// Waits for the response of a command.
+    /// Waits for the response to a command.
     pub(crate) fn wait_for(&mut self, id: u32, what: &'static str, timeout: Option<Duration>) -> Result<Vec<u8>> {
         let deadline = timeout.map(|timeout| Instant::now() + timeout);
         loop {
@@ -113,12 +114,12 @@ impl Session {
         }
     }
 
-    /// Timeout of a response that involves no motion.
+    /// Timeout of responses to commands without a motion.
     pub(crate) fn timeout(&self) -> Duration {
         self.timeout
     }
 
-    /// The response of a command, if it has arrived.
+    /// The response to a command, if it has arrived.
     pub(crate) fn poll(&mut self, id: u32) -> Result<Option<Vec<u8>>> {
         self.fetch()?;
         Ok(self.take_kept(id))
@@ -158,7 +159,7 @@ impl Session {
 
     /// Waits for a datagram of the peer and returns the newest one.
     ///
-    /// `decode` turns bytes into a state; a datagram that it refuses is an error. If `discard_waiting` is set,
+    /// `decode` converts a datagram to a state; a datagram that it rejects is an error. If `discard_waiting` is set,
     /// datagrams received before the call are ignored.
     pub(crate) fn receive<T>(
         &mut self,
@@ -180,7 +181,7 @@ impl Session {
                 Err(source) => return Err(socket_error("receive from", self.address, source)),
             }
             if newest.is_none() && Instant::now() >= deadline {
-                // The end of the robot's connection has its own error.
+                // If the robot has closed the connection, `fetch` returns the error for that.
                 self.fetch()?;
                 return Err(FciError::Timeout { what: "state", address: self.address, waited: self.timeout });
             }
@@ -214,7 +215,7 @@ impl Session {
         received
     }
 
-    /// The length of a datagram that came from the peer.
+    /// The length of a datagram, if it came from the peer.
     fn accept(&mut self, length: usize, from: SocketAddr) -> Option<usize> {
         if from.ip() != self.address.ip() {
             return None;
@@ -234,11 +235,11 @@ impl Session {
 impl Drop for Session {
     fn drop(&mut self) {
         let stream = self.sending.stream.lock().unwrap_or_else(PoisonError::into_inner);
-        // If the peer is disconnected, nothing remains to be closed.
+        // An error means that the peer is already disconnected.
         let _ = stream.shutdown(Shutdown::Both);
         drop(stream);
         if let Some(reader) = self.reader.take() {
-            // It may wait for room.
+            // The reading thread may wait for room in the queue.
             while !reader.is_finished() {
                 let _ = self.incoming.recv_timeout(Duration::from_millis(1));
             }
@@ -250,7 +251,7 @@ impl Drop for Session {
 fn read_responses(mut stream: impl Read, kind: HeaderKind, sender: &SyncSender<Incoming>) {
     loop {
         match read_message(&mut stream, kind) {
-            // An error of the socket counts as its end, like a closed connection.
+            // An error of the socket counts as a closed connection.
             Err(_) => return,
             Ok(message) => {
                 let is_end = message.is_err();

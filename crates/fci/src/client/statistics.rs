@@ -2,23 +2,23 @@
 
 use std::time::{Duration, Instant};
 
-/// A longer gap between states is a stall.
+/// Longest gap between two states that is not a stall.
 const STALL: Duration = Duration::from_millis(20);
-/// Slower answers are counted in the last bin.
+/// Number of bins of answer times, one per microsecond; the last one counts all slower answers.
 const NUM_BINS: usize = 5000;
 
-/// Times of one motion's loop.
+/// Timing of one motion's control loop.
 #[derive(Debug, Clone)]
 pub struct ControlStatistics {
     /// Number of answered states.
     pub num_answers: u64,
-    /// Milliseconds of the robot between the first and the last answered state without an answer: states that came too late.
+    /// Number of states, one per millisecond of the robot, that arrived too late for an answer.
     pub num_skipped: u64,
     /// Longest time between two states, by this computer's clock.
     pub max_gap: Duration,
-    /// Number of such times longer than 20 ms.
+    /// Number of gaps between two states longer than 20 ms.
     pub num_stalls: u64,
-    /// Number of answers by time in microseconds, from receiving the state to having sent the command.
+    /// Histogram of the answer times in microseconds, from receiving the state to having sent the command.
     answer_us: Vec<u32>,
     max_answer: Duration,
     last_received: Option<(Instant, u64)>,
@@ -56,7 +56,7 @@ impl ControlStatistics {
         self.last_received = Some((now, message_id));
     }
 
-    /// Records that it was answered.
+    /// Records that the last state was answered.
     pub(super) fn answered(&mut self) {
         let Some((received, _)) = self.last_received else { return };
         let took = received.elapsed();
@@ -65,7 +65,8 @@ impl ControlStatistics {
         self.answer_us[(took.as_micros() as usize).min(NUM_BINS - 1)] += 1;
     }
 
-    /// The time within which a share of the answers was sent, to the microsecond; the slowest one for a share of 1.
+    /// The answer time, to the microsecond, within which the fraction `share` of the answers was sent; the slowest one
+    /// for a fraction of 1.
     pub fn answer_time(&self, share: f64) -> Duration {
         let wanted = (share * self.num_answers as f64).ceil() as u64;
         let mut counted = 0;

@@ -1,4 +1,5 @@
-//! Poses, twists and the elbow: the next reference from a command, its limits, and the joint motion that it needs.
+//! Poses, twists and the elbow: the next reference from a command, the check of its limits, and the joint motion for
+//! it.
 
 use nalgebra::{Isometry3, SMatrix, Vector6};
 
@@ -9,35 +10,39 @@ use crate::pose::{difference, is_rigid, isometry, moved};
 use crate::wire::MotionCommand;
 use crate::wire::robot_error::{RobotError, RobotErrors};
 
-/// Largest distance of a motion's first pose from the end effector; not published by libfranka, as in franka-sim.
+/// Largest distance of a motion's first pose from the end effector. Not published by libfranka; the value is
+/// franka-sim's.
 const START_TRANSLATION_M: f64 = 0.05;
 const START_ROTATION_RAD: f64 = 0.1;
-/// Largest distance of the first elbow from the measured one; likewise.
+/// Largest distance of the first elbow from the measured one. Not published by libfranka; the value is franka-sim's.
 const START_ELBOW_RAD: f64 = 0.1;
-/// Smallest singular value of the Jacobian at which a Cartesian motion may start; likewise.
+/// Smallest singular value of the Jacobian at which a Cartesian motion may start. Not published by libfranka; the value
+/// is franka-sim's.
 pub const MIN_SINGULAR_VALUE: f64 = 0.05;
-/// Keeps the inverse bounded near singular poses; at 1e-3 a pose is still followed to a micrometre in the next cycle.
+/// Damping that keeps the inverse bounded near singular poses; with 1e-3 the error of a pose is still below a
+/// micrometre in the next cycle.
 const DAMPING: f64 = 1e-3;
 
-/// The client's reference of the end effector: `O_T_EE_c`, `O_dP_EE_c`, `O_ddP_EE_c`, `elbow_c` and its derivatives.
+/// The reference of the end effector from the client's commands: `O_T_EE_c`, `O_dP_EE_c`, `O_ddP_EE_c`, `elbow_c` and
+/// its derivatives.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CartesianReference {
     /// `base_from_ee`.
     pub pose: Isometry3<f64>,
-    /// m/s and rad/s in the base frame.
+    /// Twist in the base frame, m/s and rad/s.
     pub twist: Vector6<f64>,
-    /// m/s² and rad/s² in the base frame.
+    /// Derivative of the twist, m/s² and rad/s².
     pub twist_rate: Vector6<f64>,
     /// Position of joint 3 and sign of joint 4.
     pub elbow: [f64; 2],
-    /// rad/s, of joint 3.
+    /// Velocity of joint 3, rad/s.
     pub elbow_velocity: f64,
-    /// rad/s², of joint 3.
+    /// Acceleration of joint 3, rad/s².
     pub elbow_acceleration: f64,
 }
 
 impl CartesianReference {
-    /// At rest at the joints' positions.
+    /// A reference at rest at a pose, with the elbow of the joint positions `q`.
     pub fn at_rest(pose: Isometry3<f64>, q: &JointVector) -> Self {
         Self {
             pose,
@@ -69,7 +74,7 @@ impl CartesianReference {
     /// The reference after a commanded twist, or the error for which the robot stops.
     pub fn after_twist(&self, command: &MotionCommand, is_first: bool, limits: &Limits) -> Result<Self, RobotErrors> {
         let twist = Vector6::from(command.twist);
-        // The error is named after the interface: the command here is the velocity.
+        // The error is named after the interface: with twists, the command is a velocity.
         let acceleration_error = RobotError::CartesianMotionGeneratorAccelerationDiscontinuity;
         self.to(moved(&self.pose, &(twist * PERIOD_SECS)), twist, acceleration_error, command, is_first, limits)
     }
@@ -150,13 +155,13 @@ pub fn smallest_singular_value(jacobian: &Jacobian) -> f64 {
     values.min().max(0.0).sqrt()
 }
 
-/// The joints' step that moves the end effector by `motion` (m and rad in the base frame), and joint 3 by `elbow_step`
-/// if it is commanded, otherwise the smallest possible step.
+/// The step of the joints that moves the end effector by `motion` (m and rad in the base frame). If the elbow is
+/// commanded, joint 3 moves by `elbow_step`; otherwise this is the smallest such step.
 pub fn joint_step(jacobian: &Jacobian, motion: &Vector6<f64>, elbow_step: Option<f64>) -> JointVector {
     match elbow_step {
         None => damped_step(jacobian, motion),
         Some(elbow_step) => {
-            // The motion of joint 3 is given; the other six do the rest.
+            // The motion of joint 3 is given; the other six joints supply the rest of the motion.
             let given = jacobian.column(2) * elbow_step;
             let mut others = *jacobian;
             others.column_mut(2).fill(0.0);
@@ -169,6 +174,6 @@ pub fn joint_step(jacobian: &Jacobian, motion: &Vector6<f64>, elbow_step: Option
 
 fn damped_step(jacobian: &Jacobian, motion: &Vector6<f64>) -> JointVector {
     let square = jacobian * jacobian.transpose() + SMatrix::<f64, 6, 6>::identity() * (DAMPING * DAMPING);
-    // The sum is positive definite, so that a factor exists.
+    // The matrix is positive definite, so that a factor exists.
     square.cholesky().map_or_else(JointVector::zeros, |factor| jacobian.transpose() * factor.solve(motion))
 }

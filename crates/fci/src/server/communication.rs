@@ -1,13 +1,14 @@
-//! Records which cycles were answered.
+//! Counts the cycles of a motion that the client answered.
 
 use std::collections::VecDeque;
 
 /// Number of successive lost commands after which the robot stops.
 pub const MAX_LOST_IN_A_ROW: u32 = 20;
-/// Number of last cycles in the success rate.
+/// Number of cycles that the success rate covers.
 const WINDOW: usize = 100;
-/// Cycles that a client has for its first command: libfranka leaves some states unanswered while a motion starts. Not
-/// published; without a limit a client that never answers would keep the robot in a motion forever.
+/// Maximum number of cycles before the first command: libfranka leaves some states unanswered while a motion starts.
+/// The real value is not published; without a limit, a client that never answers would keep the robot in a motion
+/// forever.
 const MAX_CYCLES_TO_START: u32 = 200;
 
 /// Counts the answers of one motion.
@@ -42,7 +43,7 @@ impl Communication {
         self.lost_in_a_row >= if self.has_started { MAX_LOST_IN_A_ROW } else { MAX_CYCLES_TO_START }
     }
 
-    /// Share of the last cycles that were answered.
+    /// Fraction of the last cycles that were answered.
     pub fn success_rate(&self) -> f64 {
         let answered = self.window.iter().filter(|&&is_answered| is_answered).count();
         answered as f64 / self.window.len().max(1) as f64

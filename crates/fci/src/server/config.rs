@@ -6,41 +6,41 @@ use std::time::Duration;
 use crate::limits::Limits;
 use crate::wire::{HAND_PORT, ROBOT_PORT};
 
-/// The start of a cycle.
+/// The rule that determines when a cycle starts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Pace {
-    /// A thousand times per second, as on a robot; later commands are lost.
+    /// A thousand cycles per second, as on a robot; late commands are lost.
     RealTime,
-    /// During motions after the client's answer, or after `max_wait` as a lost command. Time advances during motions
-    /// and while arm or fingers move, so that a run is the same on every machine.
+    /// During motions, the next cycle starts after the client's answer, or after `max_wait` as with a lost command.
+    /// Time advances during motions and while arm or fingers move, so that a run is the same on every machine.
     Lockstep {
-        /// Maximum time of a client for an answer.
+        /// Maximum duration of the wait for a client's answer.
         max_wait: Duration,
     },
 }
 
 impl Pace {
-    /// Lockstep with half a second for each answer: libfranka gives up on a robot that is silent for a second.
+    /// Lockstep with half a second for each answer: libfranka ends the connection if it receives no state for a second.
     pub const LOCKSTEP: Pace = Pace::Lockstep { max_wait: Duration::from_millis(500) };
 }
 
 /// The server's addresses and its timing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ServerConfig {
-    /// Address to listen on.
+    /// IP address to listen on.
     pub ip: IpAddr,
     /// TCP port of the robot; 0 for a free one.
     pub robot_port: u16,
     /// TCP port of the hand; 0 for a free one.
     pub hand_port: u16,
-    /// The start of a cycle.
+    /// The rule that determines when a cycle starts.
     pub pace: Pace,
     /// The limits applied to the client.
     pub limits: Limits,
 }
 
 impl Default for ServerConfig {
-    /// A Panda on this computer only, in real time, on the robot's own ports.
+    /// A Panda in real time on the robot's own ports, reachable from this computer only.
     fn default() -> Self {
         Self {
             ip: Ipv4Addr::LOCALHOST.into(),

@@ -7,19 +7,19 @@ use super::reference::PERIOD_SECS;
 use crate::wire::CollisionBehavior;
 use crate::wire::robot_error::{RobotError, RobotErrors};
 
-/// Cut-off of the estimate's low-pass filter.
+/// Cut-off frequency of the estimate's low-pass filter.
 const CUTOFF_HZ: f64 = 30.0;
-/// Above this reference acceleration of a joint, rad/s², the thresholds for acceleration apply.
+/// Reference acceleration of a joint, rad/s², above which the thresholds for acceleration apply.
 const ACCELERATING: f64 = 0.05;
 
-/// The estimate and its interpretation.
+/// The estimated external forces, and the contacts and collisions that follow from them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Contacts {
     /// External joint torques, N·m.
     pub torque: JointVector,
-    /// At the stiffness frame's origin in the base frame, N and N·m.
+    /// Wrench at the origin of the stiffness frame, in the base frame, N and N·m.
     pub wrench_in_base: Vector6<f64>,
-    /// In the stiffness frame.
+    /// The same wrench in the stiffness frame, N and N·m.
     pub wrench_in_stiffness: Vector6<f64>,
     /// Joints in contact.
     pub joint_contact: [bool; 7],
@@ -46,8 +46,8 @@ impl Default for Contacts {
 }
 
 impl Contacts {
-    /// The estimate after one cycle: `torque` is the present external torque, `jacobian` that of the stiffness frame's
-    /// origin.
+    /// Updates the estimate after one cycle. `torque` is the present external torque, `jacobian` the Jacobian of the
+    /// origin of the stiffness frame.
     pub fn update(
         &mut self,
         torque: &JointVector,

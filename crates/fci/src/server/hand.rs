@@ -1,25 +1,26 @@
-//! The simulated hand: requests in, responses and states out, cycle by cycle. It has no socket and no clock.
+//! The simulated hand: it takes requests and returns responses and states, cycle by cycle. It has no socket and no
+//! clock.
 
 use super::plant::Plant;
 use crate::wire::{HandCommand, HandRequest, HandState, HandStatus};
 
 /// Largest width of Franka's hand, m.
 pub const HAND_MAX_WIDTH_M: f64 = 0.08;
-/// Its largest speed and continuous force.
+/// Largest speed of Franka's hand.
 const MAX_SPEED_M_S: f64 = 0.1;
 const MAX_FORCE_N: f64 = 70.0;
-/// Force of motions without a grasp.
+/// Force of the fingers in motions without a grasp.
 const MOVING_FORCE_N: f64 = 30.0;
-/// Tolerance of a reached width.
+/// Largest difference between the commanded width and a width that counts as reached.
 const WIDTH_TOLERANCE_M: f64 = 1e-3;
-/// Fingers slower than this for this many cycles have stopped.
+/// Speed below which fingers have stopped if it lasts for [`STANDING_CYCLES`].
 const STANDING_M_S: f64 = 2e-3;
 const STANDING_CYCLES: u32 = 100;
 /// Maximum number of cycles of a motion.
 const MAX_CYCLES: u32 = 20_000;
-/// Homing has its own speed.
+/// Speed of homing.
 const HOMING_SPEED_M_S: f64 = 0.05;
-/// A target beyond this presses on any object between the fingers.
+/// Target width of closing fingers, so far beyond zero that they press on any object.
 const PRESSING_WIDTH_M: f64 = -0.03;
 /// Reported temperature of the hand, °C.
 const TEMPERATURE: u16 = 30;
@@ -44,7 +45,7 @@ struct Running {
 /// A response to be sent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct HandOutgoing {
-    /// The request's number.
+    /// Number of the request.
     pub command_id: u32,
     /// The request's command.
     pub command: HandCommand,
@@ -56,7 +57,7 @@ pub struct HandOutgoing {
 #[derive(Debug, Default)]
 pub struct HandCore {
     running: Option<Running>,
-    /// The widths between which the last grasp holds a part.
+    /// Smallest and largest width at which the last grasp holds a part, m.
     grasped: Option<(f64, f64)>,
     time_ms: u32,
     fails: bool,
@@ -64,12 +65,12 @@ pub struct HandCore {
 }
 
 impl HandCore {
-    /// Makes the hand fail from now on, as a defective one does, or work again.
+    /// Makes the hand fail from now on like a defective one, or work again.
     pub fn set_failing(&mut self, fails: bool) {
         self.fails = fails;
     }
 
-    /// The due responses.
+    /// Removes and returns the responses that are due.
     pub fn take_responses(&mut self) -> Vec<HandOutgoing> {
         std::mem::take(&mut self.outbox)
     }
@@ -79,7 +80,7 @@ impl HandCore {
         self.running.is_some()
     }
 
-    /// Starts a client's request, except Connect; the previous one is aborted.
+    /// Starts a client's request (except Connect) and aborts the previous one.
     pub fn request(&mut self, plant: &mut dyn Plant, command_id: u32, request: &HandRequest) {
         let command = request.command();
         if let Some(running) = self.running.take() {
@@ -122,7 +123,7 @@ impl HandCore {
         }
     }
 
-    /// The client is disconnected: the fingers stop.
+    /// Stops the fingers because the client is disconnected.
     pub fn disconnect(&mut self, plant: &mut dyn Plant) {
         if self.running.take().is_some() {
             plant.move_hand(plant.hand_width().0, MAX_SPEED_M_S, MOVING_FORCE_N);

@@ -1,4 +1,4 @@
-//! The server's sockets: the connected client, received and sent messages.
+//! The server's sockets, and the client that is connected to them.
 
 use std::io::Write;
 use std::net::{IpAddr, Shutdown, SocketAddr, TcpListener, TcpStream, UdpSocket};
@@ -12,13 +12,13 @@ use crate::error::{FciError, Result};
 use crate::message::read_message;
 use crate::wire::{Header, HeaderKind};
 
-/// Time within which a client must accept a response; otherwise it counts as disconnected.
+/// Time within which a client must accept a response; a slower client counts as disconnected.
 const WRITE_TIMEOUT: Duration = Duration::from_millis(100);
-/// Time that a second client waits for the end of the first, which another thread reports: a client that has just
-/// disconnected may connect again at once. Shorter than a client's timeout for an answer (1 s).
+/// Time that a second client waits for the end of the first, so that a client that has just disconnected can connect
+/// again at once. It is shorter than a client's timeout for an answer (1 s).
 const HANDOVER: Duration = Duration::from_millis(500);
 
-/// Messages of the listening thread and of the reading one to the loop.
+/// Messages from the listening thread and the reading thread to the loop.
 #[derive(Debug)]
 enum LinkEvent {
     Connected(TcpStream, SocketAddr),
@@ -26,7 +26,7 @@ enum LinkEvent {
     Gone(u64),
 }
 
-/// Message from the connection to the control loop.
+/// A message from the connection to the control loop.
 #[derive(Debug)]
 pub enum Incoming {
     /// A request of the client: header and body.
@@ -117,7 +117,7 @@ impl Link {
                     self.close();
                     return Some(Incoming::Gone);
                 }
-                // Of a client that is no longer served.
+                // The event belongs to a client that is no longer served.
                 Ok(LinkEvent::Message(..) | LinkEvent::Gone(..)) => {}
                 Err(TryRecvError::Empty | TryRecvError::Disconnected) => return None,
             }
@@ -160,7 +160,7 @@ impl Link {
             match self.udp.recv_from(buffer) {
                 Ok((length, from)) if from == peer => return Some(length),
                 Ok(_) => {}
-                // An error of an earlier datagram (port unreachable) arrives here; the next call continues to read.
+                // The error may belong to an earlier datagram (port unreachable); the next call continues to read.
                 Err(_) => return None,
             }
         }
@@ -192,7 +192,7 @@ impl Link {
         self.client.as_ref().is_some_and(|client| client.session == session)
     }
 
-    /// Accepts a client, or lets it wait if there is one already; a third one is refused.
+    /// Accepts a client, or lets it wait if another is connected; a third client is refused.
     fn meet(&mut self, stream: TcpStream, address: SocketAddr) {
         if self.client.is_none() {
             self.take_client(stream, address);
@@ -203,7 +203,7 @@ impl Link {
         }
     }
 
-    /// Accepts the waiting client when the first has ended, or refuses it after its waiting time.
+    /// Accepts the waiting client when the first has ended, or refuses it after [`HANDOVER`].
     fn admit_waiting(&mut self) {
         let Some(waiting) = self.waiting.take() else { return };
         if self.client.is_none() {
@@ -237,7 +237,7 @@ impl Drop for Link {
     fn drop(&mut self) {
         self.close();
         self.is_stopping.store(true, Ordering::Relaxed);
-        // Wakes the thread that waits for clients.
+        // This connection wakes the thread that waits for clients.
         let _ = TcpStream::connect_timeout(&self.address, WRITE_TIMEOUT);
         if let Some(listener) = self.listener.take() {
             let _ = listener.join();

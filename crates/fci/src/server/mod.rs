@@ -1,8 +1,8 @@
-//! The server: puts a [`Plant`], a simulated arm with a hand, on the network as a Panda (protocol versions 5 and, for
-//! the hand, 3).
+//! The server: makes a [`Plant`], a simulated arm with a hand, available on the network as a Panda (protocol version 5,
+//! and version 3 for the hand).
 //!
-//! [`RobotCore`] and [`HandCore`] are the robot without sockets and clock: every cycle takes the client's command, if
-//! any, and returns the next state. [`Server`] is the network around them.
+//! [`RobotCore`] and [`HandCore`] are robot and hand without sockets and clock: every cycle takes the client's command,
+//! if any, and returns the next state. [`Server`] connects them to the network.
 
 mod cartesian;
 mod communication;

@@ -1,4 +1,4 @@
-//! A robot's measurements compared with its limits.
+//! Compares a robot's measurements with its limits.
 
 use super::frames::shifted;
 use super::plant::{Observation, Plant};
@@ -7,7 +7,7 @@ use crate::wire::robot_error::RobotError;
 
 /// Largest excess of measured velocities over the commanded limit, rad/s or m/s, before the robot stops.
 const MEASURED_VELOCITY_MARGIN: f64 = 0.1;
-/// Largest distance of measured positions, rad, beyond the range of commanded ones.
+/// Largest excess of measured positions over the range of commanded ones, rad.
 const MEASURED_POSITION_MARGIN: f64 = 0.01;
 impl RobotCore {
     /// Estimates contacts and compares measurements with their limits.

@@ -1,4 +1,4 @@
-//! A running motion: from a client's command to the next reference, or to the errors that stop the robot.
+//! A running motion: converts a client's command to the next reference, or to the errors that stop the robot.
 
 use nalgebra::Isometry3;
 
@@ -11,10 +11,11 @@ use crate::pose::difference;
 use crate::wire::robot_error::{RobotError, RobotErrors};
 use crate::wire::{ControllerMode, MotionCommand, MotionGeneratorMode, RobotCommand};
 
-/// Largest distance of a motion's first position from the reference; not published, as in franka-sim.
+/// Largest distance of a motion's first position from the reference. Not published by libfranka; the value is
+/// franka-sim's.
 const START_POSITION_RAD: f64 = 0.1;
 
-/// The pose of the end effector at joint positions: `base_from_ee` and its Jacobian.
+/// Function from joint positions to `base_from_ee` and the Jacobian of the end effector.
 pub type EndEffectorAt<'a> = &'a dyn Fn(&JointVector) -> (Isometry3<f64>, Jacobian);
 
 /// The references of a robot.
@@ -24,14 +25,14 @@ pub struct References {
     pub joints: JointReference,
     /// `O_T_EE_c` and its derivatives.
     pub cartesian: CartesianReference,
-    /// `tau_J_d`: without gravity.
+    /// `tau_J_d`, which excludes gravity.
     pub torque: JointVector,
 }
 
-/// A motion.
+/// State of a running motion.
 #[derive(Debug, Clone)]
 pub struct Motion {
-    /// The Move's number.
+    /// Number of the Move request.
     pub command_id: u32,
     /// The controller, which computes the torques.
     pub controller: ControllerMode,
@@ -44,12 +45,12 @@ pub struct Motion {
 }
 
 impl Motion {
-    /// A motion that was just requested.
+    /// The state of a motion that was just requested.
     pub fn new(command_id: u32, controller: ControllerMode, generator: MotionGeneratorMode) -> Self {
         Self { command_id, controller, generator, communication: Communication::default(), is_elbow_given: false }
     }
 
-    /// The references after a cycle, and whether the motion is at its end; or the errors that stop the robot.
+    /// The references after a cycle and whether the motion has ended; otherwise the errors that stop the robot.
     pub fn follow(
         &mut self,
         last: &References,
@@ -71,7 +72,7 @@ impl Motion {
             next.torque = self.checked_torque(last, command, limits)?;
         }
         if command.motion.finished {
-            // A motion must end at rest: a constant reference follows.
+            // A motion must end at rest, because a constant reference follows it.
             let stopped = next.joints.after_velocity(JointVector::zeros());
             let errors = stopped.violations(&next.joints, limits, self.generator);
             if !errors.is_empty() {
@@ -115,7 +116,7 @@ impl Motion {
         if errors.is_empty() { Ok(next) } else { Err(errors) }
     }
 
-    /// libfranka sends only finite numbers; a robot that received another one would stop.
+    /// Checks that the command is finite: libfranka sends only finite numbers, and a robot would stop for others.
     fn check_finite(&self, command: &MotionCommand) -> Result<(), RobotErrors> {
         let is_finite = |values: &[f64]| values.iter().all(|value| value.is_finite());
         let error = match self.generator {
@@ -146,7 +147,7 @@ impl Motion {
     ) -> Result<JointVector, RobotErrors> {
         let torque = JointVector::from(command.torque);
         let mut errors = RobotErrors::default();
-        // Written so that NaN counts as out of range.
+        // With this form of the comparison, NaN counts as out of range.
         if !torque.iter().zip(&limits.torque).all(|(torque, limit)| torque.abs() <= limit * ROUNDING) {
             errors.insert(RobotError::TauJRangeViolation);
         }
@@ -156,7 +157,7 @@ impl Motion {
         if errors.is_empty() { Ok(torque) } else { Err(errors) }
     }
 
-    /// A lost motion command is replaced at constant acceleration; a lost torque keeps its value.
+    /// The references after a lost command: motions continue at constant acceleration, torques keep their value.
     fn extrapolate(&self, last: &References, end_effector_at: EndEffectorAt) -> References {
         match self.generator {
             MotionGeneratorMode::CartesianPosition | MotionGeneratorMode::CartesianVelocity => {
@@ -167,7 +168,7 @@ impl Motion {
     }
 }
 
-/// In a joint motion, the Cartesian reference follows the joints' reference.
+/// The references of a joint motion: the Cartesian reference follows from the joints' reference.
 fn with_joints(last: &References, joints: JointReference, end_effector_at: EndEffectorAt) -> References {
     let (pose, jacobian) = end_effector_at(&joints.q);
     let twist = jacobian * joints.dq;
@@ -182,7 +183,8 @@ fn with_joints(last: &References, joints: JointReference, end_effector_at: EndEf
     References { joints, cartesian, ..*last }
 }
 
-/// In a Cartesian motion, the joints follow: one Newton step per cycle, from the joints' present positions.
+/// The references of a Cartesian motion: the joints follow with one Newton step per cycle, from their present
+/// reference.
 fn with_cartesian(
     last: &References,
     cartesian: CartesianReference,

@@ -15,16 +15,16 @@ pub(super) const ROUNDING: f64 = 1.0 + 1e-6;
 /// The controller's reference of the joints: `q_d`, `dq_d`, `ddq_d`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointReference {
-    /// rad.
+    /// Positions, rad.
     pub q: JointVector,
-    /// rad/s.
+    /// Velocities, rad/s.
     pub dq: JointVector,
-    /// rad/s².
+    /// Accelerations, rad/s².
     pub ddq: JointVector,
 }
 
 impl JointReference {
-    /// At rest at a position.
+    /// A reference at rest at a position.
     pub fn at_rest(q: JointVector) -> Self {
         Self { q, dq: JointVector::zeros(), ddq: JointVector::zeros() }
     }
@@ -62,8 +62,8 @@ impl JointReference {
 
     /// The errors for which the robot would stop between `previous` and this reference.
     ///
-    /// The names are the interface's: a too large acceleration is a discontinuity of the velocity if positions or poses
-    /// are commanded, and of the acceleration if velocities or twists are commanded.
+    /// The errors have the interface's names: too large an acceleration is a discontinuity of the velocity if positions
+    /// or poses are commanded, and of the acceleration if velocities or twists are commanded.
     pub fn violations(&self, previous: &Self, limits: &Limits, generator: MotionGeneratorMode) -> RobotErrors {
         let jerk = (self.ddq - previous.ddq) / PERIOD_SECS;
         let exceeds = |values: &JointVector, limits: &[f64; 7]| {
@@ -122,7 +122,7 @@ mod tests {
         for (share, expected) in [(0.999, vec![]), (1.001, vec!["joint_motion_generator_acceleration_discontinuity"])] {
             assert_eq!(names(&rest, &rest.after_velocity(with_joint_1([0.0, 7.5e-3 * share, 0.0]).dq)), expected);
         }
-        // At 14.995 rad/s², 15 is reached within the jerk limit.
+        // From 14.995 rad/s², the limit of 15 can be exceeded within the jerk limit.
         let accelerating = with_joint_1([0.0, 1.0, 14.995]);
         for (acceleration, expected) in
             [(14.999, vec![]), (15.001, vec!["joint_motion_generator_velocity_discontinuity"])]

@@ -61,7 +61,7 @@ impl RobotCore {
             base_from_ee_commanded: pose_of(&cartesian.pose),
             twist_commanded: cartesian.twist.into(),
             twist_rate_commanded: cartesian.twist_rate.into(),
-            // The simulated gears are stiff.
+            // The simulated gears are rigid, so that motors and joints have the same positions.
             theta: self.observation.q.into(),
             dtheta: self.observation.dq.into(),
             motion_generator_mode: self.motion.as_ref().map_or(MotionGeneratorMode::Idle, |motion| motion.generator),

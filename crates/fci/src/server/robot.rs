@@ -1,5 +1,5 @@
-//! The simulated robot: requests and commands in, responses and states out, cycle by cycle. It has no socket and no
-//! clock.
+//! The simulated robot: it takes requests and commands and returns responses and states, cycle by cycle. It has no
+//! socket and no clock.
 
 use nalgebra::Isometry3;
 
@@ -20,8 +20,8 @@ use crate::wire::{
 /// Number of cycles of a recovery during which the arm yields to contacts, so that the next motion does not start in a
 /// collision.
 const RECOVERY_CYCLES: u32 = 200;
-/// The simulation pauses once the measured velocities are below this, rad/s, or after this many cycles without a
-/// motion: an arm that presses on something may never be completely at rest.
+/// The simulation pauses once the measured velocities are below this limit, rad/s, or after [`MAX_SETTLING_CYCLES`]
+/// without a motion: an arm that presses on an object may never be completely at rest.
 const STILL: f64 = 1e-3;
 const MAX_SETTLING_CYCLES: u32 = 1000;
 /// A measured joint velocity below this, rad/s, counts as rest.
@@ -30,7 +30,7 @@ const STANDING: f64 = 0.01;
 /// A response to be sent.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outgoing {
-    /// The request's number.
+    /// Number of the request.
     pub command_id: u32,
     /// The request's command.
     pub command: Command,
@@ -52,7 +52,8 @@ pub struct RobotCore {
     pub(super) mode: RobotMode,
     pub(super) errors: RobotErrors,
     pub(super) reflex_reason: RobotErrors,
-    /// Whether the arm was in self-collision at the start of the motion, which may then lead it out.
+    /// Whether the arm was in self-collision at the start of the motion; such a motion may continue, to leave the
+    /// collision.
     pub(super) began_in_self_collision: bool,
     pub(super) time_ms: u64,
     pub(super) torque: JointVector,
@@ -100,12 +101,12 @@ impl RobotCore {
         }
     }
 
-    /// The due responses.
+    /// Removes and returns the responses that are due.
     pub fn take_responses(&mut self) -> Vec<Outgoing> {
         std::mem::take(&mut self.outbox)
     }
 
-    /// Whether a motion is running and its client has answered a state.
+    /// Whether the client of the running motion has answered a state; `None` without a motion.
     pub fn expects_commands(&self) -> Option<bool> {
         self.motion.as_ref().map(|motion| motion.communication.has_started())
     }
@@ -121,7 +122,7 @@ impl RobotCore {
         self.time_ms += 1;
     }
 
-    /// Milliseconds since the start: the number of the present state.
+    /// Milliseconds since the start, which is the number of the present state.
     pub fn time_ms(&self) -> u64 {
         self.time_ms
     }
@@ -159,12 +160,12 @@ impl RobotCore {
                     return;
                 }
             }
-            // There are no walls: size, frame and activation are zero.
+            // The simulation has no virtual walls: size, frame and activation are zero.
             Request::GetCartesianLimit(_) => {
                 rest = vec![0; 3 * 8 + 16 * 8 + 1];
                 Status::Success
             }
-            // A library of machine code is the only thing that a robot without Franka's software cannot send.
+            // The library is machine code of Franka's, which this server does not have.
             Request::LoadModelLibrary(_) => Status::Error,
             Request::Connect { .. } | Request::GetRobotModel => Status::NotPossible,
             setter if self.motion.is_some() => {
@@ -176,7 +177,7 @@ impl RobotCore {
         self.outbox.push(Outgoing { command_id, command, response: Response { status, rest } });
     }
 
-    /// The client is disconnected: for a running motion this is a communication error.
+    /// Records that the client is disconnected, which is a communication error of a running motion.
     pub fn disconnect(&mut self) {
         if self.motion.is_some() {
             self.abort(RobotError::CommunicationConstraintsViolation.into());
@@ -185,7 +186,7 @@ impl RobotCore {
         self.outbox.clear();
     }
 
-    /// Advances a millisecond, with the answer to the present state, if any.
+    /// Advances by a millisecond, with the client's answer to the present state, if any.
     ///
     /// # Errors
     /// The plant's errors.
@@ -260,7 +261,7 @@ impl RobotCore {
         self.references.cartesian = CartesianReference::at_rest(at(&joints.q).0, &joints.q);
     }
 
-    /// Leaves the motion; the Move is answered when the arm is at rest.
+    /// Ends the motion; the Move is answered when the arm is at rest.
     fn end_motion(&mut self, status: Status) {
         let Some(motion) = self.motion.take() else { return };
         self.mode = RobotMode::Idle;
@@ -273,7 +274,7 @@ impl RobotCore {
         }
     }
 
-    /// Stops for errors: the motion ends, the arm brakes, and nothing moves until the recovery.
+    /// Stops because of errors: the motion ends, the arm brakes, and nothing moves until the recovery.
     pub(super) fn abort(&mut self, errors: RobotErrors) {
         self.errors = errors;
         self.reflex_reason = errors;
@@ -281,7 +282,7 @@ impl RobotCore {
         let is_external = self.motion.as_ref().is_some_and(|motion| motion.controller == ControllerMode::External);
         let is_collision = errors.contains(RobotError::JointReflex) || errors.contains(RobotError::CartesianReflex);
         if is_collision {
-            // Braking would continue to press.
+            // Braking would continue to press on the obstacle.
             self.references.joints = JointReference::at_rest(self.observation.q);
         } else if is_external {
             // The arm is not at the reference, and must not move there.

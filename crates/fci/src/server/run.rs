@@ -20,12 +20,12 @@ use crate::wire::{
 
 /// The server's protocol version.
 const VERSION: Version = Version::V5;
-/// One cycle.
+/// Duration of a cycle.
 const PERIOD: Duration = Duration::from_millis(1);
 /// Interval of the hand's states, in cycles.
 const HAND_STATE_CYCLES: u64 = 20;
-/// In lockstep, a state must be answered within this time, otherwise it counts as unanswered at the start of a motion:
-/// libfranka leaves the first one or two without an answer.
+/// In lockstep, maximum wait for an answer at the start of a motion: libfranka leaves the first one or two states
+/// unanswered.
 const START_WAIT: Duration = Duration::from_millis(50);
 
 /// Data shared by the server's owner and its loop.
@@ -36,7 +36,7 @@ struct Shared {
     statistics: Mutex<ServerStatistics>,
 }
 
-/// A robot on the network. Dropping it ends the server.
+/// A simulated robot on the network. Dropping it ends the server.
 #[derive(Debug)]
 pub struct Server {
     robot_address: SocketAddr,
@@ -85,7 +85,7 @@ impl Server {
         *self.shared.statistics.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Makes the hand fail, as a defective one does, or work again: for tests of clients.
+    /// Makes the hand fail like a defective one, or work again, for tests of clients.
     pub fn set_hand_failing(&self, fails: bool) {
         self.shared.hand_fails.store(fails, Ordering::Relaxed);
     }
@@ -170,7 +170,7 @@ impl Loop {
         Ok(())
     }
 
-    /// Advances a millisecond.
+    /// Advances robot and hand by a millisecond.
     fn cycle(&mut self, command: Option<&RobotCommand>) -> Result<()> {
         self.hand.set_failing(self.shared.hand_fails.load(Ordering::Relaxed));
         if command.is_some() || self.robot.expects_commands() == Some(true) {
@@ -210,7 +210,7 @@ impl Loop {
         *self.shared.statistics.lock().unwrap_or_else(PoisonError::into_inner) = self.statistics;
     }
 
-    /// Waits for the next millisecond; a late one is not compensated.
+    /// Waits for the start of the next millisecond; later cycles do not compensate a delay.
     fn sleep(&mut self) {
         let now = Instant::now();
         if now < self.next_cycle {
@@ -295,7 +295,7 @@ impl Loop {
                 self.statistics.num_motions += u64::from(request.command() == Command::Move);
                 self.robot.request(self.plant.as_ref(), header.command_id, &request);
             }
-            // An invalid request, or a request before Connect: this client uses another protocol.
+            // A client with an invalid request, or a request before Connect, uses another protocol.
             (Err(_), _) | (Ok(_), false) => {
                 self.robot_link.close();
                 self.robot.disconnect();
@@ -306,7 +306,7 @@ impl Loop {
     fn serve_hand_request(&mut self, header: &Header, payload: &[u8]) {
         match (HandRequest::decode(header, payload), self.hand_link.is_open()) {
             (Ok(HandRequest::Connect { version, udp_port }), false) => {
-                // Number 1 means another version for Connect, and a failure for other commands.
+                // Status 1 means another version for Connect, and a failure for other commands.
                 let status = if version == HAND_VERSION { HandStatus::Success } else { HandStatus::Fail };
                 self.hand_link.respond(&status.encode(HandCommand::Connect, header.command_id));
                 if status == HandStatus::Success {

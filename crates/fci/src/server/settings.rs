@@ -10,30 +10,30 @@ use crate::wire::{CollisionBehavior, Load, Request, Status};
 const MAX_JOINT_STIFFNESS: f64 = 14250.0;
 const TRANSLATION_STIFFNESS: std::ops::RangeInclusive<f64> = 10.0..=3000.0;
 const ROTATION_STIFFNESS: std::ops::RangeInclusive<f64> = 1.0..=300.0;
-/// The payload of the Panda is 3 kg; more than the robot's own mass is probably an error of units.
+/// Largest accepted load. The payload of a Panda is 3 kg; a load above the robot's own mass is probably in wrong units.
 const MAX_LOAD_KG: f64 = 18.0;
 
-/// Mass of Franka's hand, kg, its centre of mass in the flange's frame, m, and its inertia, kg·m².
+/// Mass of Franka's hand, kg.
 pub const HAND_MASS_KG: f64 = 0.73;
-/// In the flange's frame.
+/// Centre of mass of Franka's hand in the flange's frame, m.
 pub const HAND_CENTER_M: [f64; 3] = [-0.01, 0.0, 0.03];
-/// About the centre of mass, column by column.
+/// Inertia of Franka's hand about its centre of mass, column by column, kg·m².
 pub const HAND_INERTIA: [f64; 9] = [0.001, 0.0, 0.0, 0.0, 0.0025, 0.0, 0.0, 0.0, 0.0017];
 
 /// The settings of a robot.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
-    /// Nominal end effector relative to the flange: Franka's hand, turned by -45°, its tip at 0.1034 m.
+    /// Nominal end effector relative to the flange: Franka's hand, rotated by -45°, with its tip at 0.1034 m.
     pub flange_from_ne: Isometry3<f64>,
     /// End effector relative to the nominal one.
     pub ne_from_ee: Isometry3<f64>,
     /// Stiffness frame relative to the end effector.
     pub ee_from_stiffness: Isometry3<f64>,
-    /// The load of the robot besides its hand.
+    /// The load of the robot in addition to its hand.
     pub load: Load,
-    /// N·m/rad.
+    /// Stiffness of the joints, N·m/rad.
     pub joint_stiffness: JointVector,
-    /// N/m and N·m/rad.
+    /// Cartesian stiffness, N/m and N·m/rad.
     pub cartesian_stiffness: [f64; 6],
     /// Thresholds at which contacts are reported and collisions stop the robot.
     pub collision: CollisionBehavior,
@@ -118,7 +118,7 @@ impl Settings {
                 }
                 is_valid
             }
-            // Hand guiding has no meaning for a simulated robot, and its filters are the client's.
+            // Hand guiding has no effect on a simulated robot, and filters are left to the client.
             Request::SetGuidingMode(_) => true,
             Request::SetFilters(frequencies) => frequencies.iter().all(|value| *value > 0.0 && *value <= 1000.0),
             _ => return None,

@@ -2,15 +2,15 @@
 
 use std::time::Duration;
 
-/// Delay of a cycle, by the computer's clock, that counts as a stall.
+/// Largest delay of a cycle, by the computer's clock, that is not a stall.
 pub const STALL: Duration = Duration::from_millis(20);
 
 /// Counts since the server started.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct ServerStatistics {
-    /// States that were sent.
+    /// Number of states that were sent.
     pub num_states: u64,
-    /// Number of cycles of motions, from the first command of each.
+    /// Number of cycles within motions, from the first command of each motion on.
     pub num_motion_cycles: u64,
     /// Number of commands that arrived in their own cycle.
     pub num_commands: u64,
@@ -18,7 +18,7 @@ pub struct ServerStatistics {
     pub num_late: u64,
     /// Number of datagrams that are not commands.
     pub num_invalid: u64,
-    /// Motions that were started.
+    /// Number of motions that were started.
     pub num_motions: u64,
     /// Number of cycles that started more than 20 ms too late.
     pub num_stalls: u64,

@@ -11,9 +11,9 @@ const DAMPING_RATIO: f64 = 0.7;
 /// Stiffness, N·m/rad, that holds the elbow while the end effector is controlled.
 const NULLSPACE_STIFFNESS: f64 = 20.0;
 
-/// Impedance in the joints: `K (q_d - q) + D (dq_d - dq) + M ddq_d + coriolis`, `K` in N·m/rad.
+/// Joint impedance: `K (q_d - q) + D (dq_d - dq) + M ddq_d + coriolis`, with `K` in N·m/rad.
 ///
-/// `D` damps each joint with its own inertia.
+/// `D` is computed for each joint from its own inertia.
 pub fn joint_impedance(robot: &Observation, reference: &JointReference, stiffness: &JointVector) -> JointVector {
     let spring = stiffness.component_mul(&(reference.q - robot.q));
     let damping =
@@ -34,8 +34,9 @@ pub struct EndEffector {
     pub twist_desired: Vector6<f64>,
 }
 
-/// Impedance of the end effector: `Jᵀ (K e + D (v_d - J dq)) + M ddq_d + coriolis`, and a weak one for the elbow in the
-/// null space. `K` in N/m and N·m/rad along the base's axes; `D` damps each direction with the effective inertia in it.
+/// Impedance of the end effector: `Jᵀ (K e + D (v_d - J dq)) + M ddq_d + coriolis`, and a weak impedance of the elbow
+/// in the null space. `K` is in N/m and N·m/rad along the base's axes; `D` is computed for each direction from the
+/// effective inertia in it.
 pub fn cartesian_impedance(
     robot: &Observation,
     end_effector: &EndEffector,
@@ -65,7 +66,8 @@ fn operational_inertia(robot: &Observation, jacobian: &Jacobian) -> SMatrix<f64,
     mobility.try_inverse().unwrap_or_else(SMatrix::identity)
 }
 
-/// The torques that hold a load of `mass` kg at `center` (m in the base frame) against gravity.
+/// The torques that hold a load of `mass` kg against gravity; `lever` points from the flange to its centre (m, base
+/// frame).
 pub fn load_gravity(mass: f64, flange_jacobian: &Jacobian, lever: &nalgebra::Vector3<f64>) -> JointVector {
     const GRAVITY_M_S2: f64 = 9.81;
     JointVector::from_fn(|joint, _| {

@@ -1,6 +1,7 @@
-//! Packed little-endian fields, read and written through one list of fields.
+//! Packed little-endian fields: one list of fields serves for reading and writing.
 //!
-//! A message names its fields once, in a function generic over [`Codec`]; an [`Encoder`] writes them, a [`Decoder`] fills them.
+//! A message lists its fields once, in a function generic over [`Codec`]; an [`Encoder`] writes the fields, a
+//! [`Decoder`] reads them.
 
 use crate::wire_error::WireError;
 
@@ -15,7 +16,7 @@ pub enum Real {
 
 /// One direction of a message: each call writes or reads the next field.
 pub trait Codec {
-    /// The next bytes, in order.
+    /// Writes or reads the next bytes, in order.
     ///
     /// # Errors
     /// [`WireError::Short`] if a message ends too early.
@@ -24,10 +25,10 @@ pub trait Codec {
     /// Precision of [`Codec::reals`].
     fn real(&self) -> Real;
 
-    /// One byte.
+    /// Writes or reads one byte.
     ///
     /// # Errors
-    /// As [`Codec::bytes`].
+    /// As for [`Codec::bytes`].
     fn u8(&mut self, value: &mut u8) -> Result<(), WireError> {
         let mut bytes = [*value];
         self.bytes(&mut bytes)?;
@@ -35,10 +36,10 @@ pub trait Codec {
         Ok(())
     }
 
-    /// Two bytes.
+    /// Writes or reads two bytes.
     ///
     /// # Errors
-    /// As [`Codec::bytes`].
+    /// As for [`Codec::bytes`].
     fn u16(&mut self, value: &mut u16) -> Result<(), WireError> {
         let mut bytes = value.to_le_bytes();
         self.bytes(&mut bytes)?;
@@ -46,10 +47,10 @@ pub trait Codec {
         Ok(())
     }
 
-    /// Four bytes.
+    /// Writes or reads four bytes.
     ///
     /// # Errors
-    /// As [`Codec::bytes`].
+    /// As for [`Codec::bytes`].
     fn u32(&mut self, value: &mut u32) -> Result<(), WireError> {
         let mut bytes = value.to_le_bytes();
         self.bytes(&mut bytes)?;
@@ -57,10 +58,10 @@ pub trait Codec {
         Ok(())
     }
 
-    /// Eight bytes.
+    /// Writes or reads eight bytes.
     ///
     /// # Errors
-    /// As [`Codec::bytes`].
+    /// As for [`Codec::bytes`].
     fn u64(&mut self, value: &mut u64) -> Result<(), WireError> {
         let mut bytes = value.to_le_bytes();
         self.bytes(&mut bytes)?;
@@ -68,10 +69,10 @@ pub trait Codec {
         Ok(())
     }
 
-    /// A byte that is zero for false; any other is read as true, as C++ does.
+    /// Writes or reads a boolean as one byte; every byte except zero is true, as in C++.
     ///
     /// # Errors
-    /// As [`Codec::bytes`].
+    /// As for [`Codec::bytes`].
     fn bool(&mut self, value: &mut bool) -> Result<(), WireError> {
         let mut byte = u8::from(*value);
         self.u8(&mut byte)?;
@@ -79,10 +80,10 @@ pub trait Codec {
         Ok(())
     }
 
-    /// One double.
+    /// Writes or reads one double.
     ///
     /// # Errors
-    /// As [`Codec::bytes`].
+    /// As for [`Codec::bytes`].
     fn f64(&mut self, value: &mut f64) -> Result<(), WireError> {
         let mut bytes = value.to_le_bytes();
         self.bytes(&mut bytes)?;
@@ -90,18 +91,18 @@ pub trait Codec {
         Ok(())
     }
 
-    /// Doubles, in order.
+    /// Writes or reads doubles, in order.
     ///
     /// # Errors
-    /// As [`Codec::bytes`].
+    /// As for [`Codec::bytes`].
     fn f64s(&mut self, values: &mut [f64]) -> Result<(), WireError> {
         values.iter_mut().try_for_each(|value| self.f64(value))
     }
 
-    /// Numbers of the precision of [`Codec::real`], in order.
+    /// Writes or reads numbers with the precision of [`Codec::real`], in order.
     ///
     /// # Errors
-    /// As [`Codec::bytes`].
+    /// As for [`Codec::bytes`].
     fn reals(&mut self, values: &mut [f64]) -> Result<(), WireError> {
         match self.real() {
             Real::F64 => self.f64s(values),
@@ -155,12 +156,12 @@ pub struct Decoder<'a> {
 }
 
 impl<'a> Decoder<'a> {
-    /// From the first byte on; `message` names it in errors.
+    /// Starts at the first byte; `message` is the name in errors.
     pub fn new(message: &'static str, bytes: &'a [u8], real: Real) -> Self {
         Self { message, bytes, position: 0, real }
     }
 
-    /// Ends the reading.
+    /// Checks that no bytes remain.
     ///
     /// # Errors
     /// [`WireError::Long`] if bytes remain.

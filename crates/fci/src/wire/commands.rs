@@ -3,9 +3,9 @@
 use super::version::Version;
 use crate::wire_error::WireError;
 
-/// A command; the numbers depend on the version.
+/// A command; its number depends on the protocol version.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[allow(missing_docs, reason = "each is described at the request of its name")]
+#[allow(missing_docs, reason = "the requests of the same names are documented")]
 pub enum Command {
     Connect,
     Move,
@@ -64,21 +64,21 @@ impl Command {
         }
     }
 
-    /// The command of a number.
+    /// The command with a number.
     ///
     /// # Errors
-    /// [`WireError::Value`] for a number without a meaning.
+    /// [`WireError::Value`] for a number without a command.
     pub fn from_number(number: u32, version: Version) -> Result<Self, WireError> {
         let command = usize::try_from(number).ok().and_then(|index| Self::table(version).get(index));
         command.copied().ok_or(WireError::Value { field: "command", found: number })
     }
 
-    /// The number in a version, `None` for a command that the version lacks.
+    /// The number in a version; `None` for a command that the version does not have.
     pub fn number(self, version: Version) -> Option<u32> {
         Self::table(version).iter().position(|&command| command == self).map(|index| index as u32)
     }
 
-    /// The command in words.
+    /// The name in messages.
     pub const fn name(self) -> &'static str {
         match self {
             Command::Connect => "connect",

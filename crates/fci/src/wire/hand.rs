@@ -4,7 +4,7 @@ use super::codec::{Codec, Decoder, Encoder, Real};
 use super::header::{Header, HeaderKind};
 use crate::wire_error::WireError;
 
-/// The hand's version.
+/// The version of the hand's protocol.
 pub const HAND_VERSION: u16 = 3;
 
 /// Number of a command.
@@ -13,18 +13,18 @@ pub const HAND_VERSION: u16 = 3;
 pub enum HandCommand {
     /// Opens a session.
     Connect = 0,
-    /// Closes and opens to find the range.
+    /// Closes and opens the fingers to find their range.
     Homing = 1,
-    /// Closes on a part.
+    /// Closes the fingers on a part.
     Grasp = 2,
-    /// Moves to a width.
+    /// Moves the fingers to a width.
     Move = 3,
-    /// Stops.
+    /// Stops the fingers.
     Stop = 4,
 }
 
 impl HandCommand {
-    /// The command in words.
+    /// The name in messages.
     pub const fn name(self) -> &'static str {
         match self {
             HandCommand::Connect => "hand: connect",
@@ -53,29 +53,30 @@ pub enum HandRequest {
         /// The client's UDP port.
         udp_port: u16,
     },
-    /// Homing: measures the range of the fingers.
+    /// Measures the range of the fingers.
     Homing,
-    /// Closes to a width and presses; successful if the fingers are then between `width - inner` and `width + outer`.
+    /// Closes to a width and presses; successful if the fingers end between `width - epsilon_inner` and `width +
+    /// epsilon_outer`.
     Grasp {
         /// The part's width, m.
         width: f64,
-        /// Tolerance below it.
+        /// Tolerance below the width, m.
         epsilon_inner: f64,
-        /// Tolerance above it.
+        /// Tolerance above the width, m.
         epsilon_outer: f64,
         /// Closing speed, m/s.
         speed: f64,
         /// Force, N.
         force: f64,
     },
-    /// Moves to a width.
+    /// Moves the fingers to a width.
     Move {
         /// Distance between the fingers, m.
         width: f64,
         /// Speed, m/s.
         speed: f64,
     },
-    /// Stops and releases the part.
+    /// Stops the fingers and releases the part.
     Stop,
 }
 
@@ -91,7 +92,7 @@ impl HandRequest {
         }
     }
 
-    /// The message, header included.
+    /// The message, including its header.
     pub fn encode(&self, command_id: u32) -> Vec<u8> {
         let mut encoder = Encoder::new(Real::F64);
         // An encoder has no error.
@@ -102,7 +103,7 @@ impl HandRequest {
     /// Reads the payload of a request.
     ///
     /// # Errors
-    /// [`WireError`] for an unknown command or another size.
+    /// [`WireError`] for an unknown command or a wrong size.
     pub fn decode(header: &Header, payload: &[u8]) -> Result<Self, WireError> {
         let mut request = match HandCommand::from_number(header.command)? {
             HandCommand::Connect => HandRequest::Connect { version: 0, udp_port: 0 },
@@ -140,11 +141,11 @@ impl HandRequest {
 pub enum HandStatus {
     /// Done.
     Success = 0,
-    /// The hand failed; to Connect: another version.
+    /// The hand failed; as an answer to Connect, it has another version.
     Fail = 1,
-    /// Done, but without the wanted result: the part is not within the tolerance.
+    /// Done, but the width is not within the tolerance.
     Unsuccessful = 2,
-    /// Another command ended it.
+    /// Another command ended the motion.
     Aborted = 3,
 }
 
@@ -162,7 +163,7 @@ impl HandStatus {
             .ok_or(WireError::Value { field: "status of the hand", found: number.into() })
     }
 
-    /// The response, header included; to Connect the server's version follows.
+    /// The response, including its header; a response to Connect also contains the server's version.
     pub fn encode(self, command: HandCommand, command_id: u32) -> Vec<u8> {
         let mut payload = (self as u16).to_le_bytes().to_vec();
         if command == HandCommand::Connect {
@@ -175,13 +176,13 @@ impl HandStatus {
 /// The hand's state.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct HandState {
-    /// Milliseconds, wrapping.
+    /// Number of the state: milliseconds, which wrap around.
     pub message_id: u32,
     /// Distance between the fingers, m.
     pub width: f64,
-    /// Largest distance, found by homing, m.
+    /// Largest distance between the fingers, found by homing, m.
     pub max_width: f64,
-    /// Whether the last grasp holds something.
+    /// Whether the last grasp holds an object.
     pub is_grasped: bool,
     /// Temperature, °C.
     pub temperature: u16,
@@ -199,7 +200,7 @@ impl HandState {
     /// Reads a datagram.
     ///
     /// # Errors
-    /// [`WireError`] for another size.
+    /// [`WireError`] for a wrong size.
     pub fn decode(bytes: &[u8]) -> Result<Self, WireError> {
         let mut state = Self::default();
         let mut decoder = Decoder::new("state of the hand", bytes, Real::F64);

@@ -3,11 +3,12 @@
 use super::codec::{Codec, Decoder, Encoder, Real};
 use crate::wire_error::WireError;
 
-/// Size of the robot's header.
+/// Size of the robot's header in bytes.
 pub const HEADER_SIZE: usize = 12;
-/// Size of the hand's header.
+/// Size of the hand's header in bytes.
 pub const HAND_HEADER_SIZE: usize = 10;
-/// Maximum size of a message over TCP; the largest is the robot's description in version 10 (about 30 kB).
+/// Maximum size of a message over TCP, in bytes; the largest one is the robot's description in version 10 (about 30
+/// kB).
 pub const MAX_MESSAGE_SIZE: u32 = 4 << 20;
 
 /// The kind of header: the robot's command number has four bytes, the hand's two.
@@ -34,14 +35,14 @@ impl HeaderKind {
 pub struct Header {
     /// Number of the command.
     pub command: u32,
-    /// Chosen by the client; repeated in the response.
+    /// Number of the request, chosen by the client and repeated in the response.
     pub command_id: u32,
-    /// Size of header and payload.
+    /// Size of header and payload in bytes.
     pub size: u32,
 }
 
 impl Header {
-    /// A message: this header, with its size, and the payload.
+    /// A whole message: a header with the right size, then the payload.
     pub fn message(kind: HeaderKind, command: u32, command_id: u32, payload: &[u8]) -> Vec<u8> {
         let mut header = Self { command, command_id, size: (kind.size() + payload.len()) as u32 };
         let mut encoder = Encoder::new(Real::F64);
@@ -65,7 +66,7 @@ impl Header {
         Ok(header)
     }
 
-    /// Size of the data after the header.
+    /// Size of the payload in bytes.
     pub fn payload_size(&self, kind: HeaderKind) -> usize {
         self.size as usize - kind.size()
     }

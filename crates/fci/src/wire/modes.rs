@@ -54,7 +54,7 @@ byte_enum! {
         CartesianImpedance = 1,
         /// The client's torques.
         External = 2,
-        /// None of these.
+        /// Any other controller.
         Other = 3,
     }
 }

@@ -8,7 +8,7 @@ use super::state::{IDENTITY, Transform};
 use super::version::Version;
 use crate::wire_error::WireError;
 
-/// Tolerances of a motion.
+/// Largest deviations from a motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Deviation {
     /// Translation, m.
@@ -19,7 +19,7 @@ pub struct Deviation {
     pub elbow: f64,
 }
 
-/// Starts a motion.
+/// Parameters of a Move, which starts a motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MoveRequest {
     /// The controller.
@@ -32,30 +32,30 @@ pub struct MoveRequest {
     pub max_goal_deviation: Deviation,
 }
 
-/// The thresholds at which contacts and collisions are reported and stop the robot; lower thresholds for contacts,
-/// upper ones for collisions. Torques in N·m, forces in N and N·m.
+/// Thresholds of external torques (N·m) and forces (N, N·m). Above the lower thresholds the robot reports a contact;
+/// above the upper ones it reports a collision and stops.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CollisionBehavior {
-    /// While accelerating.
+    /// Thresholds of contacts while the arm accelerates.
     pub lower_torque_acceleration: [f64; 7],
-    /// While accelerating.
+    /// Thresholds of collisions while the arm accelerates.
     pub upper_torque_acceleration: [f64; 7],
-    /// At constant speed.
+    /// Thresholds of contacts at constant speed.
     pub lower_torque_nominal: [f64; 7],
-    /// At constant speed.
+    /// Thresholds of collisions at constant speed.
     pub upper_torque_nominal: [f64; 7],
-    /// While accelerating.
+    /// Thresholds of contacts while the arm accelerates.
     pub lower_force_acceleration: [f64; 6],
-    /// While accelerating.
+    /// Thresholds of collisions while the arm accelerates.
     pub upper_force_acceleration: [f64; 6],
-    /// At constant speed.
+    /// Thresholds of contacts at constant speed.
     pub lower_force_nominal: [f64; 6],
-    /// At constant speed.
+    /// Thresholds of collisions at constant speed.
     pub upper_force_nominal: [f64; 6],
 }
 
 impl CollisionBehavior {
-    /// One pair of thresholds for all states of motion.
+    /// The same thresholds for acceleration and for constant speed.
     pub fn new(lower_torque: [f64; 7], upper_torque: [f64; 7], lower_force: [f64; 6], upper_force: [f64; 6]) -> Self {
         Self {
             lower_torque_acceleration: lower_torque,
@@ -70,7 +70,7 @@ impl CollisionBehavior {
     }
 }
 
-/// The load of the robot besides its end effector.
+/// The load of the robot in addition to its end effector.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Load {
     /// Mass, kg.
@@ -100,9 +100,9 @@ pub enum Request {
     GetCartesianLimit(u32),
     /// Sets the thresholds for contacts and collisions.
     SetCollisionBehavior(CollisionBehavior),
-    /// Sets the internal controller's stiffness, N·m/rad.
+    /// Sets the stiffness of the internal joint impedance, N·m/rad.
     SetJointImpedance([f64; 7]),
-    /// Sets the internal controller's stiffness, N/m and N·m/rad.
+    /// Sets the stiffness of the internal Cartesian impedance, N/m and N·m/rad.
     SetCartesianImpedance([f64; 6]),
     /// Sets the directions for hand guiding: x, y, z, roll, pitch, yaw, elbow.
     SetGuidingMode([bool; 7]),
@@ -110,13 +110,13 @@ pub enum Request {
     SetEeToStiffness(Transform),
     /// Sets the end effector's frame relative to the nominal one.
     SetNeToEe(Transform),
-    /// Sets the load.
+    /// Sets the robot's load.
     SetLoad(Load),
     /// Sets cut-off frequencies of filters, Hz (version 5).
     SetFilters([f64; 5]),
     /// Clears errors.
     AutomaticErrorRecovery,
-    /// Asks for a library with the robot's dynamics (version 5): architecture and system.
+    /// Asks for a library with the robot's dynamics (version 5), for an architecture and an operating system.
     LoadModelLibrary([u8; 2]),
     /// Asks for the robot's description, a URDF (version 10).
     GetRobotModel,
@@ -146,7 +146,7 @@ impl Request {
         }
     }
 
-    /// The message, header included; `None` for a command that the version lacks.
+    /// The message, including its header; `None` for a command that the version does not have.
     pub fn encode(&self, command_id: u32, version: Version) -> Option<Vec<u8>> {
         let number = self.command().number(version)?;
         let mut encoder = Encoder::new(Real::F64);
@@ -158,7 +158,7 @@ impl Request {
     /// Reads the payload of a request.
     ///
     /// # Errors
-    /// [`WireError`] for an unknown command or mode, or another size.
+    /// [`WireError`] for an unknown command or mode, or a wrong size.
     pub fn decode(header: &Header, payload: &[u8], version: Version) -> Result<Self, WireError> {
         let mut request = Self::blank(Command::from_number(header.command, version)?);
         let mut decoder = Decoder::new("request", payload, Real::F64);
@@ -229,7 +229,7 @@ impl MoveRequest {
             2 => ControllerMode::External,
             found => return Err(WireError::Value { field: "controller mode", found }),
         };
-        // A Move numbers its modes from joint positions, a state from idle.
+        // In a Move, generator 0 is joint positions; in a state, it is idle.
         let mut generator = u32::from(self.generator as u8).wrapping_sub(1);
         codec.u32(&mut generator)?;
         self.generator = match (generator, version) {
@@ -246,7 +246,7 @@ impl MoveRequest {
             codec.f64(&mut deviation.elbow)?;
         }
         if version == Version::V10 {
-            // The generator for clients slower than 1 kHz and its velocities: not used here.
+            // Fields of the generator for clients slower than 1 kHz, which this client does not use.
             codec.bool(&mut false)?;
             codec.f64s(&mut [0.0; 7])?;
         }

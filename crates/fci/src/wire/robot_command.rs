@@ -5,9 +5,9 @@ use super::state::{IDENTITY, Transform};
 use super::version::Version;
 use crate::wire_error::WireError;
 
-/// Size of a command in version 5.
+/// Size of a command in version 5, in bytes.
 pub const COMMAND_SIZE_V5: usize = 370;
-/// Size of a command in version 10.
+/// Size of a command in version 10, in bytes.
 pub const COMMAND_SIZE_V10: usize = 371;
 
 /// The data for a motion generator; the running Move determines which fields are used.
@@ -48,7 +48,7 @@ impl Default for MotionCommand {
 pub struct RobotCommand {
     /// Number of the answered state.
     pub message_id: u64,
-    /// For the motion generator.
+    /// Command for the motion generator.
     pub motion: MotionCommand,
     /// Torques without gravity, N·m (`tau_J_d`).
     pub torque: [f64; 7],
@@ -68,7 +68,7 @@ impl RobotCommand {
     /// Reads a datagram.
     ///
     /// # Errors
-    /// [`WireError`] for another size.
+    /// [`WireError`] for a wrong size.
     pub fn decode(bytes: &[u8], version: Version) -> Result<Self, WireError> {
         let mut command = Self::default();
         let mut decoder = Decoder::new("command", bytes, Real::F64);

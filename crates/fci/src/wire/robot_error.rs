@@ -5,7 +5,7 @@ use std::fmt;
 use crate::wire::codec::Codec;
 use crate::wire_error::WireError;
 
-/// Defines the errors, in the order of their bits.
+/// Defines the errors in the order of their bits.
 macro_rules! robot_errors {
     ($($(#[$doc:meta])* $variant:ident = $name:literal),+ $(,)?) => {
         /// The reason why the robot stopped a motion.
@@ -16,7 +16,7 @@ macro_rules! robot_errors {
         }
 
         impl RobotError {
-            /// Every error, in the order of the bits.
+            /// Every error, in the order of its bit.
             pub const ALL: [RobotError; NUM_ERRORS] = [$(RobotError::$variant,)+];
 
             /// libfranka's name.
@@ -51,7 +51,7 @@ robot_errors! {
     CartesianReflex = "cartesian_reflex",
     /// The goal pose was missed by more than the tolerance.
     MaxGoalPoseDeviationViolation = "max_goal_pose_deviation_violation",
-    /// The path was left.
+    /// The path was missed by more than the tolerance.
     MaxPathPoseDeviationViolation = "max_path_pose_deviation_violation",
     /// The velocity along the path was not kept.
     CartesianVelocityProfileSafetyViolation = "cartesian_velocity_profile_safety_violation",
@@ -75,25 +75,25 @@ robot_errors! {
     CartesianMotionGeneratorVelocityDiscontinuity = "cartesian_motion_generator_velocity_discontinuity",
     /// The commanded acceleration jumps: the jerk is too large.
     CartesianMotionGeneratorAccelerationDiscontinuity = "cartesian_motion_generator_acceleration_discontinuity",
-    /// The elbow changed its side.
+    /// The sign of the elbow changed.
     CartesianMotionGeneratorElbowSignInconsistent = "cartesian_motion_generator_elbow_sign_inconsistent",
     /// The first elbow differs from the arm's elbow.
     CartesianMotionGeneratorStartElbowInvalid = "cartesian_motion_generator_start_elbow_invalid",
     /// The wanted force was not reached.
     ForceControllerDesiredForceToleranceViolation = "force_controller_desired_force_tolerance_violation",
-    /// The elbow started on the other side.
+    /// The sign of the first elbow differs from the arm's.
     StartElbowSignInconsistent = "start_elbow_sign_inconsistent",
     /// Twenty commands in a row were lost.
     CommunicationConstraintsViolation = "communication_constraints_violation",
-    /// The motors took too much power.
+    /// The motors needed too much power.
     PowerLimitViolation = "power_limit_violation",
     /// The pose requires a joint outside its range.
     CartesianMotionGeneratorJointPositionLimitsViolation = "cartesian_motion_generator_joint_position_limits_violation",
-    /// The twist requires a too large velocity of a joint.
+    /// The twist requires too large a velocity of a joint.
     CartesianMotionGeneratorJointVelocityLimitsViolation = "cartesian_motion_generator_joint_velocity_limits_violation",
-    /// The pose requires a too large acceleration of a joint.
+    /// The pose requires too large an acceleration of a joint.
     CartesianMotionGeneratorJointVelocityDiscontinuity = "cartesian_motion_generator_joint_velocity_discontinuity",
-    /// The pose requires a too large jerk of a joint.
+    /// The pose requires too large a jerk of a joint.
     CartesianMotionGeneratorJointAccelerationDiscontinuity = "cartesian_motion_generator_joint_acceleration_discontinuity",
     /// The commanded pose is not a rotation and translation.
     CartesianPositionMotionGeneratorInvalidFrameFlag = "cartesian_position_motion_generator_invalid_frame_flag",

@@ -6,22 +6,22 @@ use super::version::Version;
 use crate::wire::robot_error::RobotErrors;
 use crate::wire_error::WireError;
 
-/// Size of a state in version 5.
+/// Size of a state in version 5, in bytes.
 pub const STATE_SIZE_V5: usize = 2373;
-/// Size of a state in version 10.
+/// Size of a state in version 10, in bytes.
 pub const STATE_SIZE_V10: usize = 1377;
 
 /// A homogeneous transform, column by column; `base_from_ee[12..15]` is the translation in metres.
 pub type Transform = [f64; 16];
 
-/// The identity.
+/// The identity transform.
 pub(crate) const IDENTITY: Transform = [1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.];
 
-/// The state that the robot sends every millisecond. In brackets the field's name in libfranka.
+/// The state that the robot sends every millisecond. The names in brackets are libfranka's.
 ///
 /// # Units and frames
-/// rad, m, kg, N, N·m and seconds; `base` is libfranka's `O`, `flange` `F`, `ne` the nominal end effector, `ee` the end
-/// effector, `stiffness` libfranka's `K`.
+/// Units are rad, m, kg, N, N·m and seconds. `base` is libfranka's frame `O`, `flange` is `F`, `ne` is the nominal end
+/// effector `NE`, `ee` is the end effector `EE`, and `stiffness` is `K`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RobotState {
     /// Milliseconds since the robot started; a command answers the state of its number.
@@ -40,15 +40,15 @@ pub struct RobotState {
     pub ne_from_ee: Transform,
     /// Mass of the end effector (`m_ee`).
     pub ee_mass: f64,
-    /// Its inertia (`I_ee`).
+    /// Inertia of the end effector (`I_ee`).
     pub ee_inertia: [f64; 9],
-    /// Its centre of mass relative to the flange (`F_x_Cee`).
+    /// Centre of mass of the end effector relative to the flange (`F_x_Cee`).
     pub ee_center: [f64; 3],
     /// Mass of the load (`m_load`).
     pub load_mass: f64,
-    /// Its inertia (`I_load`).
+    /// Inertia of the load (`I_load`).
     pub load_inertia: [f64; 9],
-    /// Its centre of mass relative to the flange (`F_x_Cload`).
+    /// Centre of mass of the load relative to the flange (`F_x_Cload`).
     pub load_center: [f64; 3],
     /// Position of joint 3 and sign of joint 4.
     pub elbow: [f64; 2],
@@ -82,7 +82,7 @@ pub struct RobotState {
     pub external_torque: [f64; 7],
     /// Estimated wrench at the stiffness frame, in the base frame (`O_F_ext_hat_K`).
     pub external_wrench_in_base: [f64; 6],
-    /// The same in the stiffness frame (`K_F_ext_hat_K`).
+    /// Estimated wrench at the stiffness frame, in the stiffness frame (`K_F_ext_hat_K`).
     pub external_wrench_in_stiffness: [f64; 6],
     /// The reference's twist in the base frame (`O_dP_EE_d`).
     pub twist_desired: [f64; 6],
@@ -90,15 +90,15 @@ pub struct RobotState {
     pub base_acceleration: [f64; 3],
     /// Last commanded elbow (`elbow_c`).
     pub elbow_commanded: [f64; 2],
-    /// Its velocity (`delbow_c`).
+    /// Velocity of the commanded elbow (`delbow_c`).
     pub elbow_velocity_commanded: [f64; 2],
-    /// Its acceleration (`ddelbow_c`).
+    /// Acceleration of the commanded elbow (`ddelbow_c`).
     pub elbow_acceleration_commanded: [f64; 2],
     /// Last commanded pose (`O_T_EE_c`).
     pub base_from_ee_commanded: Transform,
     /// Last commanded twist (`O_dP_EE_c`).
     pub twist_commanded: [f64; 6],
-    /// Its derivative (`O_ddP_EE_c`).
+    /// Derivative of the commanded twist (`O_ddP_EE_c`).
     pub twist_rate_commanded: [f64; 6],
     /// Motor positions (`theta`).
     pub theta: [f64; 7],
@@ -114,7 +114,7 @@ pub struct RobotState {
     pub reflex_reason: RobotErrors,
     /// The robot's mode.
     pub robot_mode: RobotMode,
-    /// Share of the last 100 commands that were received in time; 0 outside motions.
+    /// Fraction of the last 100 commands that were received in time; 0 outside motions.
     pub control_command_success_rate: f64,
 }
 
@@ -183,7 +183,7 @@ impl RobotState {
     /// Reads a datagram.
     ///
     /// # Errors
-    /// [`WireError`] for another size or an unknown mode.
+    /// [`WireError`] for a wrong size or an unknown mode.
     pub fn decode(bytes: &[u8], version: Version) -> Result<Self, WireError> {
         let mut state = Self::default();
         let mut decoder = Decoder::new("state", bytes, version.state_real());

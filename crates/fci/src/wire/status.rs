@@ -1,4 +1,4 @@
-//! The robot's answers; their numbers depend on command and version.
+//! The robot's answers. Their numbers depend on command and version.
 
 use std::fmt;
 
@@ -19,9 +19,9 @@ pub enum Status {
     PreemptedBySafety,
     /// A safety function is active (version 10).
     RejectedBySafety,
-    /// Not possible in the robot's present mode.
+    /// The command is not possible in the robot's present mode.
     NotPossible,
-    /// No Cartesian motion starts at a singular pose.
+    /// A Cartesian motion would start at a singular pose.
     StartAtSingularPose,
     /// An argument is out of range.
     InvalidArgument,
@@ -31,13 +31,13 @@ pub enum Status {
     EmergencyAborted,
     /// The commands were invalid.
     InputErrorAborted,
-    /// Stopped for another reason.
+    /// The motion was stopped for another reason.
     Aborted,
     /// Only a person at the robot can recover.
     ManualRecoveryRequired,
-    /// The versions differ.
+    /// The robot does not support the client's version.
     IncompatibleVersion,
-    /// Failed.
+    /// The command failed.
     Error,
 }
 
@@ -122,7 +122,7 @@ const GETTER: &[Status] = &[Status::Success, Status::NotPossible, Status::Reject
 const LIBRARY: &[Status] = &[Status::Success, Status::Error];
 
 impl Status {
-    /// The meaning of a command's numbers: the status of number `n` is the `n`th.
+    /// The statuses of a command, ordered by their numbers from 0 on.
     fn table(command: Command, version: Version) -> &'static [Status] {
         match (command, version) {
             (Command::Connect, _) => CONNECT,
@@ -139,10 +139,10 @@ impl Status {
         }
     }
 
-    /// The status of a number.
+    /// The status with a number.
     ///
     /// # Errors
-    /// [`WireError::Value`] for a number without a meaning.
+    /// [`WireError::Value`] for a number without a status.
     pub fn from_number(number: u8, command: Command, version: Version) -> Result<Self, WireError> {
         Self::table(command, version)
             .get(usize::from(number))
@@ -150,7 +150,7 @@ impl Status {
             .ok_or(WireError::Value { field: "status", found: number.into() })
     }
 
-    /// The number of the status, `None` if the command has no such status.
+    /// The number of the status; `None` if the command does not have it.
     pub fn number(self, command: Command, version: Version) -> Option<u8> {
         Self::table(command, version).iter().position(|&status| status == self).map(|index| index as u8)
     }
@@ -161,7 +161,7 @@ impl Status {
 pub struct Response {
     /// The result of the command.
     pub status: Status,
-    /// Bytes after the status: the server's version, the robot's description.
+    /// Bytes after the status, such as the server's version or the robot's description.
     pub rest: Vec<u8>,
 }
 
@@ -169,7 +169,7 @@ impl Response {
     /// Reads the payload of a response.
     ///
     /// # Errors
-    /// [`WireError`] for an empty one or an unknown status.
+    /// [`WireError`] for an empty payload or an unknown status.
     pub fn decode(payload: &[u8], command: Command, version: Version) -> Result<Self, WireError> {
         let Some((&status, rest)) = payload.split_first() else {
             return Err(WireError::Short { message: "response", expected: 1, found: 0 });

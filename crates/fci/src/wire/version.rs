@@ -20,7 +20,7 @@ impl Version {
         }
     }
 
-    /// The version of a number, `None` for an unsupported one.
+    /// The version with a number; `None` for an unsupported one.
     pub const fn from_number(number: u16) -> Option<Self> {
         match number {
             5 => Some(Version::V5),
@@ -29,7 +29,7 @@ impl Version {
         }
     }
 
-    /// The precision of a state's numbers.
+    /// The precision of the numbers in a state.
     pub(crate) const fn state_real(self) -> Real {
         match self {
             Version::V5 => Real::F64,

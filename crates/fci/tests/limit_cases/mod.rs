@@ -1,6 +1,7 @@
-//! One motion just inside and one just outside of every limit that a robot checks, by our client.
+//! One motion just inside and one just outside of every limit that a robot checks, with this crate's client.
 //!
-//! Each motion moves one signal to its limit with all others well within theirs, to `1 - MARGIN` or `1 + MARGIN` of it.
+//! Each motion moves one signal to `1 - MARGIN` or `1 + MARGIN` of its limit, while all other signals stay well within
+//! their limits.
 
 mod profile;
 mod signal;
@@ -16,29 +17,30 @@ use profile::Profile;
 pub use signal::go_to;
 use signal::{Axis, Signal};
 
-/// Distance inside and outside, as a share of the limit.
+/// Distance from the limit, inside and outside, as a fraction of the limit.
 const MARGIN: f64 = 0.005;
-/// Excess of measured velocities over the limit, rad/s, at which the robot stops, or slightly later.
+/// Excess of measured velocities over the limit, rad/s, at or soon after which the robot stops.
 const MEASURED_BEYOND: f64 = 0.4;
-/// Measured velocities of the end effector overshoot the commanded ones, and a robot may stop a tenth of a metre per
-/// second later.
+/// Margin for measured velocities of the end effector, m/s: they overshoot the commanded ones, and a robot may stop
+/// only 0.1 m/s above the limit.
 const MEASURED_END_MARGIN: f64 = 0.1;
 /// The usual start configuration of a Panda, rad.
 pub const READY: [f64; 7] = [0.0, -FRAC_PI_4, 0.0, -3.0 * FRAC_PI_4, 0.0, FRAC_PI_2, FRAC_PI_4];
-/// Turn of joint 2 per metre forward at the ready pose with the smallest motion of all joints, rad/m: an entry of the
-/// Jacobian's pseudoinverse. No other joint uses as much of its limits there.
+/// Rotation of joint 2 per metre forward at the ready pose, with the smallest motion of all joints, rad/m: an entry of
+/// the Jacobian's pseudoinverse. No other joint comes as close to its limits in this motion.
 const JOINT_2_PER_METRE: f64 = 3.1520;
-/// A pose next to those at which no Cartesian motion may start, and one of them, rad: the smallest singular values of
-/// the end effector's Jacobian are 0.053 and 0.048, both at the flange and at the finger tips; the required minimum is
-/// 0.05.
+/// A configuration just far enough from a singular one for the start of a Cartesian motion, rad: the smallest singular
+/// value of the end effector's Jacobian is 0.053, and 0.048 at [`SINGULAR`], both at the flange and at the finger tips.
+/// The required minimum is 0.05.
 const BESIDE_SINGULAR: [f64; 7] = [0.0000, -0.2081, 0.0000, -0.8449, 0.0000, 1.3718, std::f64::consts::FRAC_PI_4];
 const SINGULAR: [f64; 7] = [0.0000, -0.1924, 0.0000, -0.8038, 0.0000, 1.3663, std::f64::consts::FRAC_PI_4];
 /// Joints 4 and 6 of an arm in self-collision, rad.
 const FOLDED: (f64, f64) = (-3.0, 0.8);
-/// Distance before the pose of the stop at which a motion just inside ends, as a share of the path to the folded pose.
+/// Distance between the pose of the stop and the end of the motion just inside, as a fraction of the path to the folded
+/// pose.
 const FOLD_MARGIN: f64 = 0.02;
 
-/// A kind of check, with a motion on either side of it.
+/// A limit, with one motion inside and one outside.
 #[derive(Debug, Clone)]
 pub struct Case {
     /// The checked limit.
@@ -51,22 +53,22 @@ pub struct Case {
 /// The robot's reaction to a motion outside.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Reason {
-    /// It stops for this error.
+    /// The robot stops because of this error.
     Stop(RobotError),
-    /// It does not start.
+    /// The robot does not start the motion.
     Refusal(Status),
 }
 
 /// The end of a motion.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Found {
-    /// At its end.
+    /// The motion reached its end.
     Done,
-    /// By the robot, for these errors.
+    /// The robot stopped the motion because of these errors.
     Stopped(RobotErrors),
-    /// Before its start.
+    /// The robot refused to start the motion.
     Refused(Status),
-    /// In another way.
+    /// The motion ended in another way.
     Other(String),
 }
 
@@ -81,7 +83,7 @@ impl fmt::Display for Found {
     }
 }
 
-/// Every kind of check.
+/// A case for every limit.
 pub fn all(limits: &Limits) -> Vec<Case> {
     let (inside, outside) = (1.0 - MARGIN, 1.0 + MARGIN);
     let case = |name, error, signal: &dyn Fn(f64) -> Signal| Case {
@@ -94,8 +96,8 @@ pub fn all(limits: &Limits) -> Vec<Case> {
     let (velocity, acceleration, jerk) = (limits.velocity[joint], limits.acceleration[joint], limits.jerk[joint]);
     let position = |profile| Signal::JointPosition { joint, profile };
     let speed = |profile| Signal::JointVelocity { joint, profile };
-    // Joint 7 starts at 0.785 rad; near its end an FR3 allows only a low velocity, so that the inner motion ends
-    // earlier.
+    // Joint 7 starts at 0.785 rad; near the end of its range an FR3 allows only a low velocity, so that the motion
+    // inside ends earlier.
     let to_the_end = limits.q_max[6] - FRAC_PI_4;
     let torque = |peak: f64| {
         let up = (0..=20).map(|step| peak * f64::from(step) / 20.0);
@@ -133,24 +135,24 @@ pub fn all(limits: &Limits) -> Vec<Case> {
         case("joint jerk, by velocities", RobotError::JointMotionGeneratorAccelerationDiscontinuity, &|share| {
             speed(Profile::jerk(jerk * share))
         }),
-        case("turning velocity, by poses", RobotError::CartesianMotionGeneratorVelocityLimitsViolation, &|share| {
+        case("angular velocity, by poses", RobotError::CartesianMotionGeneratorVelocityLimitsViolation, &|share| {
             Signal::Pose { profile: Profile::velocity(-turn.velocity * share, 500) }
         }),
-        case("turning acceleration, by poses", RobotError::CartesianMotionGeneratorVelocityDiscontinuity, &|share| {
+        case("angular acceleration, by poses", RobotError::CartesianMotionGeneratorVelocityDiscontinuity, &|share| {
             Signal::Pose { profile: Profile::acceleration(turn.acceleration * share) }
         }),
-        case("turning jerk, by poses", RobotError::CartesianMotionGeneratorAccelerationDiscontinuity, &|share| {
+        case("angular jerk, by poses", RobotError::CartesianMotionGeneratorAccelerationDiscontinuity, &|share| {
             Signal::Pose { profile: Profile::jerk(turn.jerk * share) }
         }),
-        case("turning velocity, by twists", RobotError::CartesianMotionGeneratorVelocityLimitsViolation, &|share| {
+        case("angular velocity, by twists", RobotError::CartesianMotionGeneratorVelocityLimitsViolation, &|share| {
             Signal::Twist { profile: Profile::velocity(-turn.velocity * share, 500) }
         }),
         case(
-            "turning acceleration, by twists",
+            "angular acceleration, by twists",
             RobotError::CartesianMotionGeneratorAccelerationDiscontinuity,
             &|share| Signal::Twist { profile: Profile::acceleration(turn.acceleration * share) },
         ),
-        case("turning jerk, by twists", RobotError::CartesianMotionGeneratorAccelerationDiscontinuity, &|share| {
+        case("angular jerk, by twists", RobotError::CartesianMotionGeneratorAccelerationDiscontinuity, &|share| {
             Signal::Twist { profile: Profile::jerk(turn.jerk * share) }
         }),
         case("translation jerk, by poses", RobotError::CartesianMotionGeneratorAccelerationDiscontinuity, &|share| {
@@ -205,7 +207,7 @@ pub fn all(limits: &Limits) -> Vec<Case> {
         Case {
             name: "first position",
             reason: Reason::Stop(RobotError::JointPositionMotionGeneratorStartPoseInvalid),
-            // A step to a constant position has twice the jerk when it ends.
+            // A step to a constant position has twice its jerk at the end of the step.
             inside: Signal::StartPosition { offset: 0.5 * jerk * 1e-9 * inside },
             outside: Signal::StartPosition { offset: 0.101 },
         },
@@ -222,7 +224,7 @@ pub fn all(limits: &Limits) -> Vec<Case> {
             outside: Signal::StartElbow { offset: 0.101 },
         },
         Case {
-            name: "elbow's side",
+            name: "sign of the elbow",
             reason: Reason::Stop(RobotError::CartesianMotionGeneratorElbowSignInconsistent),
             inside: Signal::ElbowSign { changes: false },
             outside: Signal::ElbowSign { changes: true },
@@ -242,8 +244,8 @@ pub fn all(limits: &Limits) -> Vec<Case> {
     ]
 }
 
-/// Joint limits in Cartesian motions far from the Cartesian limits, along the base's x; to be run from [`READY`].
-/// Franka's robots stop for them: a Panda refuses 2.5 m/s², as joint 2 would need 7.9 rad/s² of 7.5.
+/// Joint limits in Cartesian motions far from the Cartesian limits, along the base's x, from [`READY`]. Franka's robots
+/// stop for them: a Panda stops at 2.5 m/s², because joint 2 would need 7.9 rad/s² and its limit is 7.5.
 pub fn joints_of_cartesian_motions(limits: &Limits) -> Vec<Case> {
     let (inside, outside) = (1.0 - MARGIN, 1.0 + MARGIN);
     let acceleration = limits.acceleration[1] / JOINT_2_PER_METRE;
@@ -276,11 +278,11 @@ pub fn joints_of_cartesian_motions(limits: &Limits) -> Vec<Case> {
 }
 
 /// Folds the arm from `home`, rad, until the robot stops it before a self-collision, then moves it to just before that
-/// pose. Returns the ends of the motion just inside and of the one outside.
+/// pose. Returns the results of the motion just inside and of the motion outside.
 ///
 /// # Errors
-/// Those of the connection.
-#[allow(dead_code, reason = "our own server has a test of its own")]
+/// Errors of the connection.
+#[allow(dead_code, reason = "the server of this crate has its own test")]
 pub fn fold(robot: &mut Robot, home: &[f64; 7]) -> Result<[Found; 2], FciError> {
     let mut folded = *home;
     (folded[3], folded[5]) = FOLDED;
@@ -302,7 +304,7 @@ fn found<T>(ended: Result<T, FciError>) -> Result<Found, FciError> {
         Ok(_) => Ok(Found::Done),
         Err(FciError::Motion { status: Status::ReflexAborted, errors, .. }) => Ok(Found::Stopped(errors)),
         Err(FciError::Refused { status, .. }) => Ok(Found::Refused(status)),
-        // If the start is checked in the cycle after the Move was accepted, the refusal is its second answer.
+        // A robot that checks the start in the cycle after it accepted the Move sends the refusal as a second answer.
         Err(FciError::Motion { status: status @ Status::StartAtSingularPose, .. }) => Ok(Found::Refused(status)),
         Err(error @ FciError::Motion { .. }) => Ok(Found::Other(error.to_string())),
         Err(error) => Err(error),
@@ -318,8 +320,8 @@ fn recover(robot: &mut Robot) -> Result<(), FciError> {
 
 impl Case {
     /// Whether poses, twists or the elbow are commanded. A robot may stop such a motion inside its Cartesian limits
-    /// because of the joints' limits; the two can be distinguished only if the joints have higher limits.
-    #[allow(dead_code, reason = "franka-sim is told to allow the joints more")]
+    /// because of its joint limits; the Cartesian limits can be tested alone only if the joint limits are higher.
+    #[allow(dead_code, reason = "only used with franka-sim, whose joint limits are widened")]
     pub fn is_cartesian(&self) -> bool {
         matches!(
             self.inside,
@@ -347,7 +349,7 @@ impl Case {
     /// Runs one of the two motions from `home`, rad, and recovers from its error.
     ///
     /// # Errors
-    /// Those of the connection.
+    /// Errors of the connection.
     pub fn run(&self, robot: &mut Robot, home: &[f64; 7], is_inside: bool) -> Result<Found, FciError> {
         go_to(robot, home)?;
         let signal = if is_inside { &self.inside } else { &self.outside };

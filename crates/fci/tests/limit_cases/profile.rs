@@ -1,4 +1,4 @@
-//! Velocities, one per millisecond, that lead a signal to a limit and back to rest.
+//! Velocities, one per millisecond, that bring a signal to a limit and back to rest.
 
 use std::f64::consts::PI;
 
@@ -10,7 +10,7 @@ pub const PERIOD_SECS: f64 = 1e-3;
 pub struct Profile(Vec<f64>);
 
 impl Profile {
-    /// Up to a velocity along a cosine of `ramp_ms`, and down again.
+    /// Increases to a velocity along a cosine of `ramp_ms`, then decreases to zero.
     pub fn velocity(peak: f64, ramp_ms: u32) -> Self {
         let shape = |ms: u32| 0.5 * peak * (1.0 - (PI * f64::from(ms) / f64::from(ramp_ms)).cos());
         let up = (0..=ramp_ms).map(shape);
@@ -18,8 +18,8 @@ impl Profile {
         Self(up.chain([peak; 3]).chain(down).collect())
     }
 
-    /// As [`Profile::velocity`] to 0.8 of the peak, and from there briefly to the peak at a constant acceleration, so
-    /// that an overshooting arm is not measured beyond the limit.
+    /// As [`Profile::velocity`] to 0.8 of the peak, then briefly to the peak at a constant acceleration, so that the
+    /// overshoot of the arm does not exceed the limit.
     pub fn velocity_burst(peak: f64, ramp_ms: u32, acceleration: f64) -> Self {
         let base = 0.8 * peak;
         let num_steps = ((peak - base) / (acceleration * PERIOD_SECS)).ceil();
@@ -30,7 +30,8 @@ impl Profile {
         Self([rising, &burst, falling].concat())
     }
 
-    /// Up to an acceleration in ten steps, held for three cycles; the reverse leads back to rest.
+    /// Increases to an acceleration in ten steps, holds it for three cycles, and reverses the sequence to return to
+    /// rest.
     pub fn acceleration(peak: f64) -> Self {
         let up = (1..=10).map(|step| peak * f64::from(step) / 10.0);
         let pulse: Vec<f64> = up.clone().chain([peak; 3]).chain(up.rev()).collect();
@@ -38,22 +39,22 @@ impl Profile {
         Self::from_accelerations(pulse.into_iter().chain(back))
     }
 
-    /// A jump of the acceleration as large as the jerk limit allows in one cycle, and back to rest by further jumps.
+    /// Changes the acceleration by one step of the jerk `peak`, and returns to rest by further steps.
     pub fn jerk(peak: f64) -> Self {
         let step = peak * PERIOD_SECS;
         Self::from_accelerations([step, 0.0, -step, 0.0].into_iter())
     }
 
-    /// Smoothly by a distance in this many milliseconds.
+    /// Moves smoothly by a distance in `duration_ms`.
     pub fn distance(distance: f64, duration_ms: u32) -> Self {
-        // The area under the velocities is the peak times the ramp.
+        // The integral of the velocity is the peak times the ramp.
         let ramp_ms = duration_ms / 2;
         let shape = Self::velocity(1.0, ramp_ms);
         let length = shape.offset(u64::MAX);
         Self(shape.0.iter().map(|velocity| velocity * distance / length).collect())
     }
 
-    /// Values without conversion, such as torques.
+    /// Stores values without conversion, such as torques.
     pub fn of(values: impl Iterator<Item = f64>) -> Self {
         Self(values.collect())
     }

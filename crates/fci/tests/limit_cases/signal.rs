@@ -16,17 +16,17 @@ pub enum Signal {
     JointPosition { joint: usize, profile: Profile },
     /// A joint's velocity.
     JointVelocity { joint: usize, profile: Profile },
-    /// The turn of the end effector about the base's z.
+    /// The rotation of the end effector about the base's z, as poses.
     Pose { profile: Profile },
-    /// The same as a velocity.
+    /// The rotation of the end effector about the base's z, as twists.
     Twist { profile: Profile },
     /// The path of the end effector along an axis of the base, as poses.
     PoseAlong { axis: Axis, profile: Profile },
-    /// The same as a velocity.
+    /// The path of the end effector along an axis of the base, as twists.
     TwistAlong { axis: Axis, profile: Profile },
     /// The elbow, with the end effector at rest.
     Elbow { profile: Profile },
-    /// Joint 7's torque, with the others at rest.
+    /// The torque of joint 7, with the other joints at rest.
     Torque { profile: Profile },
     /// Joint 7 brought to a velocity by torques.
     SpunJoint { profile: Profile },
@@ -38,11 +38,11 @@ pub enum Signal {
     StartElbow { offset: f64 },
     /// The elbow's sign changes after 20 cycles, or not.
     ElbowSign { changes: bool },
-    /// The commanded pose is a rotation multiplied by this after 20 cycles.
+    /// The rotation of the commanded pose is multiplied by `scale` after 20 cycles.
     Frame { scale: f64 },
-    /// This many successive answers are omitted.
+    /// `num` successive answers are omitted.
     Unanswered { num: u64 },
-    /// The speed of an end effector that is set [`FAR_END_M`] beyond its position, turned by joint 6.
+    /// The speed of an end effector that is set [`FAR_END_M`] beyond its position and moved by joint 6.
     FarEnd { profile: Profile },
     /// A constant pose, started from joint positions.
     StandingPose { from: [f64; 7] },
@@ -51,15 +51,15 @@ pub enum Signal {
 /// An axis of the base.
 #[derive(Debug, Clone, Copy)]
 pub enum Axis {
-    /// Forward, along which joint 2 moves most.
+    /// Forward: joint 2 moves most.
     X,
-    /// Sideways: a rotation in the base needs the smallest joint motion.
+    /// Sideways: a rotation of the base joint needs the smallest joint motion.
     Y,
 }
 
 /// Distance by which [`Signal::FarEnd`] moves the end effector along its own z, m.
 const FAR_END_M: f64 = 2.0;
-/// From joint 6's axis to the flange, along the flange's z and across it, m.
+/// Distances from joint 6's axis to the flange, along the flange's z and across it, m.
 const JOINT_6_TO_FLANGE_M: [f64; 2] = [0.107, 0.088];
 
 /// Moves the joints slowly.
@@ -99,7 +99,7 @@ fn answer<T>(value: T, is_last: bool) -> Answer<T> {
 const STANDING_MS: u64 = 100;
 /// Number of cycles at rest before a profile starts.
 const PROFILE_START_MS: u64 = 30;
-/// The cycle at which the others take effect.
+/// The cycle in which motions without a profile change.
 const EVENT_MS: u64 = 20;
 
 impl Signal {
@@ -122,7 +122,7 @@ impl Signal {
         (ControllerMode::JointImpedance, generator)
     }
 
-    /// Runs the motion from the arm's position; only [`Signal::StandingPose`] first moves to its start.
+    /// Runs the motion from the arm's present position; [`Signal::StandingPose`] first moves to its start.
     pub fn run(&self, robot: &mut Robot) -> Result<RobotState, FciError> {
         match self {
             Signal::StandingPose { from } => go_to(robot, from)?,
@@ -162,7 +162,8 @@ impl Signal {
     /// Sets the command of the `ms`th cycle; returns true in the last.
     fn fill(&self, command: &mut RobotCommand, ms: u64, state: &RobotState, start: &RobotState) -> bool {
         let motion = &mut command.motion;
-        // The first command of a motion has other rules, and torques take over from the internal controller.
+        // A profile starts later, because the first command of a motion has other rules, and torques replace the
+        // internal controller.
         let since_start = ms.checked_sub(PROFILE_START_MS);
         match self {
             Signal::Elbow { .. } if since_start.is_none() => motion.valid_elbow = true,
@@ -255,7 +256,7 @@ impl Signal {
     }
 }
 
-/// The end effector moved from the finger tips along its own z, m.
+/// A frame of the end effector that is moved from the finger tips along its own z, m.
 fn ee_moved_by(z_m: f64) -> Transform {
     transform(&nalgebra::Isometry3::translation(0.0, 0.0, z_m))
 }
@@ -268,7 +269,7 @@ fn holding_torque(state: &RobotState, start: &RobotState) -> [f64; 7] {
     })
 }
 
-/// A torque reached from the last one within the torque rate limit.
+/// The torque nearest to `torque` within the rate limit from the last torque.
 fn within_rate(torque: f64, state: &RobotState, joint: usize) -> f64 {
     let last = state.torque_desired[joint];
     torque.clamp(last - 0.9, last + 0.9)

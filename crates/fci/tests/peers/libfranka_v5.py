@@ -1,7 +1,7 @@
-"""Unmodified libfranka 0.9.2 (panda-python) drives our server: python libfranka_v5.py HOST lockstep|realtime.
+"""Unmodified libfranka 0.9.2 (panda-python) drives this project's server: python libfranka_v5.py HOST lockstep|realtime.
 
-Prints a line for each check. In lockstep every command must be answered in its own cycle; in real time the share is
-reported, and motions that this machine is too slow for do not fail the run.
+Prints a line for each check. In lockstep every command must be answered in its own cycle; in real time the
+fraction is reported, and motions for which this machine is too slow do not fail the run.
 """
 
 import math
@@ -25,7 +25,7 @@ def check(name, is_right, found=""):
 
 
 class Clock:
-    """Robot time since the motion's first callback, and how many callbacks followed the last by a millisecond."""
+    """Robot time since the motion's first callback, and the number of callbacks that followed the last one by a millisecond."""
 
     def __init__(self):
         self.secs, self.calls, self.in_cycle, self.rates = 0.0, 0, 0, []
@@ -42,12 +42,12 @@ class Clock:
 
 
 def swing(duration):
-    """From 0 to 1 and back at rest, in duration seconds."""
+    """A value from 0 to 1 and back in duration seconds, at rest at both ends."""
     return lambda t: 0.5 * (1.0 - math.cos(2.0 * math.pi * min(t / duration, 1.0)))
 
 
 def run(name, control, command, duration, **options):
-    """A motion whose command is made by command(state, secs); returns its clock.
+    """Runs a motion with the commands of command(state, secs); returns its clock.
 
     In real time, a motion may be stopped for commands that were lost: for twenty in a row, or for what the next one looks like after a gap.
     """
@@ -85,7 +85,7 @@ def main():
     hand = libfranka.Gripper(HOST)
     check("hand's version", hand.server_version() == 3, hand.server_version())
 
-    # Setters, and what a robot refuses.
+    # Setters, and values that a robot rejects.
     robot.set_collision_behavior([30.0] * 7, [40.0] * 7, [30.0] * 6, [40.0] * 6)
     robot.set_joint_impedance([3000.0, 3000.0, 3000.0, 2500.0, 2500.0, 2000.0, 2000.0])
     robot.set_cartesian_impedance([2000.0] * 3 + [100.0] * 3)
@@ -100,7 +100,7 @@ def main():
 
     shape = swing(2.0)
 
-    # Joint positions, with each internal controller; measured against wanted at the end.
+    # Joint positions, with each internal controller; the arm must follow within 0.01 rad.
     for label, mode in [("joint impedance", STIFF), ("Cartesian impedance", SOFT)]:
         start = robot.read_once().q_d
         largest = [0.0]
@@ -120,7 +120,7 @@ def main():
 
     run("joint velocities", robot.control_joint_velocity, velocities, 2.0, controller_mode=STIFF)
 
-    # Poses: 6 cm to the side and back, with turning.
+    # Poses: 6 cm to the side and back, with a rotation.
     start = robot.read_once().O_T_EE_c
     reached = [0.0]
 
@@ -244,8 +244,8 @@ def main():
     check("  open", abs(hand.read_once().width - 0.08) < 0.001, f"{hand.read_once().width:.4f}")
     check("hand moves to 3 cm", hand.move(0.03, 0.1) and abs(hand.read_once().width - 0.03) < 0.0015,
           f"{hand.read_once().width:.4f}")
-    check("a grasp of nothing is told as such", not hand.grasp(0.03, 0.05, 20.0))
-    check("  nothing is held", not hand.read_once().is_grasped)
+    check("a grasp without a part is unsuccessful", not hand.grasp(0.03, 0.05, 20.0))
+    check("  no part is held", not hand.read_once().is_grasped)
     check("hand opens", hand.move(0.08, 0.1))
     try:
         hand.move(0.5, 0.1)

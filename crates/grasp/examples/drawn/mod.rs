@@ -21,7 +21,7 @@ pub fn draw_parts(
     seed: u64,
 ) -> Result<Vec<FitPart>> {
     let photo = PhotoConfig { width, height, ..PhotoConfig::default() };
-    // The same photo that the scenes' truth refers to.
+    // The seed of the photo to which the scenes' ground truth refers.
     let photo_seed = SceneConfig::default().photo_seed;
     let mut generated = Vec::new();
     let mut parts = Vec::new();
@@ -40,7 +40,7 @@ pub fn draw_parts(
         }
     }
     for (kind_idx, (config, a_part)) in kinds.iter().enumerate() {
-        // As in use: the camera's distance is unknown, and parts may lie partly outside.
+        // As in detection, the camera's distance is unknown, and parts may lie partly outside the picture.
         let config = SceneConfig {
             width,
             height,

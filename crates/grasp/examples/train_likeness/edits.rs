@@ -1,5 +1,5 @@
-//! Photos of other parts, made by changing one feature of a photo: moved, removed or added; a notch or a lug at the
-//! outline; stretched.
+//! Photos of other parts, made by one change of a photo: a feature moved, removed or added; a notch or a lug at the
+//! outline; the whole photo stretched.
 
 use rand::Rng;
 use rand_pcg::Pcg64Mcg;
@@ -7,16 +7,18 @@ use sdg_shape::{Pair, SIDE};
 
 use crate::pairs::{AREA, between};
 
-/// Radius of a feature and its displacement, in pixels.
+/// Radius of a feature, in pixels.
 const RADIUS: [f32; 2] = [2.5, 7.0];
+/// Displacement of a feature, in pixels.
 const MOVED_PX: [f32; 2] = [4.0, 10.0];
-/// Factor by which a photo is longer or shorter in one direction.
+/// Relative change of length in one direction.
 const STRETCH: [f32; 2] = [0.1, 0.3];
 /// Minimum total change of the photo by an edit, in pixels of full contrast.
 const MIN_CHANGE: f32 = 2.5;
+/// Number of edits that are tried.
 const TRIES: usize = 12;
 
-/// The pair with another part's photo; `None` where no edit changed enough.
+/// Replaces the photo by that of another part; `None` if no edit changed the photo enough.
 pub fn edited(pair: &Pair, rng: &mut Pcg64Mcg) -> Option<Pair> {
     (0..TRIES).find_map(|_| {
         let mut other = pair.clone();
@@ -53,7 +55,7 @@ fn inside(pair: &Pair, rng: &mut Pcg64Mcg) -> [f32; 2] {
     place(if inside.is_empty() { AREA / 2 } else { inside[rng.random_range(0..inside.len())] })
 }
 
-/// A feature is replaced by its surroundings, and is copied elsewhere or nowhere.
+/// Replaces a feature by its surroundings, and copies it elsewhere if `stands_elsewhere`.
 fn move_feature(pair: &mut Pair, rng: &mut Pcg64Mcg, stands_elsewhere: bool) {
     let (from, radius) = (inside(pair, rng), rng.random_range(RADIUS[0]..RADIUS[1]));
     let (sin, cos) = rng.random_range(0.0..std::f32::consts::TAU).sin_cos();
@@ -81,7 +83,7 @@ fn move_feature(pair: &mut Pair, rng: &mut Pcg64Mcg, stands_elsewhere: bool) {
     }
 }
 
-/// A feature of the photo is copied to another place.
+/// Copies a feature of the photo to another place.
 fn put_in(pair: &mut Pair, rng: &mut Pcg64Mcg) {
     let (from, to, radius) = (inside(pair, rng), inside(pair, rng), rng.random_range(RADIUS[0]..RADIUS[1]));
     let before = pair.photo.clone();
@@ -102,7 +104,7 @@ fn paste(pair: &mut Pair, before: &[Option<[f32; 3]>], from: [f32; 2], to: [f32;
     }
 }
 
-/// Table inside the outline, or part outside it.
+/// Adds a patch of table inside the outline, or of the part outside.
 fn change_outline(pair: &mut Pair, rng: &mut Pcg64Mcg) {
     let is_edge = |i: &usize| {
         let (x, y) = (i % SIDE, i / SIDE);
@@ -128,13 +130,13 @@ fn change_outline(pair: &mut Pair, rng: &mut Pcg64Mcg) {
     }
 }
 
-/// Longer or shorter in one direction.
+/// Stretches or shortens the photo in one direction.
 fn stretched(pair: &Pair, rng: &mut Pcg64Mcg) -> Pair {
     let (sin, cos) = rng.random_range(0.0..std::f32::consts::TAU).sin_cos();
     let share = rng.random_range(STRETCH[0]..STRETCH[1]);
     let factor = if rng.random_bool(0.5) { 1.0 + share } else { 1.0 / (1.0 + share) };
     let middle = 0.5 * (SIDE as f32 - 1.0);
-    // One end stays where it is.
+    // One end keeps its position.
     let fixed = rng.random_range(-1.0..1.0f32) * 0.4 * SIDE as f32;
     let source = |i: usize| {
         let [x, y] = place(i).map(|k| k - middle);

@@ -22,13 +22,13 @@ use crate::pairs::{Pairs, Stream};
 use crate::rendered::Rendered;
 
 const BATCH: usize = 128;
-/// Share of each batch. Chosen by hand.
+/// Fraction of each batch that comes from rendered pairs. Chosen by hand.
 const RENDERED_SHARE: f64 = 0.35;
 const SCHEDULE: OneCycle = OneCycle { peak: 2e-3, warm_up: 0.1 };
 const WEIGHT_DECAY: f64 = 0.02;
 const MAX_GRADIENT_NORM: f64 = 1.0;
 
-/// A convolution, a batch norm and a rectifier. In the file, the norm is part of the convolution.
+/// A convolution, a batch norm and a rectifier. In the file, the norm is folded into the convolution.
 #[derive(Module, Debug)]
 struct Convolution {
     weight: Param<Tensor<4>>,
@@ -77,7 +77,7 @@ impl Network {
     fn loss(&self, batch: &[(Vec<f32>, bool)], device: &Device) -> Tensor<1> {
         let pairs = batch.iter().flat_map(|(values, _)| values.iter().copied()).collect::<Vec<_>>();
         let pairs = Tensor::<4>::from_data(TensorData::new(pairs, [batch.len(), SIDE, SIDE, NUM_CHANNELS]), device);
-        // −1 for right examples: −ln p is softplus of the signed log-odds.
+        // −1 for correct examples: −ln p is the softplus of the signed log-odds.
         let signs: Vec<f32> = batch.iter().map(|(_, is_right)| if *is_right { -1.0 } else { 1.0 }).collect();
         let signs = Tensor::<1>::from_data(TensorData::new(signs, [batch.len()]), device);
         activation::softplus(self.forward(pairs.permute([0, 3, 1, 2])) * signs, 1.0).mean()
@@ -114,8 +114,8 @@ impl Network {
     }
 }
 
-/// Trains on the training examples; reports the classification of the held-out ones after every epoch. Returns the
-/// file's bytes.
+/// Trains on the training examples, and reports the classification of the held-out examples after every epoch. Returns
+/// the bytes of the weights' file.
 pub fn train(
     pairs: &Pairs,
     rendered: &Rendered,
@@ -149,7 +149,7 @@ pub fn train(
     network.valid().file()
 }
 
-/// Every example changed by its own random stream, on all cores: those of the indices, and `num_rendered` more.
+/// The examples of the indices and `num_rendered` rendered ones, each changed by its own random stream, on all cores.
 fn batch(pairs: &Pairs, idxs: &[usize], rendered: &Rendered, num_rendered: usize, seed: u64) -> Vec<(Vec<f32>, bool)> {
     let make = |k: usize| {
         let rng = &mut Pcg64Mcg::seed_from_u64(seed.wrapping_add(k as u64));
@@ -163,13 +163,13 @@ fn batch(pairs: &Pairs, idxs: &[usize], rendered: &Rendered, num_rendered: usize
     std::thread::scope(|scope| {
         let first = scope.spawn(|| (0..count / 2).map(make).collect::<Vec<_>>());
         let second: Vec<_> = (count / 2..count).map(make).collect();
-        let mut all = first.join().expect("nothing in it panics");
+        let mut all = first.join().expect("a thread of the batch panicked");
         all.extend(second);
         all
     })
 }
 
-/// Loss and share of correct classifications, by the network in its shipped form.
+/// Loss and classification of the held-out examples by the network in its shipped form, as text.
 fn held_out(pairs: &Pairs, rendered: &Rendered, network: &LikenessNetwork) -> String {
     let drawn = pairs.of(Stream::HeldOut).into_iter().map(|idx| (pairs.pair(idx), pairs.is_right(idx)));
     let drawn = Told::of(network, drawn);
@@ -182,7 +182,7 @@ struct Told {
     loss: f64,
     hits: usize,
     count: usize,
-    /// The probability that a right example scores higher than a wrong one.
+    /// The probability that a correct example scores higher than a wrong one.
     area: f64,
 }
 
@@ -205,6 +205,6 @@ impl Told {
 
 impl std::fmt::Display for Told {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "loss {:.4}, {} of {} told, area {:.3}", self.loss, self.hits, self.count, self.area)
+        write!(f, "loss {:.4}, {} of {} classified correctly, area {:.3}", self.loss, self.hits, self.count, self.area)
     }
 }

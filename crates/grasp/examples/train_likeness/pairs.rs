@@ -16,7 +16,7 @@ use crate::drawn::{Result, absent, draw_parts};
 pub const AREA: usize = SIDE * SIDE;
 /// Parts drawn together: all of them are in memory with their pictures.
 const PARTS_AT_ONCE: usize = 20;
-/// Picture sizes, in turn.
+/// Picture sizes, used alternately.
 const SIZES: [[u32; 2]; 2] = [[640, 480], [320, 240]];
 
 /// The use of an example.
@@ -31,17 +31,20 @@ pub struct Pairs {
     bytes: Vec<u8>,
 }
 
-/// Ranges of the changes, as standard deviations or half ranges of the named quantities. Chosen by hand.
+/// Half range of the logarithm of the exposure. Chosen by hand.
 const EXPOSURE: f32 = 0.5;
+/// Half range of the logarithm of gamma. Chosen by hand.
 const GAMMA: f32 = 0.4;
+/// Half range of the logarithm of each colour's gain. Chosen by hand.
 const TINT: f32 = 0.1;
+/// Maximum standard deviation of the noise. Chosen by hand.
 const NOISE: f32 = 0.02;
 
 impl Pairs {
     /// Nothing yet.
     pub const EMPTY: Self = Self { bytes: Vec::new() };
 
-    /// Draws the missing parts and searches for them; the held-out ones use another seed.
+    /// Generates the missing parts and searches for them; held-out parts use another seed.
     pub fn drawn_up_to(self, parts: usize, held_out: usize, seed: u64, say: &mut dyn FnMut(String)) -> Result<Self> {
         let once = |condition| (SceneConfig::only(condition), 1);
         let kinds: Vec<(SceneConfig, u64)> = Condition::ALL
@@ -77,13 +80,13 @@ impl Pairs {
         Ok(Self { bytes }.sorted())
     }
 
-    /// The parts that are present, by stream, in groups of [`PARTS_AT_ONCE`].
+    /// The groups of [`PARTS_AT_ONCE`] parts that are present, as stream and index of the group.
     fn chunks(&self) -> BTreeSet<(u8, usize)> {
         let chunk = |facts: PairFacts| (facts.stream, usize::from(facts.part_idx) / PARTS_AT_ONCE);
         self.bytes.chunks_exact(RECORD).map(pair_facts).map(chunk).collect()
     }
 
-    /// In the order in which they are drawn.
+    /// The records in the order in which the parts are generated.
     fn sorted(self) -> Self {
         let mut records: Vec<&[u8]> = self.bytes.chunks_exact(RECORD).collect();
         records.sort_by_key(|record| (pair_facts(record).stream, pair_facts(record).part_idx));
@@ -107,12 +110,12 @@ impl Pairs {
         self.bytes.len() / RECORD
     }
 
-    /// Indices of the examples for training, or of those held out.
+    /// Indices of the examples of a stream.
     pub fn of(&self, stream: Stream) -> Vec<usize> {
         (0..self.len()).filter(|&idx| pair_facts(self.record(idx)).stream == stream as u8).collect()
     }
 
-    /// Numbers of right and wrong examples.
+    /// Numbers of correct and wrong examples.
     pub fn counts(&self, stream: Stream) -> (usize, usize) {
         let of_it = self.of(stream);
         let right = of_it.iter().filter(|&&idx| self.is_right(idx)).count();
@@ -127,24 +130,24 @@ impl Pairs {
         &self.bytes[idx * RECORD..][..RECORD]
     }
 
-    /// Unchanged.
+    /// The unchanged pair.
     pub fn pair(&self, idx: usize) -> Pair {
         pair_of(self.record(idx))
     }
 
-    /// Both turned and mirrored together, with a different light change for each.
+    /// The pair as changed by [`changed`].
     pub fn changed_pair(&self, idx: usize, rng: &mut Pcg64Mcg) -> Pair {
         changed(&self.pair(idx), rng)
     }
 }
 
-/// Both turned and mirrored together, with a different light change for each.
+/// Rotates and mirrors both images together, and changes the light of each differently.
 pub fn changed(pair: &Pair, rng: &mut Pcg64Mcg) -> Pair {
     let pair = turned(pair, rng);
     Pair { photo: in_other_light(&pair.photo, 0.6, rng), picture: in_other_light(&pair.picture, 1.0, rng), ..pair }
 }
 
-/// Both turned by the same angle about the centre, and mirrored or not.
+/// Rotates both images by the same angle about the centre, and mirrors both or neither.
 fn turned(pair: &Pair, rng: &mut Pcg64Mcg) -> Pair {
     let (sin, cos) = rng.random_range(0.0..std::f32::consts::TAU).sin_cos();
     let mirror = if rng.random_bool(0.5) { -1.0 } else { 1.0 };
@@ -182,7 +185,7 @@ pub fn between(colors: &[Option<[f32; 3]>], [x, y]: &[f32; 2]) -> Option<[f32; 3
     Some(std::array::from_fn(|c| corners.iter().zip(weights).map(|(corner, weight)| weight * corner[c]).sum()))
 }
 
-/// Another exposure, gamma, tint and noise; `strength` scales all of them.
+/// Changes exposure, gamma and tint, and adds noise; `strength` scales all changes.
 fn in_other_light(colors: &[Option<[f32; 3]>], strength: f32, rng: &mut Pcg64Mcg) -> Vec<Option<[f32; 3]>> {
     let mut range = |most: f32| rng.random_range(-most..most) * strength;
     let (gain, gamma) = (range(EXPOSURE).exp(), range(GAMMA).exp());

@@ -13,19 +13,20 @@ use crate::drawn::Result;
 use crate::edits::edited;
 use crate::pairs::changed;
 
-/// Every part of this index interval is held out, if parts are held out.
+/// One part in this many is held out, if parts are held out.
 const HELD_OUT: usize = 4;
-/// Chosen by hand: the shares of right examples, of right examples whose photo is another picture of the part, and of
-/// right examples that an edit of the photo makes wrong.
+/// Fraction of correct examples. Chosen by hand.
 const RIGHT_SHARE: f64 = 0.55;
+/// Fraction of correct examples whose photo is another picture of the part. Chosen by hand.
 const OTHER_PHOTO_SHARE: f64 = 0.6;
+/// Fraction of correct examples that an edit of the photo makes wrong. Chosen by hand.
 const EDITED_SHARE: f64 = 0.25;
 
 /// Examples of one part.
 #[derive(Default)]
 struct OfPart {
     right: Vec<Pair>,
-    /// Indices of the right ones whose picture can serve as a photo.
+    /// Indices of the correct examples whose picture can serve as a photo.
     clear: Vec<usize>,
     wrong: Vec<Pair>,
 }
@@ -37,10 +38,10 @@ pub struct Rendered {
 }
 
 impl Rendered {
-    /// Nothing.
+    /// No examples.
     pub const EMPTY: Self = Self { training: Vec::new(), held_out: Vec::new() };
 
-    /// Reads a file of `rendered_pairs`; with `holds_out` every fourth part is not trained on.
+    /// Reads a file of `rendered_pairs`; with `holds_out`, every fourth part is kept out of training.
     pub fn read(path: &Path, holds_out: bool) -> Result<Self> {
         let bytes = std::fs::read(path)?;
         let mut parts: BTreeMap<u16, OfPart> = BTreeMap::new();
@@ -69,7 +70,7 @@ impl Rendered {
         let part = self.training.choose(rng).expect("some part is trained on");
         let mut is_right = part.wrong.is_empty() || rng.random_bool(RIGHT_SHARE);
         let of_it = if is_right { &part.right } else { &part.wrong };
-        let mut pair = of_it.choose(rng).expect("parts without right ones are left out").clone();
+        let mut pair = of_it.choose(rng).expect("parts without correct examples are left out").clone();
         if !part.clear.is_empty() && rng.random_bool(OTHER_PHOTO_SHARE) {
             let other = &part.right[*part.clear.choose(rng).expect("it is not empty")];
             pair.photo.clone_from(&other.picture);

@@ -1,4 +1,4 @@
-//! The constants that are fitted one by one, and the values that are tried.
+//! The constants that are fitted one by one, and the tried values.
 
 use crate::check_config::CheckConfig;
 
@@ -6,9 +6,9 @@ const SHAPE: &str = "crates/shape/src/config.rs";
 
 /// A constant of the code that can be fitted.
 pub(super) struct Constant {
-    /// Its field of [`CheckConfig`].
+    /// The constant's field of [`CheckConfig`].
     pub(super) name: &'static str,
-    /// The file that contains its value.
+    /// The file that contains the constant's value.
     pub(super) file: &'static str,
     /// The tried values in ascending order, including the present one.
     pub(super) grid: &'static [f64],

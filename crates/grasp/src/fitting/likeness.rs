@@ -9,25 +9,25 @@ use crate::taught::TaughtDemonstration;
 use crate::teach::symmetry::HiddenTurns;
 use crate::verification::{PlacedDemonstration, SearchedImage, search};
 
-/// Number of wrong poses used per picture: those of highest agreement.
+/// Number of wrong poses used per picture, in descending agreement.
 const WRONG_A_PICTURE: usize = 3;
 
-/// A pose within this distance of an instance, as a share of its diagonal and in radians, that is not right counts as
-/// neither right nor wrong, because the part's height displaces it.
+/// A pose that is not correct but within this distance of an instance, as a fraction of its diagonal and in radians,
+/// counts as neither correct nor wrong, because the part's height displaces it.
 const NEARLY: (f64, f64) = (0.15, 0.3);
 
 /// A photo and an aligned picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LikenessExample {
-    /// Index of the picture among the part's.
+    /// Index among the part's pictures.
     pub picture_idx: usize,
     /// The network's input.
     pub pair: Pair,
-    /// Whether the picture shows the part there.
+    /// Whether the picture shows the part at this place.
     pub is_right: bool,
 }
 
-/// For every instance its best right pose, for every picture its three best wrong ones, by agreement.
+/// The best correct pose of every instance, and the three best wrong poses of every picture, by agreement.
 ///
 /// # Errors
 /// A part that cannot be taught.

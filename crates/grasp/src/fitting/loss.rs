@@ -7,20 +7,21 @@ use crate::verdict::judge_picture;
 /// Scores are clamped to this distance from 0 and 1: one decision costs at most −ln 0.01 = 4.6.
 const MIN_SCORE: f64 = 0.01;
 
-/// Number of refused right parts that cost as much as one accepted wrong part. It was 3 before a network compared photo
-/// and picture; at 1 the paper's protocol then had false alarms. Now the best wrong pose there stays far below 0.5.
+/// Number of refused correct detections that cost as much as one accepted wrong detection. Before a network compared
+/// photo and picture, the value was 3, since 1 gave false alarms in the paper's protocol. With the network, the best
+/// wrong pose in that protocol stays far below 0.5.
 pub(super) const COST_OF_WRONG: f64 = 1.0;
 
 /// The loss of wrong decisions; see [`crate::fitting`] for the definition.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Loss {
-    /// The sum of the losses of right and wrong poses.
+    /// The sum of the losses of correct and wrong poses.
     pub total: f64,
-    /// Loss of right poses: mean of −ln p.
+    /// Loss of correct poses: mean of −ln p.
     pub right: f64,
     /// Loss of wrong poses: mean of −ln (1 − q).
     pub wrong: f64,
-    /// Number of instances with an accepted right pose, and number of instances.
+    /// Number of instances with an accepted correct pose, and number of instances.
     pub accepted: [usize; 2],
     /// Number of pictures with an accepted wrong pose, and number of pictures.
     pub false_alarms: [usize; 2],
@@ -51,7 +52,7 @@ fn part_loss(part: &PartObservations, config: &ScoreConfig) -> Loss {
     }
 }
 
-/// The best score of a right pose of each instance, and of a wrong pose.
+/// The best score of a correct pose for each instance, and the best score of a wrong pose.
 fn scores(picture: &PictureObservations, config: &ScoreConfig) -> (Vec<f64>, f64) {
     let mut rights = vec![0.0f64; picture.num_instances];
     let mut worst = 0.0f64;
@@ -172,7 +173,7 @@ mod tests {
     fn differences_are_taken_part_by_part() {
         let loss = |total: f64| Loss { total, right: total, wrong: 0.0, accepted: [0, 0], false_alarms: [0, 0] };
         let difference = Difference::between(&[loss(1.0), loss(2.0)], &[loss(0.9), loss(1.7)]);
-        // Differences −0.1 and −0.3: their mean is −0.2, their standard deviation √0.02, its error √0.02 / √2 = 0.1.
+        // Differences −0.1 and −0.3: mean −0.2, standard deviation √0.02, standard error √0.02 / √2 = 0.1.
         assert!((difference.mean + 0.2).abs() < 1e-12);
         assert!((difference.half_interval - 0.196).abs() < 1e-12);
         assert!(difference.is_improvement());

@@ -1,26 +1,26 @@
-//! Fits the constants of [`CheckConfig`] on pictures with truth: for maintainers.
+//! Fits the constants of [`CheckConfig`] on pictures with ground truth: for maintainers.
 //!
 //! ```text
-//! parts with pictures ─ observe: search, evidence for right and wrong poses ─┬─ score: logistic regression ─┐
+//! parts with pictures ─ observe: search, evidence of correct and wrong poses ┬─ score: logistic regression ─┐
 //! constant × grid ─ observe again ─ regression again ────────────────────────┴─ loss on the training half ──┤
 //!                                                       best value of each ─── loss on the held-out half ───┘
 //! ```
 //! First the weights of the score are fitted, without searching the pictures again. Then each constant of
-//! [`CheckConfig::search`] is fitted alone, the others at their present values: for each value, the present one
-//! included, every picture is searched again and the weights are fitted again, because the evidence depends on the
-//! constants.
+//! [`CheckConfig::search`] is fitted alone, with the others at their present values. For each tried value, including
+//! the present one, every picture is searched again and the weights are fitted again, because the evidence depends on
+//! the constants.
 //!
-//! **Loss** ([`Loss`]). A picture's detections are scored as in use. Let p be the best score of a right pose of an
-//! instance (0 if there is none) and q the best score of a wrong pose in a picture (likewise); both are clamped to 0.01
-//! and 0.99. A part's loss is the mean of −ln p over the instances plus the mean of −ln (1 − q) over the pictures; the
-//! loss of several parts is their mean. The minimum is 0.02. A right pose lies within 4 % of the part's size and 10° of
-//! an instance, up to its symmetry. Poses on a part that differs only in size count as neither right nor wrong: without
-//! a camera it is the part.
+//! **Loss** ([`Loss`]). A picture's detections are scored as in detection. Let p be the best score of a correct pose of
+//! an instance and q the best score of a wrong pose in a picture, each 0 if there is none; both are clamped to 0.01 and
+//! 0.99. A part's loss is the mean of −ln p over the instances plus the mean of −ln (1 − q) over the pictures; the loss
+//! of several parts is their mean. The minimum is 0.02. A correct pose lies within 4 % of the part's size and 10° of an
+//! instance, up to its symmetry. Poses on a part that differs only in size count as neither correct nor wrong: without
+//! a camera, that part is the same part.
 //!
 //! **Intervals.** Parts are independent, pictures of one part are not. A difference between two values is therefore
 //! computed per part; its interval is the mean ± 1.96 standard errors of those differences.
 //!
-//! Nothing here changes a constant. Deterministic for any number of threads.
+//! A fit changes no constant, and is deterministic for any number of threads.
 
 mod constants;
 mod likeness;
@@ -55,11 +55,11 @@ pub struct FitOptions {
     pub only: Vec<String>,
 }
 
-/// The name of the score's weights among those of the constants. They are always fitted; this name alone asks for
-/// nothing else.
+/// The name of the score's weights among the names of the constants. The weights are always fitted; with this name
+/// alone, nothing else is.
 const SCORE: &str = "score";
 
-/// The names of all that can be fitted.
+/// The names of all constants that can be fitted, and of the score's weights.
 pub fn constant_names() -> Vec<&'static str> {
     std::iter::once(SCORE).chain(CONSTANTS.iter().map(|constant| constant.name)).collect()
 }
@@ -84,7 +84,7 @@ pub enum FitEvent<'a> {
 /// Fits each constant on `training` and reports the effect of its value on `held_out`; `observe` is called with the progress.
 ///
 /// # Errors
-/// A name that no constant has, fewer than two parts in either half, and a part that cannot be taught.
+/// A name that belongs to no constant, fewer than two parts in either half, and a part that cannot be taught.
 pub fn fit(
     training: &[FitPart],
     held_out: &[FitPart],
@@ -160,7 +160,7 @@ impl Sides<'_> {
     }
 }
 
-/// Every picture is searched again for each value, and the score's weights are fitted again.
+/// For each value, searches every picture again and refits the score's weights.
 fn fit_constant(
     constant: &Constant,
     sides: &Sides<'_>,
@@ -211,8 +211,8 @@ fn fit_constant(
     })
 }
 
-/// The score's weights: fitted on the training half and measured on the held-out half; and fitted on all parts, which
-/// are the ones to adopt.
+/// The score's weights: fitted on the training half and measured on the held-out half, and fitted on all parts; the
+/// latter are the ones to adopt.
 fn report_score(observed: &Observed) -> ScoreReport {
     let today = ScoreConfig::DEFAULT;
     let fitted = fit_score(&observed.training, &today);

@@ -1,5 +1,5 @@
-//! The results of the search on a part's pictures: evidence for right poses, for wrong ones, and the resemblance of
-//! other objects.
+//! The results of the search on a part's pictures: evidence of correct and of wrong poses, and the resemblance of other
+//! objects.
 
 use sdg_geometry::{Angle, PlanarGrasp};
 
@@ -13,28 +13,29 @@ use crate::teach::symmetry::HiddenTurns;
 use crate::verdict::Clues;
 use crate::verification::{PlacedDemonstration, SearchedImage, search};
 
-/// Tolerance of a right pose: distance of its grasp from the true one, as a share of the diagonal of the
-/// demonstration's box in the picture's size, and angle. The same as in `sdg evaluate --pictures`.
+/// Tolerance of a correct pose, as in `sdg evaluate --pictures`: distance between its grasp and the true one, as a
+/// fraction of the diagonal of the demonstration's box in the picture's size.
 const RIGHT_SHARE: f64 = 0.04;
+/// Tolerance of a correct pose in angle, as in `sdg evaluate --pictures`.
 const RIGHT_DEGREES: f64 = 10.0;
 
 /// A pose that the search found.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct PoseObservation {
     pub(super) clues: Clues,
-    /// The instance of which it is a right pose.
+    /// The instance of which this is a correct pose.
     pub(super) instance_idx: Option<usize>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct PictureObservations {
     pub(super) num_instances: usize,
-    /// In arbitrary order; those that are neither right nor wrong are left out.
+    /// The correct and the wrong poses, in arbitrary order.
     pub(super) poses: Vec<PoseObservation>,
 }
 
 impl PictureObservations {
-    /// Everything known about the poses, as used to judge a picture.
+    /// The evidence of the poses, as used for the decision about a picture.
     pub(super) fn clues(&self) -> Vec<Clues> {
         self.poses.iter().map(|pose| pose.clues).collect()
     }
@@ -46,7 +47,7 @@ pub(super) struct PartObservations {
 }
 
 impl PartObservations {
-    /// The share of instances with a right pose.
+    /// The fraction of instances with a correct pose.
     pub(super) fn coverage(&self) -> f64 {
         let all: usize = self.pictures.iter().map(|picture| picture.num_instances).sum();
         let is_covered =
@@ -133,8 +134,8 @@ pub(super) fn is_right(
     share <= RIGHT_SHARE && turn <= Angle::from_degrees(RIGHT_DEGREES).radians()
 }
 
-/// The distance of a pose's grasp from that of an instance: as a share of the instance's diagonal, and in radians, up
-/// to symmetry.
+/// The distance of a pose's grasp from that of an instance: as a fraction of the instance's diagonal, and in radians,
+/// up to symmetry.
 pub(super) fn error_of(
     placed: &PlacedDemonstration<'_>,
     instance: &FitInstance,
@@ -150,7 +151,7 @@ pub(super) fn error_of(
 }
 
 impl FitPicture {
-    /// Whether a pose lies on a part that counts as neither right nor wrong.
+    /// Whether a pose lies on a part that counts as neither correct nor wrong.
     pub(super) fn is_undecided(&self, placed: &PlacedDemonstration<'_>) -> bool {
         let middle = placed.outline().bounds().center();
         self.undecided.iter().any(|bbox| bbox.contains(&middle))

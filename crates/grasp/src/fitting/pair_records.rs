@@ -4,7 +4,7 @@ use sdg_shape::{Pair, SIDE};
 
 /// Pixels of a pair.
 const AREA: usize = SIDE * SIDE;
-/// Bytes of a record: those of [`PairFacts`], then photo, picture and a byte of flags for each pixel.
+/// Bytes of a record: [`PairFacts`], then photo, picture and a byte of flags for each pixel.
 pub const PAIR_RECORD_BYTES: usize = 4 + 7 * AREA;
 /// Bits of a pixel's flags.
 const INSIDE: u8 = 1;
@@ -21,9 +21,9 @@ pub struct PairFacts {
     pub stream: u8,
     /// Index of the part.
     pub part_idx: u16,
-    /// Whether the picture shows the part there.
+    /// Whether the picture shows the part at this place.
     pub is_right: bool,
-    /// Whether nothing covers the part there, so that the picture can serve as a photo of it.
+    /// Whether the part is uncovered, so that the picture can serve as a photo of it.
     pub is_clear: bool,
 }
 

@@ -7,22 +7,22 @@ use sdg_geometry::{BoundingBox, GraspLine, PlanarSimilarity, RotationalSymmetry}
 /// One part, taught from one photo, and pictures to search for it.
 #[derive(Debug, Clone)]
 pub struct FitPart {
-    /// Its demonstration.
+    /// The demonstration.
     pub demonstration: Demonstration,
-    /// The turns of its symmetry.
+    /// The part's symmetry.
     pub symmetry: RotationalSymmetry,
     /// Pictures of the photo's size, with the part and without.
     pub pictures: Vec<FitPicture>,
 }
 
-/// A picture and the truth about it.
+/// A picture and its ground truth.
 #[derive(Debug, Clone)]
 pub struct FitPicture {
     /// The picture.
     pub image: RgbImage,
     /// Every instance of the part in it.
     pub instances: Vec<FitInstance>,
-    /// Boxes of parts that differ only in size: detections on them are neither right nor wrong.
+    /// Boxes of parts that differ only in size: detections on them are neither correct nor wrong.
     pub undecided: Vec<BoundingBox>,
 }
 

@@ -1,10 +1,11 @@
 //! The score's weights, by logistic regression.
 //!
-//! Not every pose counts. As in use, only the best right pose of an instance and the best wrong pose of a picture
-//! matter: the regression is repeated, each time on the poses that the last weights rank first. Instances, pictures and
-//! parts have the same weights as in the loss of [`crate::fitting`].
+//! As in detection, only the best correct pose of an instance and the best wrong pose of a picture count: the
+//! regression is repeated, each time on the poses that the last weights rank first. Instances, pictures and parts have
+//! the same weights as in the loss of [`crate::fitting`].
 //!
-//! Legend: `x` the values of a pose's terms, clamped to their ranges; `w` the weights, the bias last; `y` 1 for right.
+//! Legend: `x` the values of a pose's terms, clamped to their ranges; `w` the weights, the bias last; `y` 1 for
+//! correct.
 
 use nalgebra::{SMatrix, SVector};
 use sdg_geometry::upper_median;
@@ -15,22 +16,23 @@ use super::observation::{PartObservations, PictureObservations};
 use crate::check_config::{ScoreConfig, Term};
 use crate::verdict::{judge_picture, rivals_gain};
 
-/// The fitted terms: all except the network's, which is not used here.
+/// Number of fitted terms: all except the network's, which is not used here.
 const NUM_TERMS: usize = 14;
 /// Weights and bias.
 type Weights = SVector<f64, { NUM_TERMS + 1 }>;
 
-/// Rounds of choosing poses and fitting; each round moves half-way, to avoid oscillation between two choices.
+/// Rounds of choosing poses and fitting; each round moves the weights half-way, to avoid oscillation between two
+/// choices.
 const NUM_ROUNDS: usize = 16;
 /// Newton steps of one regression.
 const NUM_STEPS: usize = 12;
 /// Keeps weights finite if a term carries no information, in units of a term's standard deviation. Chosen by hand.
 const RIDGE: f64 = 2e-4;
-/// Minimum share of instances with a right pose among those found; parts below it, which are nearly symmetric, carry no
-/// information about the score.
+/// Minimum fraction of instances with a correct pose among the found ones. Parts with less, which are nearly symmetric,
+/// carry no information about the score.
 const MIN_COVERAGE: f64 = 0.6;
 
-/// One pose that is used.
+/// A pose used for the regression.
 struct Example {
     x: SVector<f64, NUM_TERMS>,
     is_right: bool,
@@ -54,7 +56,7 @@ pub(super) fn fit_score(parts: &[PartObservations], from: &ScoreConfig) -> Score
     neutral_in_the_middle(&parts, &config)
 }
 
-/// Best right pose of each instance, best wrong pose of each picture.
+/// The best correct pose of each instance, and the best wrong pose of each picture.
 fn examples(parts: &[&PartObservations], config: &ScoreConfig) -> Vec<Example> {
     let mut examples = Vec::new();
     for part in parts {
@@ -84,7 +86,7 @@ fn examples(parts: &[&PartObservations], config: &ScoreConfig) -> Vec<Example> {
 /// The terms' values of every pose of a picture.
 fn values(picture: &PictureObservations, config: &ScoreConfig) -> Vec<SVector<f64, NUM_TERMS>> {
     let clues = picture.clues();
-    // Its size follows from its contributions.
+    // A pose's size follows from its contributions.
     let judged = judge_picture(&clues, config);
     clues
         .iter()
@@ -242,8 +244,8 @@ fn regression(examples: &[Example]) -> Weights {
     weights
 }
 
-/// The same score with neutral values half-way between the medians of right and wrong poses, so that the sign of a
-/// contribution says whether it supports the part. Size and outside are neutral at 0, their best value.
+/// The same score with neutral values half-way between the medians of correct and wrong poses, so that a positive
+/// contribution supports the part. Size and outside are neutral at 0, their best value.
 fn neutral_in_the_middle(parts: &[&PartObservations], config: &ScoreConfig) -> ScoreConfig {
     let examples = examples(parts, config);
     let median = |k: usize, right: Option<bool>| {
@@ -275,7 +277,7 @@ mod tests {
 
     use crate::verdict::tests::look;
 
-    /// Right poses have more edges than wrong ones on average; all other terms carry no information.
+    /// Correct poses have more edges than wrong ones on average; all other terms carry no information.
     fn part(rng: &mut Pcg64Mcg) -> PartObservations {
         let mut pose = |edges: f64, instance_idx| {
             let mut noise = || rng.random_range(-0.15..0.15);

@@ -17,9 +17,9 @@ pub struct Trial {
 /// The result for one constant.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ConstantReport {
-    /// Its field of [`crate::CheckConfig`].
+    /// The constant's field of [`crate::CheckConfig`].
     pub name: &'static str,
-    /// The file that contains its value.
+    /// The file that contains the constant's value.
     pub file: &'static str,
     /// Present value.
     pub today: f64,
@@ -27,9 +27,9 @@ pub struct ConstantReport {
     pub fitted: f64,
     /// All tried values.
     pub trials: Vec<Trial>,
-    /// On the held-out half, with the present value.
+    /// Loss on the held-out half with the present value.
     pub before: Loss,
-    /// On the held-out half, with the fitted value.
+    /// Loss on the held-out half with the fitted value.
     pub after: Loss,
     /// Difference of the losses, fitted minus present.
     pub difference: Difference,
@@ -38,15 +38,15 @@ pub struct ConstantReport {
 /// The result for the score's weights.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ScoreReport {
-    /// Fitted on the training half.
+    /// The weights fitted on the training half.
     pub fitted: ScoreConfig,
-    /// Fitted on both halves: the weights to adopt.
+    /// The weights fitted on both halves, which are the ones to adopt.
     pub on_all: ScoreConfig,
-    /// On the held-out half, with the present weights.
+    /// Loss on the held-out half with the present weights.
     pub before: Loss,
-    /// On the held-out half, with those of the training half.
+    /// Loss on the held-out half with the weights fitted on the training half.
     pub after: Loss,
-    /// From before to after.
+    /// Difference of the losses, `after` minus `before`.
     pub difference: Difference,
 }
 
@@ -57,13 +57,13 @@ pub struct FitReport {
     pub num_training: usize,
     /// Parts used for measuring the fitted values.
     pub num_held_out: usize,
-    /// The present values on the held-out half.
+    /// Loss of the present values on the held-out half.
     pub today: Loss,
-    /// The present values on the training half.
+    /// Loss of the present values on the training half.
     pub today_training: Loss,
-    /// Each constant alone.
+    /// The result for each constant alone.
     pub constants: Vec<ConstantReport>,
-    /// The score's weights.
+    /// The result for the score's weights.
     pub score: ScoreReport,
 }
 
@@ -173,7 +173,7 @@ fn verdict(is_other: bool, difference: &Difference) -> &'static str {
     }
 }
 
-/// Three decimals at most.
+/// A number with at most three decimals.
 struct Short(f64);
 
 impl fmt::Display for Short {

@@ -1,4 +1,4 @@
-//! Two small parts in each half, a few pictures, one constant of each kind.
+//! Fits on two small parts in each half, with a few pictures and one constant of each kind.
 
 use image::{Rgb, RgbImage};
 use sdg_demonstration::{AugmentationConfig, Augmenter};
@@ -68,7 +68,7 @@ fn a_fit_reports_today_and_the_best_of_the_grid() {
 fn a_pose_is_right_within_its_tolerances_and_modulo_the_symmetry() {
     let taught = demonstration();
     let observed = |symmetry: RotationalSymmetry, moved_px: f64, turned_degrees: f64| {
-        // The photo itself, with a displaced truth: as if the search had found the part that far away.
+        // The photo itself with a displaced ground truth, as if the search had found the part at that distance.
         let grasp = taught.annotation.grasp.unwrap();
         let pivot = taught.annotation.region().centroid();
         let to = pivot + nalgebra::Vector2::new(moved_px, 0.0);

@@ -1,4 +1,4 @@
-//! A network's proposals: places of an image, each with the model's reading of it.
+//! A network's proposals: places of an image, each converted to a pose of a demonstration.
 
 use nalgebra::Point2;
 use sdg_geometry::{BoundingBox, PlanarGrasp, PlanarSimilarity};
@@ -8,36 +8,36 @@ use crate::facts::TurnSource;
 use crate::same_part::SAME_PART_IOU;
 use crate::taught::TaughtDemonstration;
 
-/// The output of a network for an image, read by the model.
+/// The output of a network for an image, converted to poses.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Proposals {
-    /// Best first; those that cannot be read as a pose are left out.
+    /// The candidates, best first; detections that give no pose are left out.
     pub(crate) candidates: Vec<PoseCandidate>,
-    /// Every box with its score, also those without a candidate.
+    /// All boxes with their scores, also boxes without a candidate.
     pub(super) boxes: Vec<(BoundingBox, f64)>,
 }
 
 impl Proposals {
-    /// The highest score of a box about the same part as `bbox`; 0 where there is none.
+    /// The highest score of a box about the same part as `bbox`; 0 if there is none.
     pub(crate) fn score_at(&self, bbox: &BoundingBox) -> f64 {
         let about_it = self.boxes.iter().filter(|(proposed, _)| proposed.iou(bbox) >= SAME_PART_IOU);
         about_it.map(|(_, score)| *score).fold(0.0, f64::max)
     }
 }
 
-/// A detection with the model's reading of it, not yet verified.
+/// A detection and the pose that it gives, not yet verified.
 #[derive(Debug, Clone)]
 pub(crate) struct PoseCandidate {
     /// The class's probability.
     pub(crate) class_probability: f64,
-    /// The same; for proposals, lower if the heads contradict each other or the place does not look like
-    /// the demonstration.
+    /// The class's probability, reduced for a proposal if the heads contradict each other or the place does not
+    /// resemble the demonstration.
     pub(crate) network_score: f64,
     pub(crate) bbox: BoundingBox,
-    /// Each with the network's score; empty for a model without keypoints.
+    /// The keypoints, each with the network's score; empty for a model without keypoints.
     pub(crate) keypoints: Vec<(Point2<f64>, f64)>,
     pub(crate) grasp: PlanarGrasp,
-    /// The demonstration that it is compared with first.
+    /// The demonstration that is compared first.
     pub(crate) demonstration_idx: usize,
     /// The pose of that demonstration.
     pub(crate) image_from_cutout: PlanarSimilarity,
@@ -45,7 +45,7 @@ pub(crate) struct PoseCandidate {
 }
 
 impl PoseCandidate {
-    /// The same detection with the demonstration in this pose, and its score there.
+    /// The detection with the demonstration in this pose, and the score of the pose.
     pub(super) fn in_pose(
         self,
         demonstration: &TaughtDemonstration,
@@ -60,7 +60,7 @@ impl PoseCandidate {
         Self { network_score, ..placed }
     }
 
-    /// The same detection with the demonstration lying elsewhere; its keypoints' scores stay.
+    /// The detection with another pose of the demonstration; the keypoints' scores are unchanged.
     fn moved_to(self, demonstration: &TaughtDemonstration, image_from_cutout: PlanarSimilarity) -> Self {
         let points = demonstration.keypoints().into_iter().map(|keypoint| image_from_cutout.apply(&keypoint.point()));
         let keypoints = points.zip(self.keypoints.iter().map(|(_, score)| *score)).collect();

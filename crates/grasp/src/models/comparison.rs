@@ -1,10 +1,11 @@
-//! The comparison network's part in a detection: whether the image under a pose looks like the demonstration.
+//! The use of the comparison network in a detection: it decides whether the image under a pose resembles the
+//! demonstration.
 //!
-//! A part with similar ends is often read the wrong way round, and keypoints on a short grasp line say little about the
-//! ends of a long part. So the model's pose is compared as it is, and also fitted into the detected box in its
-//! direction and in the opposite one. The most likely poses are then corrected by the positions at which the network
-//! finds the demonstration's features. All are compared once more in views of twice the resolution, where the
-//! similarity of the features counts, too.
+//! The pose of a part with similar ends is often rotated by 180°, and keypoints on a short grasp line give little
+//! information about the ends of a long part. Therefore the model's pose is compared unchanged, and also fitted into
+//! the detected box in its direction and in the opposite one. The most likely poses are then corrected by the positions
+//! at which the network finds the demonstration's features. All candidates are compared again in views of twice the
+//! resolution, where the similarity of the features also counts.
 
 use image::RgbImage;
 use sdg_comparison::{Comparison, ComparisonNetwork, Pyramid, Reference, View};
@@ -16,14 +17,14 @@ use super::placing::fill_box;
 use crate::taught::TaughtDemonstration;
 
 /// Maximum number of compared candidates of an image: those with the highest class and box scores. Each takes three to
-/// five views. In the protocol's pictures 16 of them found no further part, and 616 of the 3200 pictures had five or
-/// more.
+/// five views. In the paper's protocol, a maximum of 16 found no further part, and 616 of the 3200 pictures had five
+/// candidates or more.
 const MAX_COMPARED: usize = 5;
 /// Maximum number of candidates of an image whose poses are corrected before their features are compared at high
-/// resolution: the most likely. Four found no further part.
+/// resolution: the most likely ones. A maximum of four found no further part.
 const MAX_CORRECTED: usize = 2;
-/// Maximum number of candidates of an image that are tried end for end at high resolution: the most likely. Such a view
-/// takes four times as long as another.
+/// Maximum number of candidates of an image that are also compared rotated by 180° at high resolution: the most likely
+/// ones. Such a view takes four times as long as another.
 const MAX_TURNED: usize = 2;
 
 /// Evaluates the network on one picture.
@@ -46,8 +47,8 @@ impl<'a> Comparer<'a> {
         Self { network, picture: Pyramid::new(image), picture_size: image.dimensions(), demonstrations }
     }
 
-    /// The best of these candidates, each in its most likely pose, with its score, best first. The input is sorted,
-    /// best first.
+    /// The best of these candidates, each in its most likely pose and with its score, best first. The input must be
+    /// sorted in the same way.
     pub(super) async fn compare(&self, mut candidates: Vec<PoseCandidate>) -> Vec<PoseCandidate> {
         candidates.truncate(MAX_COMPARED);
         let likely = candidates.into_iter().map(|one| {
@@ -76,7 +77,7 @@ impl<'a> Comparer<'a> {
         aligned
     }
 
-    /// Each candidate in its most likely pose; of equally likely ones, in the first.
+    /// Each candidate in its most likely pose; of equally likely poses, the first.
     async fn likeliest(&self, candidates: Vec<(PoseCandidate, Vec<PlanarSimilarity>)>) -> Vec<Compared> {
         let of_candidate = |(one, poses): &(PoseCandidate, Vec<PlanarSimilarity>)| -> Vec<View> {
             poses.iter().map(|pose| self.reference(one).view(&self.picture, pose)).collect()
@@ -95,8 +96,9 @@ impl<'a> Comparer<'a> {
         candidates.into_iter().filter_map(likeliest).collect()
     }
 
-    /// Each candidate at the position of the part's features in views of twice the resolution, or end for end if they
-    /// are more similar there, and its score by their similarity. The most likely come first.
+    /// Each candidate at the position of the part's features in views of twice the resolution, or rotated by 180° if
+    /// the features are then more similar, with a score that includes this similarity. The most likely candidates come
+    /// first.
     async fn aligned(&self, compared: Vec<Compared>) -> Vec<PoseCandidate> {
         let reference = |one: &PoseCandidate| self.demonstration(one).finer_reference(self.network.config());
         let ways = |(idx, (one, _)): (usize, &Compared)| match idx {
@@ -135,15 +137,15 @@ pub(super) fn best_first<T>(candidates: &mut [T], candidate: impl Fn(&T) -> &Pos
     candidates.sort_by(|a, b| candidate(b).network_score.total_cmp(&candidate(a).network_score));
 }
 
-/// The pose with the outline's box at the same place, turned end for end.
+/// The pose rotated by 180°, with the outline's box at the same place.
 fn turned(demonstration: &TaughtDemonstration, pose: &PlanarSimilarity) -> PlanarSimilarity {
     let center = demonstration.marks.bbox.center();
     pose.compose(&PlanarSimilarity::about(center, center, Angle::from_degrees(180.0), 1.0))
 }
 
-/// The pose as read; the pose fitted into the box if it differs; the pose fitted into it end for end.
+/// The model's pose; the pose fitted into the box if it differs; the pose fitted into the box rotated by 180°.
 fn likely_poses(demonstration: &TaughtDemonstration, read: &PoseCandidate) -> Vec<PlanarSimilarity> {
-    /// Largest distance of the same point in two poses that count as one, as a share of the box's diagonal.
+    /// Maximum distance of a point between two poses that count as one, as a fraction of the box's diagonal.
     const MAX_DISTANCE: f64 = 0.01;
     let PoseCandidate { bbox, grasp, image_from_cutout, .. } = read;
     let laid = fill_box(demonstration, bbox, grasp.angle);
@@ -184,7 +186,7 @@ mod tests {
         assert_eq!((likely.len(), likely[0]), (2, pose));
         assert!(taught.outline(&likely[1]).bounds().iou(&bbox) > 0.999);
         assert!((likely[1].angle.distance(pose.angle).to_degrees() - 180.0).abs() < 1e-9);
-        // A pose read too small is also fitted into its box.
+        // A pose that is too small is also fitted into its box.
         let small = PlanarSimilarity::about(from, to, Angle::from_degrees(33.0), 0.8);
         let likely = likely_poses(&taught, &read(small));
         assert_eq!((likely.len(), likely[0]), (3, small));

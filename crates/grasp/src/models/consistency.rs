@@ -1,40 +1,41 @@
-//! A network's score: the probability of the class, reduced if its heads contradict each other and if the place does
-//! not look like the demonstration.
+//! A network's score: the probability of the class, reduced if the heads contradict each other or if the place does not
+//! resemble the demonstration.
 //!
-//! Box, keypoints, mask and turn of a detection each say where the part lies. On the part they agree. On another object
-//! the box fits that object, and the demonstration at the pose of the other heads fills little of the box or has an
-//! impossible size.
+//! Box, keypoints, mask and orientation of a detection are separate estimates of the part's pose, which agree on the
+//! part. On another object, the box fits that object, and the demonstration at the pose of the other heads fills little
+//! of the box or has an impossible size.
 
 use sdg_geometry::{Angle, BoundingBox, PlanarSimilarity};
 
 use crate::sizes::SizeRange;
 use crate::taught::TaughtDemonstration;
 
-/// Weight of ln of the filled share relative to the log-odds of the class. For four generated parts, ten pictures each,
-/// taught for 120 steps, 31 scored above all but one of the pictures without them; with a weight of 0 it was 28
-/// (docs/decisions/013-base-weights.md). Other weights were not tried.
+/// Weight of ln of the filled fraction relative to the log-odds of the class. For four generated parts taught for 120
+/// steps, with ten pictures each, 31 of the 40 pictures scored above all but one of the pictures without the part; with
+/// a weight of 0, 28 did (docs/decisions/013-base-weights.md). Other weights were not tried.
 const WEIGHT: f64 = 3.0;
 
-/// Weight of the comparison network's log-odds relative to those of the class. For the same four parts, 40 pictures
-/// with the part, the number that scored above every picture without it was: 22 with a weight of 0, 24 with 0.5 and 1,
-/// 27 with 2, 29 with 3. The number placed right was 35, and 34 with 2 and 3. The network's output varies more between
-/// parts than these four show.
+/// Weight of the comparison network's log-odds relative to the log-odds of the class. Of the same 40 pictures, the
+/// number that scored above every picture without the part was: 22 with a weight of 0, 24 with 0.5 and 1, 27 with 2, 29
+/// with 3. The number of correct poses was 35, and 34 with 2 and 3. The network's output varies more between parts than
+/// these four show.
 const COMPARISON_WEIGHT: f64 = 2.0;
 
-/// Weight of the similarity of the part's features in the finer views, and the neutral mean cosine: between those of
-/// other objects, 0.35 to 0.6, and of the part, 0.6 to 0.9. For the generated parts 9001 to 9003, 49 pictures with the
-/// part placed right after 60 or 120 steps, the number that scored above every picture without it was: 16 with a weight
-/// of 0, 34 with 5, 36 with 10, 37 with 20, 38 with 30 and 50.
+/// Weight of the similarity of the part's features in the finer views. For the generated parts 9001 to 9003, taught for
+/// 60 or 120 steps, with 49 pictures with correct poses, the number of these pictures that scored above every picture
+/// without the part was: 16 with a weight of 0, 34 with 5, 36 with 10, 37 with 20, 38 with 30 and 50.
 const COSINE_WEIGHT: f64 = 20.0;
+/// The neutral mean cosine: between the values of other objects, 0.35 to 0.6, and of the part, 0.6 to 0.9.
 const NEUTRAL_COSINE: f64 = 0.62;
 
-/// The usual threshold of the score of generated parts, in log-odds. On the parts 9001 to 9004 it accepts 30 of 37
-/// places and 2 of 40 pictures without the part; 1.5 accepts 33 and 4.
+/// The usual threshold of the score of generated parts, in log-odds. On the parts 9001 to 9004, this value accepts 30
+/// of 37 places and 2 of 40 pictures without the part; 1.5 accepts 33 and 4.
 #[cfg(feature = "teach")]
 pub(crate) const USUAL_THRESHOLD: f64 = 2.0;
 
-/// Minimum filled share and maximum odds, so that both logarithms are finite.
+/// Minimum filled fraction, so that its logarithm is finite.
 const MIN_FILLED: f64 = 0.01;
+/// Maximum probability, so that its log-odds are finite.
 const MAX_PROBABILITY: f64 = 1.0 - 1e-6;
 
 /// The comparison network's output for a pose.
@@ -42,12 +43,12 @@ const MAX_PROBABILITY: f64 = 1.0 - 1e-6;
 pub(super) struct ComparisonEvidence {
     /// Log-odds that the place shows the part.
     pub(super) log_odds: f64,
-    /// The mean cosine of the part's features in the finer views; `None` before they are compared.
+    /// The mean cosine of the part's features in the finer views; `None` before the comparison.
     pub(super) cosine: Option<f64>,
 }
 
-/// The share of the box that the demonstration fills at the model's pose, in `[0, 1]`: the intersection over union of
-/// the box with the outline's box, whose size is clamped to the part's possible sizes.
+/// The fraction of the box that the demonstration fills at the model's pose, in `[0, 1]`: the intersection over union
+/// of the box with the outline's box, whose size is clamped to the part's possible sizes.
 pub(super) fn filled(
     demonstration: &TaughtDemonstration,
     image_from_cutout: &PlanarSimilarity,
@@ -69,7 +70,7 @@ pub(super) fn score(class_probability: f64, filled: f64, compared: Option<Compar
     let probability = class_probability.clamp(1.0 - MAX_PROBABILITY, MAX_PROBABILITY);
     let of_class = (probability / (1.0 - probability)).ln();
     let of_heads = of_class + WEIGHT * filled.max(MIN_FILLED).ln();
-    // A mean, not the sum: scores that are all close to 0 or 1 leave no room for a threshold between them.
+    // A mean, not a sum: with scores close to 0 and 1, there would be no room for a threshold.
     let with = |ComparisonEvidence { log_odds, cosine }| {
         let of_features = cosine.map_or(0.0, |cosine| COSINE_WEIGHT * (cosine - NEUTRAL_COSINE));
         (of_heads + COMPARISON_WEIGHT * log_odds) / (1.0 + COMPARISON_WEIGHT) + of_features
@@ -106,11 +107,11 @@ mod tests {
         let compared = |log_odds: f64, cosine| Some(ComparisonEvidence { log_odds, cosine });
         let scores = [-3.0, 0.0, 3.0].map(|log_odds| score(0.7, whole, compared(log_odds, None)));
         assert!(scores[0] < 0.2 && scores[1] < score(0.7, whole, None) && scores[2] > 0.9, "{scores:?}");
-        // Features less similar than those of other objects lower it, those of the part raise it.
+        // Features less similar than those of other objects lower the score, features of the part raise it.
         let scores = [0.4, NEUTRAL_COSINE, 0.8].map(|cosine| score(0.7, whole, compared(0.0, Some(cosine))));
         assert!(scores[0] < 0.1 && scores[2] > 0.9, "{scores:?}");
         assert_eq!(scores[1], score(0.7, whole, compared(0.0, None)));
-        // A filled share of zero and certainty remain finite.
+        // The score remains finite for a filled fraction of zero and for a probability of 1.
         assert!(score(1.0, 0.0, None) > 0.0 && score(1.0, 1.0, None) < 1.0 && score(0.0, 1.0, None) > 0.0);
     }
 }

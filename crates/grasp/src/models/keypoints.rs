@@ -26,8 +26,8 @@ pub(super) fn on_line(
     })
 }
 
-/// Model C: the keypoints' mean is the grasp's centre, the least-squares line through them its angle. `None` if
-/// they all coincide.
+/// Model C: the mean of the keypoints is the centre of the grasp, and the least-squares line through them gives the
+/// angle. `None` if all keypoints coincide.
 ///
 /// # Source
 /// Paper, section IV-C.
@@ -36,10 +36,11 @@ pub(super) fn grasp(keypoints: &[(Point2<f64>, f64)], width_px: f64) -> Option<P
     PlanarGrasp::from_keypoints(&visible, width_px)
 }
 
-/// Model B: the box gives the position, the keypoints only the turn.
+/// Model B: the box gives the position, the keypoints only the orientation.
 ///
 /// # Source
-/// Paper, section IV-B. There the box's centre is the grasp; here the grasp keeps the taught offset from it.
+/// Paper, section IV-B. In the paper the box's centre is the grasp; here the grasp keeps the taught offset from that
+/// centre.
 pub(super) fn box_and_turn(
     keypoints: &[(Point2<f64>, f64)],
     bbox: &BoundingBox,

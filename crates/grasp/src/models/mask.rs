@@ -1,4 +1,4 @@
-//! Model D: place from the mask, turn from SIFT keypoints or the outline.
+//! Model D: position from the mask, orientation from SIFT keypoints or the outline.
 
 use std::fmt;
 use std::sync::Arc;
@@ -13,23 +13,24 @@ use crate::error::Result;
 use crate::facts::TurnSource;
 use crate::taught::TaughtDemonstration;
 
-/// Margin in pixels around a mask, so that keypoints near its rim see their surroundings. Chosen by hand, not measured.
+/// Margin in pixels around a mask, so that keypoints near the edge of the mask are described with their surroundings.
+/// Chosen by hand, not measured.
 const MARGIN_PX: f64 = 24.0;
 
-/// The mask of a pipe, read from 28 cells per side, overlaps the pipe's outline by a third even if it lies exactly on
-/// it. The demonstration decides whether it is the part. Chosen on fuel lines, a shipped part; the number of pictures
-/// is not recorded.
+/// The mask of a pipe, with 28 cells per side, overlaps the pipe's outline by only a third even at the exact pose.
+/// Whether it is the part is decided by the comparison with the demonstration. Chosen on fuel lines, a shipped part;
+/// the number of pictures is not recorded.
 fn rotation() -> RotationConfig {
     let mut config = RotationConfig::default();
     config.min_overlap = 0.3;
     config
 }
 
-/// The demonstrations in the form in which the mask's content is compared with them.
+/// The demonstrations in the form that is compared with a mask's content.
 #[derive(Clone)]
 pub(crate) struct MaskMatcher {
     estimator: Arc<RotationEstimator>,
-    /// One per demonstration, in their order.
+    /// One template per demonstration, in the same order.
     templates: Vec<Arc<RotationTemplate>>,
 }
 
@@ -41,10 +42,10 @@ impl fmt::Debug for MaskMatcher {
 }
 
 impl MaskMatcher {
-    /// Reads texture and outline of the demonstrations.
+    /// Extracts texture and outline of the demonstrations.
     ///
     /// # Errors
-    /// A demonstration that shows neither.
+    /// A demonstration without texture and outline.
     pub(crate) fn new(demonstrations: &[TaughtDemonstration]) -> Result<Self> {
         let estimator = RotationEstimator::new(Sift::new(SiftConfig::default())?, rotation())?;
         let templates = demonstrations
@@ -59,14 +60,14 @@ impl MaskMatcher {
         Ok(Self { estimator: Arc::new(estimator), templates })
     }
 
-    /// The pose of the demonstration: by matched keypoints if enough of them agree, otherwise by the outline, which
-    /// may be wrong by half a turn if both ends of the part look alike. `None` if neither gives a turn.
+    /// The pose of the demonstration: by matched keypoints if enough of them agree, otherwise by the outline, which may
+    /// be wrong by 180° if both ends of the part look alike. `None` if neither gives an orientation.
     ///
     /// # Source
-    /// Paper, section IV-D. There the mask's centroid is the grasp; here the whole pose is estimated.
+    /// Paper, section IV-D. In the paper the mask's centroid is the grasp; here the whole pose is estimated.
     ///
     /// # Errors
-    /// None but those of a mask of another size than the image.
+    /// Only a mask whose size differs from the image's.
     pub(super) fn place(
         &self,
         image: &RgbImage,
@@ -95,7 +96,7 @@ impl MaskMatcher {
     }
 }
 
-/// The masked window of an image in whole pixels: SIFT on the rest would waste time.
+/// The window of an image around the mask, in whole pixels: SIFT on the rest would waste time.
 struct Window {
     left: u32,
     top: u32,

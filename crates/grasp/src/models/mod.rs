@@ -1,6 +1,6 @@
-//! The network of each model, and how its output is read as a pose of the demonstration.
+//! The network of each model, and the conversion of its output to a pose of the demonstration.
 //!
-//! | model | network | place | turn |
+//! | model | network | position | orientation |
 //! |---|---|---|---|
 //! | A ([`orientation`]) | Faster R-CNN, orientation CNN | box ([`placing`]) | class of the box's crop |
 //! | B ([`keypoints`]) | Keypoint R-CNN | box ([`placing`]) | line through the keypoints |
@@ -38,22 +38,22 @@ use crate::error::{GraspError, Result};
 use crate::facts::ModelKind;
 use crate::taught::TaughtDemonstration;
 
-/// Maximum number of candidates used in one image, best first; verification takes time for each, and the search finds
-/// the others. Chosen by hand, not measured.
+/// Maximum number of candidates used in one image, best first; the verification of each takes time, and the search
+/// finds the other parts. Chosen by hand, not measured.
 const MAX_CANDIDATES: usize = 16;
 /// Boxes of a lower score are dropped: Detectron2's threshold at test time.
 const MIN_NETWORK_SCORE: f64 = 0.05;
 
-/// A model's detector, and how it is read. Model S has none.
+/// A model's networks. Model S has none.
 #[derive(Debug, Clone)]
 pub(crate) struct Network {
     pub(crate) detector: GeneralizedRcnn,
     pub(crate) reading: Reading,
-    /// Compares the image under a pose with the demonstration; none if teaching started from weights without it.
+    /// Compares the image under a pose with the demonstration; `None` if the base weights contained none.
     pub(crate) comparison: Option<ComparisonNetwork>,
 }
 
-/// How a detection becomes a pose of the demonstration.
+/// How a detection is converted to a pose of the demonstration.
 #[derive(Debug, Clone)]
 pub(crate) enum Reading {
     /// Model A.
@@ -78,7 +78,7 @@ pub(crate) fn rcnn_kind(kind: ModelKind) -> Option<RcnnKind> {
 }
 
 impl Network {
-    /// The letter of the model with this reading.
+    /// The kind of the model.
     pub(crate) fn kind(&self) -> ModelKind {
         match self.reading {
             Reading::BoxAndCrop(_) => ModelKind::A,
@@ -88,13 +88,13 @@ impl Network {
         }
     }
 
-    /// The usual threshold, in log-odds, of scores of networks of this kind; `None` without a comparison network.
+    /// The usual threshold of the scores of networks of this kind, in log-odds; `None` without a comparison network.
     #[cfg(feature = "teach")]
     pub(crate) fn usual_threshold(&self) -> Option<f64> {
         self.comparison.as_ref().map(|_| consistency::USUAL_THRESHOLD)
     }
 
-    /// The same detector, read as another model that is taught in the same way.
+    /// The same detector used for another kind of model that is taught in the same way; `None` for other kinds.
     pub(crate) fn read_as(self, kind: ModelKind) -> Option<Self> {
         let reading = match (self.reading, kind) {
             (Reading::BoxAndKeypoints | Reading::Keypoints, ModelKind::B) => Reading::BoxAndKeypoints,
@@ -104,7 +104,7 @@ impl Network {
         Some(Self { reading, ..self })
     }
 
-    /// The network as it is stored: every weight rounded to half precision.
+    /// The network as stored in a file: every weight rounded to half precision.
     #[cfg(feature = "teach")]
     pub(crate) fn rounded(self) -> Self {
         fn round<M: Module>(module: M) -> M {
@@ -130,21 +130,21 @@ impl Network {
         Self { detector: self.detector.to_device(device), reading, comparison }
     }
 
-    /// The network's proposals, best first. Detections without a meaning for the model (coincident keypoints, a
-    /// mask without a turn) are left out.
+    /// The network's proposals, best first. Detections that give no pose (coincident keypoints, a mask without an
+    /// orientation) are left out.
     ///
     /// # Errors
-    /// An image that the network refuses.
+    /// An image that is invalid for the network.
     #[cfg(feature = "teach")]
     pub(crate) fn proposals(&self, image: &RgbImage, demonstrations: &[TaughtDemonstration]) -> Result<Proposals> {
         read_sync(self.proposals_async(image, image.dimensions().into(), demonstrations))
     }
 
     /// [`Self::proposals`], asynchronous, in a region of a picture of size `whole`; the network gets the region's
-    /// pixels at the scale that it would get for the whole picture.
+    /// pixels at the scale used for the whole picture.
     ///
     /// # Errors
-    /// As there.
+    /// As for [`Self::proposals`].
     pub(crate) async fn proposals_async(
         &self,
         image: &RgbImage,
@@ -213,10 +213,10 @@ impl Network {
     }
 }
 
-/// Refuses a detector of another kind than the model's, as a forged file may contain.
+/// Rejects a detector whose kind differs from the model's, as in a forged file.
 ///
 /// # Errors
-/// [`GraspError::Damaged`] says which head was expected.
+/// [`GraspError::Damaged`] names the expected heads.
 pub(crate) fn check_heads(kind: ModelKind, config: &RcnnConfig) -> Result<()> {
     let heads = &config.roi_heads;
     let keypoints = heads.keypoint_head.as_ref().map(|head| head.num_keypoints);

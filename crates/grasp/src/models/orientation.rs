@@ -1,4 +1,4 @@
-//! Model A: place from the box, turn from a CNN on the box's crop.
+//! Model A: position from the box, orientation from a CNN on the box's crop.
 
 use image::RgbImage;
 use sdg_geometry::BoundingBox;
@@ -9,10 +9,11 @@ use crate::error::Result;
 use crate::facts::TurnSource;
 use crate::taught::TaughtDemonstration;
 
-/// Reads the turn from the crop of a detected box, and fits the demonstration at that turn into the box.
+/// Estimates the orientation from the crop of a detected box, and fits the demonstration at that angle into the box.
 ///
 /// # Source
-/// Paper, section IV-A. There the box's centre is the grasp; here the grasp keeps the taught offset from it.
+/// Paper, section IV-A. In the paper the box's centre is the grasp; here the grasp keeps the taught offset from that
+/// centre.
 ///
 /// # Errors
 /// A box without area.

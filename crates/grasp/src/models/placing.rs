@@ -1,12 +1,12 @@
-//! The pose of a demonstration from a detection: the reading of every model, and the pose that fills a box at a known
-//! turn.
+//! The pose of a demonstration from a detection: the estimate of each model, and the pose that fills a box at a known
+//! angle.
 
 use sdg_geometry::{Angle, BoundingBox, PlanarSimilarity};
 
 use crate::facts::TurnSource;
 use crate::taught::TaughtDemonstration;
 
-/// A detection read as a pose of a demonstration.
+/// A detection converted to a pose of a demonstration.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PoseReading {
     pub(super) demonstration_idx: usize,
@@ -32,12 +32,12 @@ pub(super) fn nearest_demonstration(
         .map(|(reading, _)| reading)
 }
 
-/// The demonstration turned until its grasp line points to `grasp_angle`, then scaled and shifted so that its outline
-/// fills `bbox`.
+/// The demonstration rotated so that its grasp line points to `grasp_angle`, then scaled and shifted so that its
+/// outline fills `bbox`.
 ///
-/// The centre of a turned part's upright box is not the turned centre of its box. So the outline is turned first,
-/// and its new box is laid over the detected one. The grasp's offset from the box's centre is then the taught one
-/// at any angle.
+/// A rotation does not map the centre of a part's upright box to the centre of the rotated part's upright box.
+/// Therefore the outline is rotated first, and the box of the rotated outline is laid over the detected one. The grasp
+/// then has the taught offset from the box's centre at every angle.
 pub(super) fn fill_box(
     demonstration: &TaughtDemonstration,
     bbox: &BoundingBox,
@@ -59,7 +59,7 @@ mod tests {
     use nalgebra::Point2;
     use sdg_geometry::{GraspLine, Polygon};
 
-    /// A bright L on a dark cut-out, grasped at its longer leg, away from the middle of its box.
+    /// A bright L on a dark cut-out, grasped at the longer leg, away from the centre of its box.
     fn demonstration() -> TaughtDemonstration {
         let corners = [(20.0, 20.0), (120.0, 20.0), (120.0, 40.0), (40.0, 40.0), (40.0, 90.0), (20.0, 90.0)];
         let outline = Polygon { vertices: corners.map(|(x, y)| Point2::new(x, y)).to_vec() };

@@ -13,13 +13,13 @@ use crate::error::{GraspError, Result};
 use crate::region::SearchRegion;
 use crate::taught::TaughtDemonstration;
 
-/// Photos and their marks in the plan view of the marks' plane, and its resolution: that of the part in the first
-/// photo.
+/// Photos and marks in the plan view of the marks' plane, and the lengths of the view. Its resolution is that of the
+/// part in the first photo.
 ///
-/// Heights in metres over the table.
+/// Heights are in metres above the table.
 ///
 /// # Errors
-/// A camera that does not see the plane, and marks outside its view of it.
+/// A camera whose pictures do not show the plane, and marks outside the visible part of the plane.
 pub fn seen_from_above(
     demonstrations: &[Demonstration],
     over_table: &CameraOverTable,
@@ -51,7 +51,7 @@ pub fn seen_from_above(
 /// Pictures without the part in the same plan view.
 ///
 /// # Errors
-/// A camera that does not see the plane.
+/// A camera whose pictures do not show the plane.
 pub fn pictures_from_above(
     pictures: &[RgbImage],
     over_table: &CameraOverTable,
@@ -61,11 +61,12 @@ pub fn pictures_from_above(
     Ok(pictures.iter().map(|picture| map.resample(picture)).collect())
 }
 
-/// Whether a region of a camera's pictures can be searched for the part of demonstrations that [`super::seen_from_above`] made.
+/// Whether a region of a camera's pictures can be searched for the part of demonstrations made by
+/// [`super::seen_from_above`].
 ///
 /// # Errors
-/// A region that extends beyond the pictures or belongs to others, that does not show the plane, or that the part does
-/// not fit in.
+/// A region that extends beyond the pictures or belongs to pictures of another size, that does not show the plane, or
+/// that is too small for the part.
 pub fn check_region_from_above(
     region: &SearchRegion,
     demonstrations: &[Demonstration],
@@ -102,7 +103,7 @@ fn annotation(marked: &Annotation, camera: &PosedCamera, view: &PlanView) -> Res
         Some(line) => Some(GraspLine::new(shown(&line.start)?, shown(&line.end)?)),
         None => None,
     };
-    // Larger by the same factor as the marks.
+    // The jaw width grows by the same factor as the marks.
     let jaw_width = match (marked.jaw_width, &marked.grasp, &grasp) {
         (Some(width), Some(before), Some(after)) => {
             Some(width * (after.end - after.start).norm() / (before.end - before.start).norm())

@@ -1,12 +1,12 @@
-//! With a calibrated camera: teaching and detecting in the plan view of the marks' plane, and grasps in metres.
+//! Teaching and detection with a calibrated camera, in the plan view of the marks' plane; grasps in metres.
 //!
 //! ```text
 //! photo ─ plan view of the marks' plane ─ Demonstration in it ─ teach ─ model with Lengths
-//! picture ─ plan view, as many pixels a metre ─ detect, the size known ─┬─ back into the picture's pixels ─ GraspDetection
+//! picture ─ plan view of the same scale ─────── detect, the size known ─┬─ back into the picture's pixels ─ GraspDetection
 //!                                                                       └─ PlanarPose in metres
 //! ```
-//! In the plan view the image of the plane no longer depends on lens, slant, height and resolution, so that a model
-//! taught with one camera works with any other.
+//! In the plan view, the image of the plane is independent of the camera's lens, slant, height and resolution, so that
+//! a model taught with one camera works with any other.
 
 mod demonstration;
 mod region;
@@ -30,14 +30,14 @@ use crate::model::{GraspModel, Verification};
 use crate::region::SearchRegion;
 use crate::search_window::SearchWindow;
 
-/// A table and a camera over it.
+/// A table and a camera above it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CameraOverTable {
     /// The camera; its world's z points up.
     pub camera: PosedCamera,
     /// The table's z.
     pub table_height_m: f64,
-    /// Where parts may lie; `None` for everything that the camera sees.
+    /// The area in which parts may lie; `None` for everything in the camera's view.
     pub workspace: Option<Workspace>,
 }
 
@@ -46,7 +46,7 @@ pub struct CameraOverTable {
 pub struct PlanarPose {
     /// The gripper's centre point, in metres.
     pub position_m: Point3<f64>,
-    /// Turn about z, right-handed, of the direction from the first marked point to the second.
+    /// Angle about z, right-handed, of the direction from the first marked point to the second.
     pub yaw: Angle,
     /// The part's width between the jaws, in metres.
     pub opening_m: f64,
@@ -57,7 +57,7 @@ pub struct PlanarPose {
 }
 
 impl PlanarPose {
-    /// The gripper's pose: x along the marked line, y in which the jaws close, z down to the table.
+    /// The gripper's pose: x along the marked line, y along the closing direction of the jaws, z down to the table.
     pub fn frame_from_tcp(&self) -> Isometry3<f64> {
         let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), self.yaw.radians());
         let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
@@ -68,16 +68,16 @@ impl PlanarPose {
 /// A grasp in the picture's pixels and in metres.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlanViewDetection {
-    /// In pixels of the given picture.
+    /// The detection in pixels of the given picture.
     pub detection: GraspDetection,
-    /// In the camera's world.
+    /// The grasp pose in the camera's world.
     pub pose: PlanarPose,
 }
 
 /// Number of pixels above which a search becomes slow. Chosen by hand.
 const MAX_PLAN_PIXELS: u64 = 6_000_000;
 
-/// A model that uses a camera.
+/// A model used with a calibrated camera.
 #[derive(Debug, Clone)]
 pub struct PlanViewDetector {
     model: GraspModel,
@@ -86,7 +86,7 @@ pub struct PlanViewDetector {
     view: PlanView,
     map: PlanMap,
     region: Option<RegionInPlan>,
-    /// The range of sizes relative to the part's own, if parts may lie at another height than the table's.
+    /// The range of sizes relative to the part's size, if parts may lie at a height other than the table's.
     sizes: Option<RangeInclusive<f64>>,
 }
 
@@ -94,7 +94,7 @@ impl PlanViewDetector {
     /// Prepares all data that are the same in every picture of the camera.
     ///
     /// # Errors
-    /// A model that was taught without a camera; a camera that does not see the plane.
+    /// A model that was taught without a camera; a camera whose pictures do not show the plane.
     pub fn new(model: GraspModel, over_table: &CameraOverTable) -> Result<Self> {
         let lengths = model.facts().lengths.ok_or(GraspError::NoLengths)?;
         let view = plan_view(over_table, &lengths)?;
@@ -105,9 +105,9 @@ impl PlanViewDetector {
         Ok(Self { model, over_table: *over_table, lengths, view, map, region, sizes: None })
     }
 
-    /// Searches the plan view for parts of these sizes relative to the part's own, because a higher part appears
-    /// larger. No size within the range then speaks against a part. With `None` parts lie on the table again, and
-    /// another size is another part.
+    /// Searches the plan view for parts of these sizes relative to the part's size, because a higher part appears
+    /// larger. No size within the range then speaks against a part. With `None`, parts lie on the table, and another
+    /// size is another part.
     ///
     /// # Errors
     /// An invalid range, as for [`GraspModel::with_size_tolerance`].
@@ -127,10 +127,10 @@ impl PlanViewDetector {
         Ok(())
     }
 
-    /// Continues with another camera, or the same camera in another place.
+    /// Continues with another camera, or with the same camera at another pose.
     ///
     /// # Errors
-    /// A camera that does not see the plane; then nothing is changed.
+    /// A camera whose pictures do not show the plane; the detector is then unchanged.
     pub fn move_to(&mut self, over_table: &CameraOverTable) -> Result<()> {
         let view = plan_view(over_table, &self.lengths)?;
         let region = self.region().map(|region| RegionInPlan::new(region, &over_table.camera, &view)).transpose()?;
@@ -143,8 +143,8 @@ impl PlanViewDetector {
     /// Searches only this region of pictures, in their pixels; `None` for whole pictures.
     ///
     /// # Errors
-    /// A region that extends beyond the camera's pictures or belongs to others, that does not show the plane, or that
-    /// the part does not fit in; then nothing is changed.
+    /// A region that extends beyond the camera's pictures or belongs to pictures of another size, that does not show
+    /// the plane, or that is too small for the part; the detector is then unchanged.
     pub fn look_in(&mut self, region: Option<&SearchRegion>) -> Result<()> {
         let region = region.map(|region| RegionInPlan::new(region, &self.over_table.camera, &self.view)).transpose()?;
         if let Some(region) = &region {
@@ -169,7 +169,8 @@ impl PlanViewDetector {
         self.map.resample(picture)
     }
 
-    /// The size in the plane of the marks, in metres, of a pixel of the picture; `None` if it does not show the plane.
+    /// The size of a pixel of the picture in the plane of the marks, in metres; `None` if the pixel does not show the
+    /// plane.
     pub fn metres_per_pixel(&self, pixel: &Point2<f64>) -> Option<f64> {
         self.over_table.camera.metres_per_pixel(pixel, self.view.height_m)
     }
@@ -177,7 +178,7 @@ impl PlanViewDetector {
     /// Finds the part in a picture of the camera, best score first, as [`GraspModel::detect`] does.
     ///
     /// # Errors
-    /// As there.
+    /// As for [`GraspModel::detect`].
     pub fn detect(&self, picture: &RgbImage, verification: Verification) -> Result<Vec<PlanViewDetection>> {
         let found = self.find(picture, verification)?;
         Ok(found.into_iter().filter_map(|found| self.placed(found.detection)).collect())
@@ -213,7 +214,7 @@ impl PlanViewDetector {
         self.map.resample_window(picture, window)
     }
 
-    /// `None` if the camera does not show it.
+    /// The detection in the picture, with its pose in metres; `None` if the camera does not show it.
     pub(crate) fn placed(&self, detection: GraspDetection) -> Option<PlanViewDetection> {
         let grasp = detection.grasp;
         let center = grasp.center();
@@ -242,7 +243,7 @@ impl PlanViewDetector {
     ) -> Option<Circumstances> {
         let camera = &self.over_table.camera;
         let BoundingBox { x1, y1, x2, y2 } = detection.bbox;
-        // The photo's slant, turned with the part.
+        // The photo's slant, rotated with the part.
         let taught = self.model.demonstrations().first()?.marks.grasp.angle();
         let turn = Rotation2::new(detection.grasp.angle.radians() - taught.radians());
         let changed = Vector2::from(slant(camera, on_plane)) - turn * Vector2::from(self.lengths.slant);
@@ -255,12 +256,12 @@ impl PlanViewDetector {
         })
     }
 
-    /// The picture position of a point of the plan view, also beyond the picture's border.
+    /// The position in the picture of a point of the plan view, also beyond the picture's border.
     pub fn shown(&self, point: &Point2<f64>) -> Option<Point2<f64>> {
         self.over_table.camera.project(&self.view.point(point))
     }
 
-    /// The same detection in pixels of the picture.
+    /// The detection in pixels of the picture.
     fn in_picture(&self, detection: GraspDetection) -> Option<GraspDetection> {
         let shown = |point: &Point2<f64>| self.shown(point);
         let outline = match &detection.outline {
@@ -298,7 +299,7 @@ impl PlanViewDetector {
 }
 
 /// The tangent of the angle between a line of sight and the vertical, in the directions x and y of the plan view: the
-/// apparent displacement of a point one metre above.
+/// apparent displacement of a point one metre above the plane.
 pub(crate) fn slant(camera: &PosedCamera, point: &Point3<f64>) -> [f64; 2] {
     let sight = point.coords - camera.world_from_camera.translation.vector;
     [sight.x / -sight.z, sight.y / sight.z]

@@ -8,15 +8,15 @@ use crate::region::{RegionError, SearchRegion};
 use crate::search_window::SearchWindow;
 use crate::taught::TaughtDemonstration;
 
-/// Points of each edge of the region that are mapped, because a lens bends the edge.
+/// Number of mapped points on each edge of the region, because a lens bends the edge.
 const POINTS_A_SIDE: u32 = 16;
 
 /// A region of the picture, and its bounding box in the plan view.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct RegionInPlan {
-    /// In pixels of the picture.
+    /// The region in pixels of the picture.
     pub(super) region: SearchRegion,
-    /// In pixels of the plan view.
+    /// The bounding box in pixels of the plan view.
     bounds: BoundingBox,
 }
 
@@ -39,10 +39,10 @@ impl RegionInPlan {
         }
     }
 
-    /// The window cut out of a plan view of that size.
+    /// The window that is cut out of a plan view of size `view_size`.
     ///
     /// # Errors
-    /// A region that the part does not fit in.
+    /// A region that is too small for the part.
     pub(super) fn window(&self, view_size: [u32; 2], demonstrations: &[TaughtDemonstration]) -> Result<SearchWindow> {
         SearchWindow::about(&self.bounds, &self.region, view_size, demonstrations)
     }

@@ -4,10 +4,11 @@
 //! noise  = pixels · pixel · exp(by_disagreement (1 − agreement))
 //! walls  = by_slant · mark height · slant (against the photo's)
 //! shades = by_height · mark height
-//! length = √(noise² + walls² + shades²);  position: length;  turn: length / diagonal of the part
+//! length = √(noise² + walls² + shades²);  position: length;  angle: length / diagonal of the part
 //! ```
-//! The noise is that of the picture's edges, in its pixels. The walls are the part's sides that a camera beside it sees
-//! and the photo did not show. On a high part, light and shadow cause different edges in every picture.
+//! The noise is that of the picture's edges, in pixels of the picture. The walls are the sides of the part that are
+//! visible to a camera beside it but not in the photo. The shades are light and shadow, which cause different edges on
+//! a high part in every picture.
 
 use serde::{Deserialize, Serialize};
 
@@ -16,7 +17,7 @@ use serde::{Deserialize, Serialize};
 pub struct Uncertainty {
     /// Radius around the position in the plane, in metres.
     pub position_m: f64,
-    /// Turn in either direction.
+    /// Angle in either direction.
     pub yaw_rad: f64,
 }
 
@@ -25,10 +26,10 @@ pub struct Uncertainty {
 pub struct Circumstances {
     /// Size of a pixel of the camera's picture at the part, in metres.
     pub pixel_m: f64,
-    /// Difference of the line of sight's slant from that in the photo, seen from the part: the length of the difference
-    /// of the tangents in x and y.
+    /// Difference between the slants of the line of sight in the picture and in the photo, in the part's frame: the
+    /// length of the difference of the tangents in x and y.
     pub slant: f64,
-    /// Height of the marks over the table, in metres.
+    /// Height of the marks above the table, in metres.
     pub mark_height_m: f64,
     /// Diagonal of the part's box, in metres.
     pub diagonal_m: f64,
@@ -46,16 +47,16 @@ pub struct ErrorLength {
     pub pixels: f64,
     /// Growth of the noise's logarithm per missing agreement.
     pub by_disagreement: f64,
-    /// Share of the marks' height times the slant.
+    /// Fraction of the marks' height times the slant.
     pub by_slant: f64,
-    /// Share of the marks' height.
+    /// Fraction of the marks' height.
     pub by_height: f64,
 }
 
 impl ErrorLength {
-    /// Error of the position.
+    /// The error of the position.
     pub const POSITION: Self = Self { pixels: 0.279, by_disagreement: 1.89, by_slant: 0.436, by_height: 0.039 };
-    /// Error of the turn, as a length at the distance of the part's diagonal.
+    /// The error of the angle, as a length at the distance of the part's diagonal.
     pub const TURN: Self = Self { pixels: 0.133, by_disagreement: 3.85, by_slant: 0.325, by_height: 0.019 };
 
     /// The length in metres.
@@ -93,7 +94,7 @@ mod tests {
         assert!((error(high).position_m - 0.279e-3f64.hypot(0.78e-3)).abs() < 1e-12);
         let beside = Circumstances { slant: 0.3, ..high };
         assert!(error(beside).position_m > error(high).position_m && error(beside).yaw_rad > error(high).yaw_rad);
-        // A larger part turns less for the same error of its edges.
+        // A larger part has a smaller error in angle for the same error of its edges.
         let larger = error(Circumstances { diagonal_m: 0.2, ..beside });
         assert!((larger.yaw_rad - 0.5 * error(beside).yaw_rad).abs() < 1e-12);
     }

@@ -1,10 +1,10 @@
 //! The user's pictures without the part: samples of a network, and data for the score's calibration.
 //!
 //! ```text
-//! pictures ─┬─ AbsentSamples: every 12th sample is a window of one of them, without objects
-//!           ├─ highest_scores: of the network alone there ─ calibration of its score
-//!           └─ calibrated: highest scores of the finished model there, and its scores on held-back samples of the part
-//!                          ─ log-odds that every score has less
+//! pictures ─┬─ AbsentSamples: every 12th sample is a window of one picture, without objects
+//!           ├─ highest_scores: of the network alone ─ calibration of its score
+//!           └─ calibrated: highest scores of the finished model, and its scores on held-out samples of the part
+//!                          ─ log-odds that are subtracted from every score
 //! ```
 
 use image::{RgbImage, imageops};
@@ -20,19 +20,19 @@ use crate::model::{GraspModel, Verification};
 use crate::models::Network;
 use crate::taught::TaughtDemonstration;
 
-/// One sample in this many shows a picture without the part. Chosen by hand, not measured: fewer than the composed ones
-/// without it.
+/// One sample in this many shows a picture without the part: fewer than the composed samples without it. Chosen by
+/// hand, not measured.
 const SAMPLE_INTERVAL: u64 = 12;
-/// Number of held-back samples with the part with which the score is compared. Chosen for time: one takes about 50 ms.
+/// Number of held-out samples with the part for the calibration of the score. Chosen for time: one takes about 50 ms.
 const NUM_POSITIVES: u64 = 12;
-/// First index of these samples: far beyond those of the networks' validation, and separate from those of the reported
-/// figures.
+/// First index of these samples: far beyond the samples for the networks' validation, and separate from those for the
+/// reported quality.
 const FIRST_POSITIVE: u64 = 1 << 36;
 /// Margin below a score of 0.5 for detections without the part, in log-odds. Chosen by hand.
 const MARGIN: f64 = 0.2;
-/// Largest percentage of parts that may be refused because of pictures without it.
+/// Maximum percentage of parts that may be refused because of pictures without the part.
 const REFUSED_PERCENT: f64 = 10.0;
-/// Minimum IoU of a detection with a held-back part.
+/// Minimum IoU of a detection with a part of a held-out sample.
 const MIN_IOU: f64 = 0.5;
 
 /// Samples made from pictures without the part.
@@ -42,7 +42,7 @@ pub(super) struct AbsentSamples {
 }
 
 impl AbsentSamples {
-    /// The pictures, resized to cover frames of the samples' size.
+    /// Resizes the pictures so that they cover frames of the samples' size.
     pub(super) fn new(pictures: &[RgbImage], [width, height]: [u32; 2], seed: u64) -> Self {
         let covering = |picture: &RgbImage| {
             let across = f64::from(width) / f64::from(picture.width());
@@ -58,7 +58,7 @@ impl AbsentSamples {
         Self { pictures: pictures.iter().map(covering).collect(), seed }
     }
 
-    /// Sample `index`, if it is one of these: a window of one picture at a place determined by seed and index.
+    /// Sample `index` if it is one without the part: a window of one picture at a place determined by seed and index.
     pub(super) fn sample(&self, index: u64, [width, height]: [u32; 2]) -> Option<Sample> {
         if self.pictures.is_empty() || index % SAMPLE_INTERVAL != SAMPLE_INTERVAL - 1 {
             return None;
@@ -77,7 +77,7 @@ impl AbsentSamples {
 /// The network's highest score in each picture; 0 without a proposal.
 ///
 /// # Errors
-/// A picture that the network refuses.
+/// A picture that is invalid for the network.
 pub(super) fn highest_scores(
     network: &Network,
     demonstrations: &[TaughtDemonstration],
@@ -90,8 +90,8 @@ pub(super) fn highest_scores(
     pictures.iter().map(highest).collect()
 }
 
-/// The model with scores reduced until the pictures without the part are refused, as far as nine in ten held-back
-/// samples of the part are still accepted.
+/// The model with scores reduced until the pictures without the part are refused, but only so far that nine in ten
+/// held-out samples of the part are still accepted.
 ///
 /// # Errors
 /// A picture that cannot be searched.
@@ -128,7 +128,8 @@ fn less_for(highest: f64, present: &[f64]) -> f64 {
     decimal(-(highest + MARGIN).clamp(0.0, room))
 }
 
-/// The best score on the part in each held-back sample, in log-odds; samples in which it is not found are left out.
+/// The best score on the part in each held-out sample, in log-odds; samples in which the part is not found are left
+/// out.
 fn on_parts(model: &GraspModel, demonstrations: &[Demonstration], options: &TeachOptions) -> Result<Vec<f64>> {
     let sizes = model.size_tolerance();
     let mut style = SceneStyle { positive_share: 1.0, ..SceneStyle::default() };
@@ -163,7 +164,7 @@ mod tests {
     fn scores_are_lowered_below_a_half_but_not_at_the_cost_of_the_part() {
         let present = [3.0, 3.1, 3.2, 3.3, 3.4, 3.5, 3.6, 3.7, 3.8, 3.9, 4.0];
         assert!((less_for(1.0, &present) + 1.2).abs() < 1e-9);
-        // As similar to the part as the part itself: nine in ten stay accepted.
+        // A picture as similar to the part as the part itself: nine in ten samples are still accepted.
         assert!((less_for(9.0, &present) + 3.1).abs() < 1e-9);
         assert_eq!(less_for(1.0, &[]), 0.0, "nothing is known of the part");
     }
@@ -219,7 +220,7 @@ mod tests {
         assert!(score(&after) < score(&before));
         let read = GraspModel::from_bytes(&after.to_bytes().unwrap(), &Device::flex()).unwrap();
         assert_eq!(score(&read), score(&after));
-        // Detections that are refused anyway change nothing.
+        // Pictures whose detections are already refused change nothing.
         options.negatives.remove(0);
         assert_eq!(
             teach_s(&options).facts().negatives.unwrap(),

@@ -13,11 +13,11 @@ use crate::error::Result;
 pub(crate) struct DetectorPlan {
     /// The detector's configuration.
     pub(crate) network: RcnnConfig,
-    /// A keypoint head that only teaching has.
+    /// A keypoint head that exists only during teaching.
     ///
     /// A box, or the mask of a thin part, gives a randomly initialised network too little information about the part.
-    /// After 260 steps model A's found the rod end in 17 and the fuel line in 12 of 35 held-back samples; after 300
-    /// with keypoints in 20 and 14.
+    /// After 260 steps, model A's network found the rod end in 17 and the fuel line in 12 of 35 held-out samples; after
+    /// 300 steps with keypoints, in 20 and 14.
     pub(crate) auxiliary_keypoints: Option<KeypointHeadConfig>,
 }
 
@@ -40,9 +40,9 @@ impl DetectorPlan {
         let taught = || self.taught().init(&device, seed);
         match weights {
             None => Ok(taught()?),
-            // Our own weights, which have every taught head.
+            // This project's weights have every taught head.
             Some(weights) if weights.has_keypoint_head() => weights.apply(taught()?),
-            // Imported weights have only the model's heads: the others start from random values.
+            // Imported weights have only the model's heads; the other heads start from random values.
             Some(weights) => {
                 let own = weights.apply(self.network.init(&device, seed)?)?;
                 Ok(state_dict::import(taught()?, &state_dict::export(&own)).0)

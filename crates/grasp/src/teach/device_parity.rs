@@ -1,7 +1,6 @@
-//! Every model on every device that the build has besides flex, compared with flex: stage by stage, end to end,
-//! and taught there.
+//! Compares every model on every device of the build with flex: stage by stage, end to end, and in teaching.
 //!
-//! Built with a feature of those devices: `make test-wgpu`, `make test-ndarray`.
+//! Requires the features of the devices: `make test-wgpu`, `make test-ndarray`.
 
 use burn::tensor::Device;
 use sdg_detection::RcnnConfig;
@@ -17,11 +16,11 @@ use crate::model::Verification;
 
 /// Tolerance of a position, in pixels of the given image: a fifth of the shift that half precision may cause.
 const PLACE_PX: f64 = 0.02;
-/// Tolerance of a turn, in degrees.
+/// Tolerance of an angle, in degrees.
 const TURN_DEGREES: f64 = 0.02;
 /// Tolerance of a score or an agreement.
 const SCORE: f64 = 1e-3;
-/// Relative tolerance of the losses of the first steps: every step's differences enter the next one's weights.
+/// Relative tolerance of the losses of the first steps: the differences of a step affect the weights of the next.
 const LOSSES: f64 = 1e-3;
 /// Number of steps whose losses are compared.
 const COMPARED_STEPS: usize = 4;
@@ -33,7 +32,7 @@ fn devices() -> Vec<(ComputeBackend, Device)> {
     others.filter(|backend| backend.is_built()).map(|backend| (backend, backend.open().unwrap())).collect()
 }
 
-/// The photo's marks in the form that a training step takes, in pixels of the resized image.
+/// The photo's marks as targets of a training step, in pixels of the resized image.
 fn targets(network: &RcnnConfig) -> StateDict {
     let Demonstration { image, annotation } = demonstration();
     let transformed = sdg_detection::ImageTransform::new(&network.input).apply(&image).unwrap();
@@ -82,8 +81,8 @@ fn every_stage_of_every_network_agrees() {
     }
 }
 
-/// Detections on an object. Where the part is absent, nothing determines the pose: it ends where its start leads, which
-/// depends on the last bits.
+/// Detections on an object. Without the part the pose is undetermined: the refinement ends at a pose that depends on
+/// the last bits.
 fn placed(detections: &[GraspDetection]) -> Vec<&GraspDetection> {
     let is_placed = |agreement: f64| agreement >= CheckConfig::DEFAULT.search.min_agreement;
     detections.iter().filter(|detection| detection.agreement.is_none_or(is_placed)).collect()
@@ -116,7 +115,7 @@ fn every_model_detects_the_same() {
             for verification in [Verification::Off, Verification::ByShape] {
                 let expected = model.detect(&photo, verification).unwrap();
                 let found = there.detect(&photo, verification).unwrap();
-                // The mask after so few steps may find nothing; the verification finds the part in its own photo.
+                // After so few steps the mask may find nothing, but the verification finds the part in its own photo.
                 assert!(verification == Verification::Off || expected[0].is_accepted(), "{kind}: {expected:?}");
                 assert_same(&found, &expected, &format!("{kind} on {backend}, {verification:?}"));
             }

@@ -1,31 +1,31 @@
-//! Progress of a teaching.
+//! The progress of teaching.
 
 use sdg_training::{StepRecord, ValidationRecord};
 
-/// Progress of a teaching.
+/// The progress of teaching.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum TeachingEvent {
     /// A step of model A's orientation CNN, which is taught before the detector.
     OrientationStep {
-        /// From zero.
+        /// Index of the step, from zero.
         step: usize,
-        /// Number of steps of its run, as known now.
+        /// Number of steps of the CNN's training, as known now.
         planned_steps: usize,
         /// Cross-entropy before the update, in nats per crop.
         loss: f64,
-        /// Since the start of its run.
+        /// Time since the start of the CNN's training.
         elapsed_secs: f64,
     },
     /// A step of the detector.
     Step {
         /// The step.
         record: StepRecord,
-        /// Number of steps of the run, as known now.
+        /// Number of steps of the training, as known now.
         planned_steps: usize,
-        /// Since the start of the run.
+        /// Time since the start of the training.
         elapsed_secs: f64,
     },
-    /// A validation of the detector, with the model's reading.
+    /// A validation of the detector, with poses as the model derives them.
     Validated(ValidationRecord),
 }
 

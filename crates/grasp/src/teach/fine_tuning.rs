@@ -1,4 +1,4 @@
-//! Teaching a part from our own base weights: the differences from teaching from random values.
+//! Teaching from this project's base weights: the differences from teaching from random values.
 
 use sdg_detection::config::Freeze;
 use sdg_training::{EarlyStop, TrainingConfig, ValidationConfig};
@@ -14,18 +14,18 @@ pub struct FineTuning {
     pub training: TrainingConfig,
     /// The part of the first stage that stays frozen.
     pub freeze: Freeze,
-    /// Generated parts shown during teaching, beside the part and in its place.
+    /// Number of generated parts shown during teaching, beside the part and in its place.
     pub num_other_parts: usize,
-    /// Share of the samples that show the part.
+    /// Fraction of the samples that show the part.
     pub positive_share: f32,
-    /// Share of the box head's negatives that are the proposals of the highest objectness.
+    /// Fraction of the box head's negatives that are the proposals of the highest objectness.
     pub hard_negative_share: f64,
 }
 
 impl FineTuning {
-    /// Half a minute on two cores including everything else of teaching, with two dozen other parts. Most parts are
-    /// good enough after 40 steps; of 30 held-back samples with the part about six are so covered or blurred that no
-    /// network finds them.
+    /// Settings with which teaching takes half a minute on two cores, with two dozen other parts. Most parts are good
+    /// enough after 40 steps; in about six of 30 held-out samples with the part, it is so covered or blurred that no
+    /// network finds it.
     pub fn new(seed: u64) -> Self {
         Self {
             training: TrainingConfig {

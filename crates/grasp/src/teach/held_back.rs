@@ -1,4 +1,4 @@
-//! Held-back samples: a network's hit rate, errors and score threshold.
+//! A network's hit rate, errors and score threshold on held-out samples.
 
 use sdg_demonstration::{Sample, SampleObject};
 use sdg_geometry::{Keypoint, PlanarGrasp, median};
@@ -14,37 +14,40 @@ use crate::sighting::{Sighting, best_agreement, sightings, sightings_to_first};
 use crate::taught::TaughtDemonstration;
 use crate::verification::SearchedImage;
 
-/// Samples on which no network is trained.
+/// The samples on which no network is trained.
 pub(super) struct HeldBack<'a> {
     pub(super) samples: &'a [Sample],
     pub(super) turns: &'a HiddenTurns,
 }
 
-/// The threshold of the network's score, and the median errors after verification, in pixels of the demonstration and
-/// degrees: infinite if nothing was found.
+/// The calibration of a network on held-out samples.
 pub(super) struct Calibrated {
     pub(super) network: NetworkCalibration,
-    /// Number of samples with the part, and number of those in which a proposal of the network led to a right pose of
-    /// the demonstration.
+    /// Number of samples with the part.
     pub(super) positives: usize,
+    /// Number of samples in which a proposal of the network led to a correct pose of the demonstration.
     pub(super) hits: usize,
-    /// The network's scores on the part, found by network or search, and on the most similar place in samples without
-    /// it; 0 without a proposal.
+    /// The network's scores on the part, found by network or search; 0 without a proposal.
     pub(super) on_part: Vec<f64>,
+    /// The network's scores on the place most similar to the part in samples without it; 0 without a proposal.
     pub(super) elsewhere: Vec<f64>,
+    /// Median error after verification, in pixels of the demonstration; infinite if nothing was found.
     pub(super) error_px: f64,
+    /// Median error after verification, in degrees; infinite if nothing was found.
     pub(super) error_degrees: f64,
 }
 
 /// The observations in one sample.
 struct Seen {
-    /// The network's highest score on the part: where it proposed the part, and where network or search found it.
+    /// The network's highest score on the part where the network proposed it.
     proposed_on_part: Option<f64>,
+    /// The network's highest score on the part where network or search found it.
     on_part: Option<f64>,
-    /// Its highest score in a sample without the part, and its score on the place most similar to the part.
+    /// The network's highest score in a sample without the part.
     without_part: Option<f64>,
+    /// The network's score on the place most similar to the part.
     elsewhere: Option<f64>,
-    /// In pixels of the demonstration and degrees, for detections on the part.
+    /// Errors of the detections on the part, in pixels of the demonstration and degrees.
     errors: Vec<[f64; 2]>,
 }
 
@@ -52,7 +55,7 @@ impl HeldBack<'_> {
     /// A network's proposals in each sample.
     ///
     /// # Errors
-    /// An image that the network refuses.
+    /// An image that is invalid for the network.
     pub(super) fn propose(&self, network: &Network, demonstrations: &[TaughtDemonstration]) -> Result<Vec<Proposals>> {
         side_by_side(self.samples, |sample| network.proposals(&sample.image, demonstrations))
     }
@@ -68,8 +71,9 @@ impl HeldBack<'_> {
         self.samples.iter().zip(proposals).map(outcome).collect()
     }
 
-    /// Calibrates a network by its proposals in each sample, verified by the demonstration as in use. `other_parts` are
-    /// its highest scores in pictures of other parts only, `usual_threshold` is [`Network::usual_threshold`].
+    /// Calibrates a network by its proposals in each sample, verified by the demonstration as in detection.
+    /// `other_parts` are the network's highest scores in pictures of other parts only, `usual_threshold` is
+    /// [`Network::usual_threshold`].
     ///
     /// # Errors
     /// An image that cannot be searched.
@@ -80,7 +84,8 @@ impl HeldBack<'_> {
         demonstrations: &[TaughtDemonstration],
         other_parts: &[f64],
     ) -> Result<Calibrated> {
-        /// Highest raw score of a wrong detection if the held-back samples gave none. Chosen by hand, not measured.
+        /// Assumed highest raw score of a wrong detection if the held-out samples gave none. Chosen by hand, not
+        /// measured.
         const LOG_ODDS_WITHOUT_WRONG: f64 = 0.1;
         let samples: Vec<(&Sample, &Proposals)> = self.samples.iter().zip(proposals).collect();
         let seen = side_by_side(&samples, |(sample, proposals)| Ok(self.measure(sample, proposals, demonstrations)))?;
@@ -119,7 +124,7 @@ impl HeldBack<'_> {
                 .filter(|s| hit(s).is_some() == right && (!proposed || s.turn_source != TurnSource::Search));
             of_kind.map(|sighting| sighting.network_score).reduce(f64::max)
         };
-        // The search's detections do not count for the network, but their errors are the model's.
+        // Detections by the search do not count for the network, but their errors count for the model.
         let errors = sightings.iter().filter_map(hit).filter_map(|outcome| match outcome {
             Outcome::Found { error_px, error_degrees, .. } => Some([error_px, error_degrees]),
             _ => None,
@@ -144,5 +149,5 @@ impl HeldBack<'_> {
 /// The true grasp of an object in a sample; its width is not used.
 fn truth(object: &SampleObject) -> PlanarGrasp {
     let on_line: Vec<Keypoint> = object.keypoints.iter().map(|k| Keypoint::visible(k.point())).collect();
-    PlanarGrasp::from_keypoints(&on_line, 0.0).unwrap_or_else(|| panic!("a grasp line has a length"))
+    PlanarGrasp::from_keypoints(&on_line, 0.0).unwrap_or_else(|| panic!("expected a grasp line of non-zero length"))
 }

@@ -4,7 +4,7 @@
 //! demonstrations ─ (model A: crops ─ orientation CNN)
 //!        │
 //!        ├─ Augmenter ─ frames, windows ─ train ─ detector ─┐
-//!        │      ├─ held-back samples ── validation ─────────┴─ calibrate ─ GraspModel
+//!        │      ├─ held-out samples ─── validation ─────────┴─ calibrate ─ GraspModel
 //!        │      └─ scenes without the part ────────────────────────┘│
 //! pictures without the part ─ some of the samples, and the scores of detections in them ─┘
 //!        └─ (model S: nothing to train) ──────────────────────────────────────┘
@@ -75,12 +75,12 @@ pub struct Taught {
     pub history: Option<History>,
 }
 
-/// Teaches a grasp model. `observe` is called after every step and validation and may stop the teaching, which then
-/// keeps the best network so far, if it is good enough.
+/// Teaches a grasp model. `observe` is called after every step and validation, and may stop the teaching, which then
+/// keeps the best network so far if it is good enough.
 ///
 /// # Errors
-/// No demonstration, one that lacks the model's required marks or is among the pictures without the part, or a training
-/// without a usable result.
+/// No demonstration, a demonstration that lacks marks required by the model or is among the pictures without the part,
+/// or a training without a usable result.
 pub fn teach(
     demonstrations: &[Demonstration],
     options: &TeachOptions,
@@ -113,8 +113,8 @@ pub fn teach(
 /// [`check_region_from_above`](crate::check_region_from_above).
 ///
 /// # Errors
-/// A region without pixels; if it names the size of its pictures, one that extends beyond them, or one that the part
-/// does not fit in.
+/// A region without pixels. A region that names the size of its pictures must also lie within them and be large enough
+/// for the part.
 pub fn check_teaching_region(demonstrations: &[Demonstration], options: &TeachOptions) -> Result<()> {
     match &options.region {
         Some(region) => check_region(region, Some(&taught(demonstrations, options)?)),
@@ -122,12 +122,12 @@ pub fn check_teaching_region(demonstrations: &[Demonstration], options: &TeachOp
     }
 }
 
-/// Minimum extent of a part in its photo: below it, everything with two edges looks like it. Chosen by hand, not
+/// Minimum extent of a part in its photo: everything with two edges resembles a smaller part. Chosen by hand, not
 /// measured.
 const MIN_PART_PX: f64 = 20.0;
 
-/// Every model needs the grasp line and enough pixels of the part; model D also needs texture or shape inside the
-/// outline.
+/// Checks the marks: every model needs the grasp line and enough pixels of the part, and model D an outline with
+/// texture or shape inside.
 fn check_marks(demonstrations: &[Demonstration], kind: ModelKind) -> Result<()> {
     if demonstrations.is_empty() {
         return Err(GraspError::NoDemonstration);
@@ -145,7 +145,7 @@ fn check_marks(demonstrations: &[Demonstration], kind: ModelKind) -> Result<()> 
     check_agreement(demonstrations)
 }
 
-/// Several demonstrations must show one part, and one photo must not be marked in two ways.
+/// Checks that several demonstrations show one part, and that no photo is marked in two ways.
 fn check_agreement(demonstrations: &[Demonstration]) -> Result<()> {
     let contradiction = |expected: String, found: String| GraspError::ContradictingDemonstrations { expected, found };
     let first = &demonstrations[0].annotation.label;
@@ -172,12 +172,12 @@ fn check_agreement(demonstrations: &[Demonstration]) -> Result<()> {
     Ok(())
 }
 
-/// Number of scenes of other objects that the agreement is calibrated on: for a network, and for model S, which is to
-/// be ready in less than a second. Chosen by hand for time, not measured.
+/// Number of scenes of other objects for the calibration of the agreement. Chosen by hand for time, not measured.
 const NUM_NEGATIVE_SCENES: u64 = 12;
+/// The number for model S, which must be ready in less than a second. Chosen by hand for time, not measured.
 pub(crate) const NUM_NEGATIVE_SCENES_WITHOUT_NETWORK: u64 = 8;
 
-/// The demonstrations as the model keeps them.
+/// The demonstrations as stored in the model.
 fn taught(demonstrations: &[Demonstration], options: &TeachOptions) -> Result<Vec<TaughtDemonstration>> {
     let with_tolerance = |demonstration| {
         let taught = TaughtDemonstration::new(demonstration)?;
@@ -217,10 +217,10 @@ fn without_network(demonstrations: &[Demonstration], options: &TeachOptions, sta
     Ok(Taught { model, history: None })
 }
 
-/// Windows from which last layers are made.
+/// Number of windows from which last layers are computed.
 const NUM_VIEWS: usize = 64;
 
-/// The models with a network, by a plan.
+/// Teaches a model with a network by a plan.
 pub(crate) fn teach_network(
     demonstrations: &[Demonstration],
     plan: &Plan,
@@ -229,7 +229,7 @@ pub(crate) fn teach_network(
     start: Instant,
 ) -> Result<Taught> {
     let taught = taught(demonstrations, options)?;
-    // First, so that an error in the base weights does not appear after minutes.
+    // The base weights are applied first, so that an error in them appears at once instead of after minutes.
     let detector = plan.detector.initial(options.start.weights(), &options.device, options.seed)?;
     let comparison = match options.start.weights() {
         Some(base_weights) => base_weights.comparison(&options.device)?,
@@ -279,14 +279,14 @@ pub(crate) fn teach_network(
         }
         _ => detector,
     };
-    // The model that is examined, calibrated and returned equals the one that a file will give, without the head that
-    // only teaching has.
+    // The model that is validated, calibrated and returned equals the model read from its file, without the head that
+    // exists only during teaching.
     let finished = |detector: &GeneralizedRcnn| -> Result<Network> {
         let own = plan.detector.network.init(&options.device, options.seed)?;
         let detector = state_dict::import(own, &state_dict::export(detector)).0;
         Ok(Network { detector, reading: reading.clone(), comparison: comparison.clone() }.rounded())
     };
-    // The samples show the part at sizes outside the later search range, too.
+    // The samples also show the part at sizes outside the later search range.
     let of_any_size: Vec<TaughtDemonstration> =
         demonstrations.iter().map(TaughtDemonstration::new).collect::<Result<_>>()?;
     let mut proposed = Vec::new();

@@ -1,9 +1,9 @@
-//! Scenes without the part: how much of the demonstration is still seen in them.
+//! Scenes without the part, in which the agreement of other objects with the demonstration is measured.
 //!
 //! The agreement of a demonstration with other objects depends on the part: a ring agrees with everything round, a
-//! housing with many edges with nothing. It is therefore measured in composed scenes while teaching. The highest
-//! agreement varies more with the seed than between parts, so the mean is used: over the eight shipped parts it was
-//! 0.26 to 0.39 in 60 composed scenes each, within 0.04 of that in as many of the simulator's pictures.
+//! housing with many edges with nothing. It is therefore measured in composed scenes during teaching. The highest
+//! agreement varies more with the seed than between parts, so the mean is used: for the eight shipped parts it was 0.26
+//! to 0.39 in 60 composed scenes each, within 0.04 of the mean in as many of the simulator's pictures.
 
 use sdg_demonstration::{
     Annotation, AugmentationConfig, AugmentationStyle, Augmenter, Demonstration, Sample, SceneStyle,
@@ -22,26 +22,26 @@ use crate::sizes::scaling;
 use crate::taught::TaughtDemonstration;
 use crate::verification::SearchedImage;
 
-/// Minimum number of scenes with any agreement for computing a mean. Chosen by hand, not measured.
+/// Minimum number of scenes with any agreement for a mean. Chosen by hand, not measured.
 const MIN_SCENES: usize = 3;
 
-/// Scenes without the part, and the part as it is searched in them: at the default size tolerance, not the model's.
+/// Scenes without the part, and the part searched in them at the default size tolerance, not the model's.
 pub(crate) struct NegativeScenes {
     scenes: Vec<Sample>,
     demonstrations: Vec<TaughtDemonstration>,
 }
 
-/// Photos of more pixels are halved before scenes are composed from them. Chosen for time: model S is to be taught in a
-/// second.
+/// Photos with more pixels are halved before scenes are composed from them. Chosen for time: model S must be taught in
+/// a second.
 const MAX_PIXELS: u64 = 2_000_000;
 
 impl NegativeScenes {
     /// Composes `count` scenes of the demonstrations' size.
     ///
     /// # Errors
-    /// As [`Augmenter::new`].
+    /// As for [`Augmenter::new`].
     pub(crate) fn new(demonstrations: &[Demonstration], seed: u64, count: u64) -> Result<Self> {
-        // Pieces of the part itself agree with it, and do not occur on a table.
+        // No pieces of the part: they agree with it, but do not occur on a table.
         let style = SceneStyle { positive_share: 0.0, mutant_share: 0.0, ..SceneStyle::default() };
         let config = AugmentationConfig { style: AugmentationStyle::Scenes(style), ..AugmentationConfig::default() };
         let demonstrations: Vec<Demonstration> = demonstrations.iter().map(shrunk).collect();
@@ -55,15 +55,15 @@ impl NegativeScenes {
     /// The place most similar to the part in each scene, from the network's proposals and from the search.
     ///
     /// # Errors
-    /// An image that the network refuses.
+    /// An image that is invalid for the network.
     pub(crate) fn observe(&self, network: Option<&Network>) -> Result<Resemblances> {
         self.observe_with(network, &self.demonstrations)
     }
 
-    /// The same with other comparison settings.
+    /// As [`Self::observe`], with other comparison settings.
     ///
     /// # Errors
-    /// As [`Self::observe`]; a configuration out of range.
+    /// As for [`Self::observe`]; a configuration out of range.
     #[cfg(feature = "fitting")]
     pub(crate) fn observe_as(&self, check: &CheckConfig) -> Result<Resemblances> {
         let changed = |demonstration: &TaughtDemonstration| demonstration.clone().with_check(check.clone());
@@ -101,13 +101,13 @@ fn shrunk(demonstration: &Demonstration) -> Demonstration {
     shrunk
 }
 
-/// The place most similar to the part in each scene with any agreement: its agreement and the network's score there.
+/// The place most similar to the part in each scene with any agreement: agreement and the network's score.
 pub(crate) struct Resemblances {
     highest: Vec<(f64, f64)>,
 }
 
 impl Resemblances {
-    /// The resemblance of other objects with the part: the mean of the agreements.
+    /// The resemblance of other objects to the part: the mean of the agreements.
     pub(crate) fn resemblance(&self) -> f64 {
         if self.highest.len() < MIN_SCENES {
             return ScoreConfig::DEFAULT.resemblance.neutral;
@@ -137,7 +137,7 @@ mod tests {
             search(&SearchedImage::new(image, &taught)).iter().map(|placed| placed.agreement).fold(0.0, f64::max)
         };
         let agreements: Vec<f64> = negatives.scenes.iter().map(|sample| best(&sample.image)).collect();
-        // Some of them resemble it; otherwise the test would distinguish nothing.
+        // Some objects resemble the part; otherwise the test would be meaningless.
         assert!(
             resemblance > 0.1 && agreements.iter().all(|&agreement| agreement < 0.6),
             "{resemblance} {agreements:?}"

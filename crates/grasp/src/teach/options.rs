@@ -1,4 +1,4 @@
-//! The options of a teaching.
+//! The options of teaching.
 
 use std::ops::RangeInclusive;
 use std::time::Duration;
@@ -17,7 +17,7 @@ use crate::facts::ModelKind;
 use crate::lengths::Lengths;
 use crate::region::SearchRegion;
 
-/// How to teach.
+/// The options of teaching.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct TeachOptions {
@@ -27,27 +27,28 @@ pub struct TeachOptions {
     pub preset: Preset,
     /// The seed of every random choice.
     pub seed: u64,
-    /// Wall-clock time for the training.
+    /// Maximum wall-clock time for the training.
     pub time_budget: Option<Duration>,
-    /// Number of detector steps if not the preset's; the orientation CNN's change in proportion. For tests and trials.
+    /// Number of detector steps, if it differs from the preset's; the number for the orientation CNN changes in
+    /// proportion. For tests and trials.
     pub steps: Option<usize>,
-    /// The fine-tuning; `None` for the preset's training from random values, and for [`FineTuning::new`] from our own
-    /// base weights.
+    /// The fine-tuning; `None` for the preset's training from random values, and for [`FineTuning::new`] from this
+    /// project's base weights.
     pub fine_tuning: Option<FineTuning>,
-    /// The part's symmetry: its turns are neither taught nor counted as errors.
+    /// The part's symmetry: its rotations are neither taught nor counted as errors.
     pub symmetry: RotationalSymmetry,
-    /// Range of sizes over the nominal one within which the part is searched.
+    /// Range of sizes, relative to the nominal one, at which the part is searched.
     pub size_tolerance: RangeInclusive<f64>,
     /// The region of pictures that the model searches; teaching itself does not use it.
     pub region: Option<SearchRegion>,
-    /// The result of [`crate::seen_from_above`], if the demonstrations come from there.
+    /// The lengths returned by [`crate::seen_from_above`], if it made the demonstrations.
     pub lengths: Option<Lengths>,
     /// The user's pictures without the part: some of a network's samples, and data for the score's calibration. Each
-    /// counts once; none is used as a background of other samples.
+    /// picture counts once, and none is used as a background of other samples.
     pub negatives: Vec<RgbImage>,
     /// The initial weights of the networks.
     pub start: Start,
-    /// The computing device; without gradients.
+    /// The computing device, without gradients.
     pub device: Device,
 }
 
@@ -76,12 +77,13 @@ impl TeachOptions {
         self.preset.detector(self.kind, true).map(|detector| detector.network)
     }
 
-    /// The detector during teaching, which may have more heads than the model; our own base weights are read for it.
+    /// The detector during teaching, which may have more heads than the model; this project's base weights are read for
+    /// it.
     pub fn taught_network(&self) -> Option<RcnnConfig> {
         self.preset.detector(self.kind, true).map(|detector| detector.taught())
     }
 
-    /// The same with the shipped weights read, if these options ask for them.
+    /// The options with the shipped weights read, if they request these weights.
     ///
     /// # Errors
     /// [`GraspError::NeedsBaseWeights`](crate::GraspError::NeedsBaseWeights) if the preset starts from weights and

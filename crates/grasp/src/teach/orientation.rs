@@ -1,4 +1,4 @@
-//! Model A's first part: the orientation CNN.
+//! Model A's first network: the orientation CNN.
 
 use std::ops::ControlFlow;
 
@@ -14,7 +14,7 @@ use crate::decimal::decimal;
 use crate::error::{GraspError, Result};
 use crate::facts::OrientationFacts;
 
-/// Share of a time budget for the orientation CNN; the detector has the rest. Chosen by hand, not measured.
+/// Fraction of a time budget for the orientation CNN; the detector has the rest. Chosen by hand, not measured.
 const TIME_SHARE: f64 = 0.3;
 
 /// Teaches the orientation CNN from the demonstrations.

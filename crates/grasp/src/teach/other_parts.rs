@@ -1,6 +1,6 @@
-//! Generated parts as negatives in the scenes of a teaching.
+//! Generated parts as negatives in the scenes of teaching.
 //!
-//! They exclude the shipped parts and the parts of all measurements: their seeds are separate.
+//! The seeds of these parts are separate from those of the shipped parts and of the parts for all measurements.
 
 use sdg_demonstration::{AugmentationConfig, AugmentationStyle, Augmenter, Demonstration, SceneStyle};
 use sdg_part_generator::{Part, PhotoConfig, demonstration};
@@ -12,13 +12,13 @@ use crate::sighting::{best_agreement, sightings};
 use crate::taught::TaughtDemonstration;
 use crate::verification::SearchedImage;
 
-/// Photos as large as the network's input.
+/// Photos of the size of the network's input.
 const PHOTO: PhotoConfig = PhotoConfig { width: 320, height: 240, fill: [0.4, 0.6] };
 
 /// First seed of the other parts, far from those of the parts for measurements and pretraining.
 const FIRST_SEED: u64 = 1 << 48;
 
-/// Number of parts for training; a third as many are held back.
+/// Generates `count` parts for training, and a third as many that are held out.
 pub(super) fn draw(count: usize, seed: u64) -> [Vec<Demonstration>; 2] {
     let first = FIRST_SEED.wrapping_add(seed.wrapping_mul(10_000));
     let one = |i: usize| demonstration(&Part::generate(first.wrapping_add(i as u64)), &PHOTO, 0);
@@ -38,16 +38,16 @@ const NUM_PICTURES: u64 = 16;
 /// The scores of a network in pictures of other parts without the part.
 #[derive(Default)]
 pub(super) struct OnOtherParts {
-    /// Its highest score in each picture.
+    /// The network's highest score in each picture.
     pub(super) highest: Vec<f64>,
-    /// Its score at the place of best agreement in each picture; 0 without a proposal.
+    /// The network's score at the place of best agreement in each picture; 0 without a proposal.
     pub(super) best_agreement: Vec<f64>,
 }
 
 /// Applies a network to pictures of other parts; empty without other parts.
 ///
 /// # Errors
-/// As [`Augmenter::new`]; an image that the network refuses.
+/// As for [`Augmenter::new`]; an image that is invalid for the network.
 pub(super) fn shown(
     demonstrations: &[Demonstration],
     others: &[Demonstration],

@@ -1,9 +1,9 @@
 //! The paper's protocol: its network, samples, steps, learning rates and batches.
 //!
-//! Kept as published: R50-FPN at a short side of 800 pixels, SGD, 1500 samples of the paper's own augmentation for 1000
-//! steps of two images (model A's detector: 500 steps of eight), 200 held-back ones, 5000 crops for the orientation CNN.
+//! As published: R50-FPN at a short side of 800 pixels, SGD, 1500 samples of the paper's augmentation for 1000 steps of
+//! two images (model A's detector: 500 steps of eight), 200 held-out samples, 5000 crops for the orientation CNN.
 //!
-//! Corrected, because it is an error of the original code and not part of the protocol:
+//! Corrected, because these are errors of the original code and not part of the protocol:
 //! - the learning rate follows one cycle; the original's warm-up of 1000 steps increases it during the whole run;
 //! - the network gets the colour channels in the order of its weights;
 //! - no mirror images;
@@ -19,16 +19,15 @@ use sdg_training::{OneCycle, Optimizer, TrainingConfig, ValidationConfig};
 
 use crate::facts::ModelKind;
 
-/// Samples that are repeated in turn.
+/// Number of samples, which are repeated in the same order.
 pub(super) const DISTINCT_SAMPLES: u64 = 1500;
-/// Held-back samples.
+/// Number of held-out samples.
 const HELD_BACK: usize = 200;
 /// Width and height of the samples, in pixels.
 const SAMPLE_SIZE: [u32; 2] = [640, 480];
 
-/// Detectron2's R50-FPN. With imported weights, stem and first stage are frozen, and so are the norms. From random
-/// values nothing is frozen: all layers learn, and the frozen norms, which would have no effect, are replaced by group
-/// norms.
+/// Detectron2's R50-FPN. With imported weights, stem, first stage and norms are frozen. From random values nothing is
+/// frozen: all layers learn, and the frozen norms, which would have no effect, are replaced by group norms.
 pub(super) fn network(kind: RcnnKind, has_base_weights: bool) -> RcnnConfig {
     let mut config = r50_detectron2(kind);
     if !has_base_weights {

@@ -1,4 +1,4 @@
-//! The plan of a network model's teaching: detector, reading, samples, steps.
+//! The plan for teaching a model with a network: detector, conversion to poses, samples, steps.
 
 use sdg_demonstration::{AugmentationConfig, AugmentationStyle};
 use sdg_training::TrainingConfig;
@@ -11,31 +11,31 @@ use super::preset::{OrientationPlan, Preset};
 use crate::base_weights::BaseWeights;
 use crate::facts::ModelKind;
 
-/// Minimum share of parts that a useful network leads the demonstration to. Chosen by hand, not measured.
+/// Minimum fraction of parts at which a useful network places the demonstration. Chosen by hand, not measured.
 const MIN_HIT_RATE: f64 = 0.5;
 
-/// Everything that determines the teaching of a network model except the demonstrations and the initial weights.
+/// All settings for teaching a model with a network, except the demonstrations and the initial weights.
 #[derive(Debug, Clone)]
 pub(crate) struct Plan {
     /// The detector.
     pub(crate) detector: DetectorPlan,
-    /// The reading of its detections, and the training that it needs.
+    /// The conversion of detections to poses, and the training that it needs.
     pub(crate) reading: ReadingPlan,
     /// The detector's training.
     pub(crate) training: TrainingConfig,
     /// The training samples.
     pub(crate) samples: AugmentationConfig,
-    /// Samples before they repeat; `None` for unlimited new ones.
+    /// Number of samples before they repeat; `None` for unlimited new samples.
     pub(crate) distinct_samples: Option<u64>,
     /// The samples for validation and calibration.
     pub(crate) held_back: AugmentationConfig,
-    /// Minimum share of parts that a network must lead the demonstration to.
+    /// Minimum fraction of parts at which the network must place the demonstration.
     pub(crate) min_hit_rate: f64,
-    /// Generated parts shown during teaching, beside the part and in its place.
+    /// Number of generated parts shown during teaching, beside the part and in its place.
     pub(crate) num_other_parts: usize,
 }
 
-/// The later reading of detections as poses of the demonstration.
+/// The conversion of detections to poses of the demonstration.
 #[derive(Debug, Clone)]
 pub(crate) enum ReadingPlan {
     /// Model A, which has a second network.
@@ -49,7 +49,7 @@ pub(crate) enum ReadingPlan {
 }
 
 impl Plan {
-    /// The plan for options whose initial weights are read; `None` for model S, which has no network.
+    /// The plan for options with initial weights already read; `None` for model S, which has no network.
     pub(crate) fn new(options: &TeachOptions) -> Option<Self> {
         let &TeachOptions { kind, preset, seed, symmetry, .. } = options;
         let reading = match kind {
@@ -68,7 +68,7 @@ impl Plan {
             distinct_samples: (preset == Preset::Paper).then_some(paper::DISTINCT_SAMPLES),
             held_back: match preset {
                 Preset::Paper => AugmentationConfig::paper(),
-                // At the photo's own size, so that verification is calibrated on the same resolution.
+                // Samples of the photo's size, so that verification is calibrated at the same resolution.
                 _ => AugmentationConfig::default(),
             },
             min_hit_rate: MIN_HIT_RATE,
@@ -95,7 +95,7 @@ impl Plan {
         }
     }
 
-    /// Other detector steps; the orientation CNN's change in proportion.
+    /// Sets the number of detector steps; the number for the orientation CNN changes in proportion.
     fn set_steps(&mut self, steps: usize) {
         if let ReadingPlan::BoxAndCrop(orientation) = &mut self.reading {
             let training = &mut orientation.training;

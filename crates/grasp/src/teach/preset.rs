@@ -15,14 +15,13 @@ use crate::error::{GraspError, Result};
 use crate::facts::ModelKind;
 use crate::{NUM_KEYPOINTS, models};
 
-/// Maximum number of folds of the circle for an orientation CNN: the remaining 5° are negligible. Derived
-/// from that.
+/// Maximum order of symmetry for an orientation CNN: the remaining 5° are negligible. Derived from that.
 const MAX_FOLD: usize = 72;
 
 /// A network, its training and its augmentation under one name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Preset {
-    /// Made for two cores: minutes from photo to grasp.
+    /// For two cores: minutes from photo to grasp.
     #[default]
     Edge,
     /// Detectron2's R50-FPN, fine-tuned from imported weights.
@@ -47,7 +46,7 @@ impl Preset {
         }
     }
 
-    /// Whether its frozen stages require imported weights.
+    /// Whether the preset's frozen stages require imported weights.
     pub(super) fn needs_base_weights(self) -> bool {
         match self {
             Self::Edge | Self::Paper => false,
@@ -98,7 +97,7 @@ impl Preset {
         let fold = match symmetry {
             RotationalSymmetry::Fold(count) => (count as usize).min(MAX_FOLD),
             RotationalSymmetry::Full => {
-                // Every answer is right: there is nothing to learn.
+                // Every answer is correct: there is nothing to learn.
                 training.steps = 1;
                 MAX_FOLD
             }

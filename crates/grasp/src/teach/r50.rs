@@ -1,4 +1,4 @@
-//! R50-FPN from imported weights, for an ordinary computer.
+//! R50-FPN from imported weights, for a computer with two cores.
 
 use sdg_detection::RcnnConfig;
 use sdg_detection::config::ResizeRule;
@@ -7,9 +7,9 @@ use sdg_training::{OneCycle, TrainingConfig, ValidationConfig, WindowPhase};
 /// Short side of the images in teaching and detection with an R50. Chosen by hand for time; the loss was not measured.
 pub(super) const SHORT_SIDE_PX: u32 = 480;
 
-/// An R50 with the numerics of its weights, except for two changes that save an ordinary computer minutes. Images are
-/// not enlarged to 800 pixels, which adds no detail to a photo of 480. COCO's images show dozens of objects, but a
-/// demonstration's show one, so that fewer regions go through the heads; the keypoint head takes 7 GFLOP for each. The
+/// An R50 with the numerics of its weights, except for two changes that save minutes on such a computer. Images are not
+/// enlarged to 800 pixels, which adds no detail to a photo of 480. COCO images show dozens of objects, but
+/// demonstrations show one, so that fewer regions go through the heads; the keypoint head takes 7 GFLOP for each. The
 /// numbers were chosen by hand for time; the loss was not measured.
 pub(super) fn on_two_cores(mut config: RcnnConfig) -> RcnnConfig {
     const MAX_PROPOSALS: usize = 100;
@@ -31,8 +31,8 @@ pub(super) fn on_two_cores(mut config: RcnnConfig) -> RcnnConfig {
     config
 }
 
-/// A lower learning rate, so that imported weights are not forgotten, and fewer steps, because each takes longer.
-/// Chosen by hand, not measured.
+/// Training with a lower learning rate, to preserve the imported weights, and with fewer steps, because each takes
+/// longer. Chosen by hand, not measured.
 pub(super) fn fine_tuning(seed: u64) -> TrainingConfig {
     TrainingConfig {
         steps: 200,

@@ -1,14 +1,15 @@
-//! Many pictures in parallel.
+//! Processes many pictures in parallel.
 
 use rayon::prelude::*;
 
 use crate::error::Result;
 
-/// Applies `work` to each input; results are in their order. Two cores with one picture each finish earlier than both
-/// on one picture after the other, whose kernels and searches are too short to be shared well.
+/// Applies `work` to each input; the results are in the order of the inputs. Two cores with one picture each finish
+/// earlier than both cores on one picture after the other, because the kernels and searches of one picture are too
+/// short to be divided well.
 ///
 /// # Errors
-/// The first that failed.
+/// The error of the first input that failed.
 pub(super) fn side_by_side<I: Sync, O: Send>(
     inputs: &[I],
     work: impl Fn(&I) -> Result<O> + Sync + Send,

@@ -9,19 +9,19 @@ use crate::error::{GraspError, Result};
 /// The initial weights of the networks.
 #[derive(Debug, Clone, Default)]
 pub enum Start {
-    /// The base weights in this build (feature `base-weights`); random values for preset `paper`, as for the paper's
-    /// orientation CNN; its detectors cannot start from these weights.
+    /// The base weights in this build (feature `base-weights`). For preset `paper`, random values, because its
+    /// detectors cannot start from these weights and the paper's orientation CNN starts from random values.
     #[default]
     Shipped,
-    /// From random values.
+    /// Random values.
     Nothing,
-    /// Other weights, for the detector that [`TeachOptions::network`](super::TeachOptions::network) or
-    /// [`TeachOptions::taught_network`](super::TeachOptions::taught_network) gives.
+    /// Other weights, for the detector of [`TeachOptions::network`](super::TeachOptions::network) or
+    /// [`TeachOptions::taught_network`](super::TeachOptions::taught_network).
     Weights(BaseWeights),
 }
 
 impl Start {
-    /// The weights; none if they are not read yet or do not exist.
+    /// The weights; `None` if they are not read yet or do not exist.
     pub(super) fn weights(&self) -> Option<&BaseWeights> {
         match self {
             Self::Weights(weights) => Some(weights),
@@ -29,7 +29,7 @@ impl Start {
         }
     }
 
-    /// The same with the shipped weights read, if they are requested and the preset starts from them.
+    /// The start with the shipped weights read, if they are requested and the preset starts from them.
     ///
     /// # Errors
     /// [`GraspError::NeedsBaseWeights`] if the preset starts from weights and this build contains none.

@@ -1,8 +1,9 @@
-//! Parts that look the same at several turns.
+//! Parts that look the same at several rotations.
 //!
-//! A sample's record has the part's turn, which its picture does not show. A network trained on it would learn the
-//! mean of the turns, and a validation would count right answers as wrong. So keypoints are taught at their
-//! positions for the smallest equivalent turn, and invisible turns are not errors.
+//! A sample's record contains the part's rotation, which the picture of a symmetric part does not show. A network
+//! trained on it would learn the mean of the rotations, and a validation would count correct answers as wrong.
+//! Therefore keypoints are taught at their positions for the smallest equivalent rotation, and invisible rotations are
+//! not errors.
 
 use nalgebra::Point2;
 use sdg_demonstration::{Demonstration, Sample};
@@ -20,7 +21,7 @@ impl HiddenTurns {
         Self { symmetry, centers: demonstrations.iter().map(|d| d.annotation.region().centroid()).collect() }
     }
 
-    /// The sample with its truth at the smallest equivalent turn from the demonstration.
+    /// The sample with its ground truth at the smallest equivalent rotation from the demonstration.
     pub(super) fn canonical(&self, mut sample: Sample) -> Sample {
         if self.symmetry == RotationalSymmetry::None {
             return sample;
@@ -34,7 +35,8 @@ impl HiddenTurns {
             for keypoint in &mut object.keypoints {
                 let at = back.apply(&keypoint.point());
                 let inside = (0.0..=width).contains(&at.x) && (0.0..=height).contains(&at.y);
-                // An object that covers the part was not turned with it: whether it covers this place is unknown.
+                // An object that covers the part was not rotated with it, so that it is unknown whether it covers this
+                // place.
                 *keypoint = match inside {
                     true => Keypoint::visible(at),
                     false => Keypoint { x: at.x, y: at.y, visibility: Visibility::Unlabelled },
@@ -44,8 +46,8 @@ impl HiddenTurns {
         sample
     }
 
-    /// The equivalent of `grasp` with the smallest turn from the true one. `image_from_demonstration` is the pose of
-    /// the demonstration `demonstration_idx`.
+    /// The equivalent of `grasp` with the smallest rotation from the true grasp. `image_from_demonstration` is the pose
+    /// of the demonstration `demonstration_idx`.
     pub(crate) fn nearest(
         &self,
         grasp: &PlanarGrasp,
@@ -87,7 +89,7 @@ mod tests {
                 for object in turns.canonical(augmenter.sample(i)).objects {
                     let pose = object.image_from_demonstration;
                     assert!(pose.angle.degrees().abs() <= max_degrees + 1e-9, "{symmetry:?} {pose:?}");
-                    // The keypoints moved with it; the warp tilts slightly.
+                    // The keypoints moved with the pose; the warp tilts slightly.
                     let truth = pose.apply(&square().annotation.grasp.unwrap().start);
                     assert!((object.keypoints[0].point() - truth).norm() < 12.0, "{symmetry:?} {:?}", object.keypoints);
                 }
@@ -98,7 +100,7 @@ mod tests {
     #[test]
     fn a_grasp_a_quarter_turn_round_is_the_same_one() {
         let truth = PlanarGrasp::from_line(&square().annotation.grasp.unwrap(), 60.0);
-        // The centre is (90, 70): a quarter turn maps (110, 70) to (90, 90).
+        // The centre is (90, 70): a rotation by 90° maps (110, 70) to (90, 90).
         let turned = PlanarGrasp { x: 90.0, y: 90.0, angle: truth.angle + Angle::from_degrees(92.0), width: 60.0 };
         let nearest = |symmetry| {
             HiddenTurns::new(&[square()], symmetry).nearest(&turned, truth.angle, 0, &PlanarSimilarity::IDENTITY)

@@ -38,7 +38,7 @@ pub(crate) fn demonstration() -> Demonstration {
 /// Channels of the keypoint head's convolutions.
 const SMALL_KEYPOINT_CONVS: [usize; 2] = [16; 2];
 
-/// The network's structure with few channels and pixels.
+/// Reduces a network to few channels and pixels.
 fn shrink(network: &mut RcnnConfig) {
     network.input.resize = ResizeRule::FitWithin { width_px: 96, height_px: 72 };
     network.backbone.stem_channels = 8;
@@ -61,7 +61,7 @@ fn whole_plan(options: &TeachOptions) -> Plan {
     Plan::new(options).unwrap()
 }
 
-/// A preset's plan, small enough for a test; any network is kept.
+/// A preset's plan, small enough for a test, which keeps any network.
 pub(super) fn small_plan(options: &TeachOptions) -> Plan {
     let mut plan = whole_plan(options);
     shrink(&mut plan.detector.network);
@@ -94,10 +94,11 @@ pub(super) fn taught(preset: Preset, kind: ModelKind) -> GraspModel {
     .model
 }
 
-/// Steps of detector and orientation CNN.
+/// Number of steps of detector and orientation CNN.
 const STEPS: usize = 12;
 
-/// A model and the same model read from its file give bit-identical detections in its own photo.
+/// Checks that a model and the same model read from its file give bit-identical detections in the demonstration's
+/// photo.
 fn assert_same_after_a_file(model: &GraspModel) {
     let bytes = model.to_bytes().unwrap();
     let read = GraspModel::from_bytes(&bytes, &Device::flex()).unwrap();
@@ -152,7 +153,7 @@ fn one_network_serves_the_models_that_are_taught_alike() {
     let taught = taught(Preset::Edge, ModelKind::C);
     let read = taught.clone().read_as(ModelKind::B).unwrap();
     assert_eq!((read.kind(), ModelKind::B.taught_as()), (ModelKind::B, ModelKind::C));
-    // The same boxes, in the order of another reading's scores; positions are read differently, and the conversion back
+    // The boxes are the same, in the order of the other model's scores; positions differ, and the conversion back
     // restores them.
     let photo = demonstration().image;
     let said = |model: &GraspModel| model.detect(&photo, Verification::Off).unwrap();
@@ -245,7 +246,7 @@ fn without_network(demonstrations: &[Demonstration]) -> crate::error::Result<Gra
     teach(demonstrations, &options, &mut |_| ControlFlow::Continue(())).map(|taught| taught.model)
 }
 
-/// The demonstration with this many times the pixels.
+/// The demonstration with sides `factor` times as long.
 fn resized(factor: f64) -> Demonstration {
     let mut demonstration = demonstration();
     let [width, height] =
@@ -285,7 +286,7 @@ fn a_narrower_size_tolerance_refuses_other_sizes_and_is_kept_in_the_file() {
     let taught = teach(&[demonstration()], &options, &mut |_| ControlFlow::Continue(())).unwrap().model;
     let read = GraspModel::from_bytes(&taught.to_bytes().unwrap(), &Device::flex()).unwrap();
     assert_eq!(read.size_tolerance(), 0.95..=1.05);
-    // Larger by a fifth in a picture of the photo's size.
+    // The part is larger by a fifth in a picture of the photo's size.
     let larger = resized(1.2).image;
     let picture = image::imageops::crop_imm(&larger, 0, 0, PHOTO[0], PHOTO[1]).to_image();
     let accepts = |model: &GraspModel| {

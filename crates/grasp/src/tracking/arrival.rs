@@ -1,11 +1,11 @@
-//! The results of a search of an older frame, carried forward to the newest one.
+//! Detections of a search of an older frame, carried forward to the newest frame.
 //!
 //! ```text
-//! detections in frame k ─┬─ on a track, where that was in frame k ─ about there: likeness, marks and network score are taken
+//! detections in frame k ─┬─ on a track, at its pose in frame k ─── near it: likeness, marks and network score are taken
 //!                        │                                        │ over, and the difference is tried in the next frame
 //!                        │                                        └ elsewhere, and agrees better: carried forward, replaces it
 //!                        └─ on no track ─ carried forward, becomes a track
-//! carried forward: frame k ─ k + stride ─ … ─ newest, some steps a call
+//! carried forward: frame k ─ k + stride ─ … ─ newest, some steps per call
 //! ```
 
 use super::detector::PartDetector;
@@ -15,21 +15,22 @@ use super::track::{PastPose, Standing, Track};
 use crate::detection::{Found, Placement};
 use crate::same_part::are_outlines_of_same_part;
 
-/// A pose at this distance from its track's pose is carried forward like one of another part, because a capture from
-/// the track's own pose does not reach it. In pixels of the cut-out, and in radians. Chosen by hand.
+/// A pose at this distance from its track's pose is carried forward like the pose of another part, because a capture
+/// from the track's pose does not reach it. In pixels of the cut-out. Chosen by hand.
 const FAR_PX: f64 = 8.0;
+/// This distance in radians. Chosen by hand.
 const FAR_RAD: f64 = 0.15;
-/// Minimum gain of agreement of such a pose. Chosen by hand.
+/// Minimum gain of agreement of such a distant pose. Chosen by hand.
 const MIN_GAIN: f64 = 0.02;
 
 /// Whether a track is near enough to the newest frame to be followed into it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Carried {
-    /// It is in the frame before the newest, or nearly so.
+    /// The track has reached the frame before the newest, or nearly so.
     ToNewest,
-    /// There are frames between them.
+    /// Further frames lie between the track and the newest frame.
     Partly,
-    /// It was absent in a frame between them.
+    /// The part was absent in one of the frames between.
     Lost,
 }
 
@@ -60,7 +61,7 @@ pub(super) enum Match {
     Confirms,
     /// The same part at another pose of better agreement.
     Corrects,
-    /// The same part, elsewhere or turned by its symmetry, without better agreement.
+    /// The same part, elsewhere or rotated by its symmetry, without better agreement.
     Disagrees,
 }
 

@@ -5,22 +5,22 @@ use sdg_geometry::BoundingBox;
 
 use sdg_shape::PixelRect;
 
-/// Maximum number of cells across and down whose mean colours are compared, and the minimum shorter side of a cell: the
-/// mean of fewer pixels would be noise. Chosen by hand.
+/// Maximum number of cells, horizontally and vertically, whose mean colours are compared. Chosen by hand.
 const MAX_CELLS: [u32; 2] = [32, 24];
+/// Minimum length of a cell's shorter side: the mean of fewer pixels would be noise. Chosen by hand.
 const MIN_CELL_PX: u32 = 8;
-/// Pixels across and down from which a cell's mean is computed: more of a large picture would take longer than
-/// following a part.
+/// Maximum number of pixels, horizontally and vertically, from which a cell's mean is computed: more would take longer
+/// than following a part.
 const MAX_SAMPLES: u32 = 20;
-/// A larger change of a mean, in grey values, shows other objects. Chosen by hand: above the changes by noise and
-/// lamps, below those by a part that covers a tenth of a cell.
+/// Maximum change of a mean, in grey values, without a change of objects. Chosen by hand: above the changes by noise
+/// and lamps, below the change by a part that covers a tenth of a cell.
 const MAX_CHANGE: f32 = 6.0;
 
 /// The mean colours of the cells of a picture, or of its searched region.
 #[derive(Debug, Clone)]
 pub(super) struct CoarseView {
     window: PixelRect,
-    /// Cells across and down.
+    /// Number of cells, horizontally and vertically.
     cells: [u32; 2],
     means: Vec<[f32; 3]>,
 }
@@ -33,7 +33,7 @@ impl CoarseView {
         Self { window: *window, cells, means: places.map(|cell| mean(picture, window, cells, cell)).collect() }
     }
 
-    /// Whether there is a change outside the boxes and their borders.
+    /// Whether the picture has changed outside the boxes and their borders.
     pub(super) fn has_changed_beside(&self, before: &Self, boxes: &[BoundingBox]) -> bool {
         let PixelRect { left, top, width, height } = self.window;
         let [left, top] = [left, top].map(f64::from);
@@ -97,7 +97,7 @@ mod tests {
         assert!(after.has_changed_beside(&before, &[on(300.0)]));
         // Fewer pixels than cells.
         assert!(!view(&RgbImage::new(5, 3)).has_changed_beside(&view(&RgbImage::new(5, 3)), &[]));
-        // Only in the searched region, whose positions are those of the picture.
+        // Changes count only in the searched region; boxes are in pixels of the picture.
         let seen = |left: u32| {
             let window = PixelRect { left, top: 80, width: 64, height: 48 };
             [noisy(1), other.clone()].map(|picture| CoarseView::new(&picture, &window))

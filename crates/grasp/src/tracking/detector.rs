@@ -18,7 +18,7 @@ use crate::region::SearchRegion;
 pub enum PartDetector {
     /// Poses in pixels only.
     Picture(Box<GraspModel>),
-    /// Poses in metres, too.
+    /// Poses in pixels and in metres.
     PlanView(Box<PlanViewDetector>),
 }
 
@@ -50,7 +50,7 @@ impl PartDetector {
         }
     }
 
-    /// A rectangle of the frame of reference, within it.
+    /// The pixels of a rectangle within the frame of reference.
     pub(super) fn window(&self, picture: &RgbImage, rect: &PixelRect) -> RgbImage {
         match self {
             Self::Picture(_) => {
@@ -90,7 +90,7 @@ impl PartDetector {
     }
 }
 
-/// A search of one frame, to be run when there is time.
+/// A search of one frame, which the caller runs at a time of its choice.
 #[derive(Debug)]
 pub struct PartSearch {
     pub(super) number: u64,

@@ -1,9 +1,9 @@
 //! Refines one part in one frame: a window around its expected pose, its gradients, and the edges in it.
 //!
 //! ```text
-//! expected pose ─ outline's box and the reach ─ window, halved as the search halves ─ GradientField
+//! expected pose ─ outline's box and the reach ─ window, halved as in the search ──── GradientField
 //!                                                                                       │ snapped or captured
-//!                                       edges, surface, hue, visible share ─ Followed ──┘
+//!                                       edges, surface, hue, visible area ── Followed ──┘
 //! ```
 
 use std::sync::Arc;
@@ -20,12 +20,12 @@ use crate::prepared::{Prepared, WorkingSize};
 use crate::sizes::{SizeRange, scaling};
 use crate::taught::TaughtDemonstration;
 
-/// Margin in pixels of the halved picture around the search range, for the gradients' smoothing and for crests beside
-/// an edge: 3 and 6.
+/// Margin in pixels of the halved picture around the search range, for the gradients' smoothing (3) and for crests
+/// beside an edge (6).
 const BORDER_PX: f64 = 9.0;
 /// Minimum side of a pyramid level; as in `sdg_shape`.
 const MIN_LEVEL_SIDE: u32 = 24;
-/// Range of a close look, in lengths of the part: 1.25, and a pixel for interpolation.
+/// Range of a close look, in lengths of the part: 1.25, plus a pixel for interpolation.
 const SEEN_CLOSELY: f64 = 1.28;
 
 /// Tolerance of the agreement of a part that has not moved, for noise. Chosen by hand.
@@ -44,13 +44,13 @@ pub(super) struct SizedPart {
 /// Search range around a part's expected pose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Effort {
-    /// Some pixels: from frame to frame.
+    /// Some pixels, for following from frame to frame.
     Snapped,
-    /// Twice as many, five times slower.
+    /// Twice as many pixels, five times slower.
     Captured,
 }
 
-/// The pose of a search, and its agreement.
+/// The pose found by a search, and its agreement.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct StillPose {
     pub(super) image_from_cutout: PlanarSimilarity,
@@ -60,25 +60,25 @@ pub(super) struct StillPose {
 /// A part in one frame.
 #[derive(Debug, Clone)]
 pub(super) struct Followed {
-    /// Whether it lies at the pose of the last search.
+    /// Whether the part lies at the pose of the last search.
     pub(super) is_held: bool,
     /// The pose by edges alone.
     pub(super) by_edges: PlanarSimilarity,
-    /// The pose by edges and surface: the same, or corrected.
+    /// The pose by edges and surface: the pose by edges, or a correction of it.
     pub(super) image_from_cutout: PlanarSimilarity,
-    /// Edges and surface together, in `[0, 1]`.
+    /// Agreement of edges and surface together, in `[0, 1]`.
     pub(super) agreement: f64,
-    /// Without a close look.
+    /// The evidence without a close look.
     pub(super) evidence: Evidence,
-    /// ln of its size over the nearest nominal size.
+    /// ln of the part's size over the nearest nominal size.
     pub(super) log_size: f64,
     /// Mean brightness divided by that of the demonstration.
     pub(super) light: f64,
 }
 
 impl Effort {
-    /// In pixels of the halved picture. The scale hardly changes from frame to frame; a free scale would add only
-    /// noise. Chosen by hand.
+    /// The search range in pixels of the halved picture. The scale hardly changes from frame to frame, and a free scale
+    /// would add only noise. Chosen by hand.
     fn reach(self) -> Reach {
         match self {
             Self::Snapped => Reach { shift_px: 12.0, turn_rad: 0.12, log_scale: 0.02 },
@@ -90,12 +90,12 @@ impl Effort {
 /// A window of a frame, halved.
 struct View {
     image: RgbImage,
-    /// Shifts and shrinks.
+    /// Maps the frame to the window: a shift and a reduction.
     view_from_frame: PlanarSimilarity,
 }
 
 impl SizedPart {
-    /// The demonstration for parts of the size of a found one; `None` if it shows nothing to compare at that size.
+    /// The demonstration for parts of the size of a found part; `None` if it has no shape to compare at that size.
     pub(super) fn new(detector: &PartDetector, found: &Placement, frame_size: [u32; 2]) -> Option<Self> {
         let &Placement { demonstration_idx, colors, .. } = found;
         let scale = found.image_from_cutout.scale;
@@ -118,8 +118,8 @@ impl SizedPart {
     }
 
     /// Refines the part near `start`; `None` if too little of it lies in the frame. `correction` is the offset of the
-    /// last found pose from the pose by edges alone; it is applied if the frame agrees better with it. If the frame's
-    /// agreement with `still` is unchanged, the part lies there, and nothing is refined.
+    /// last found pose from the pose by edges alone, applied if it improves the agreement with the frame. If the
+    /// frame's agreement with `still` is unchanged, the part lies at that pose, and nothing is refined.
     ///
     /// # Units and frames
     /// Poses map pixels of the cut-out to the detector's frame of reference.
@@ -140,7 +140,7 @@ impl SizedPart {
         let step = search.template().coarsest_pixel(start.scale / self.working.shrink() / self.working.cutout_scale);
         let view = self.view(detector, picture, &bounds, margin, step)?;
         let field = GradientField::with_config(&view.image, &demonstration.check().search.shape.gradient);
-        // The table's colours are not needed from far away.
+        // The table's colours are needed only for a close look.
         let picture = Picture { image: &view.image, field: &field, table: &TableColors::default() };
         let comparison = search.comparison(&picture);
         let both = |pose: &PlanarSimilarity| comparison.agreement(pose).both();
@@ -184,7 +184,7 @@ impl SizedPart {
     ) -> Option<CloseLook> {
         let demonstration = self.demonstration(detector);
         let own = demonstration.marks.region().bounds();
-        // A square around the part at any turn.
+        // A square around the part at any angle.
         let side = SEEN_CLOSELY * own.width().max(own.height()) * image_from_cutout.scale;
         let half = 0.5 * side * std::f64::consts::SQRT_2;
         let center = image_from_cutout.apply(&own.center());
@@ -212,7 +212,7 @@ impl SizedPart {
             let grid = step * shrink;
             let least = MIN_LEVEL_SIDE * grid;
             let from = ((low - margin).max(0.0) as u32).min(limit) / grid * grid;
-            // Near the frame's end the window grows to the other side.
+            // Near the frame's border the window is extended to the other side.
             let from = from.min(limit.saturating_sub(least) / grid * grid);
             let to = ((high + margin).max(0.0).ceil() as u32).max(from + least).min(limit);
             (to >= from + shrink).then_some((from, to - from))

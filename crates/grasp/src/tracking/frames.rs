@@ -1,4 +1,4 @@
-//! The newest frame, and older ones while a search of one of them runs.
+//! The newest frame, and older frames while a search of one of them runs.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -6,11 +6,11 @@ use std::time::Duration;
 
 use image::RgbImage;
 
-/// Longest time between frames through which a detection is carried: a part at 0.5 m/s moves by 20 pixels of a
+/// Maximum time between frames through which a detection is carried: a part at 0.5 m/s moves by 20 pixels of a
 /// millimetre, which is within a capture's range. Derived from that.
 const MAX_STRIDE: Duration = Duration::from_millis(40);
-/// Maximum number of frames kept for a running search; beyond it, every second one is kept. Chosen by hand: 44 MB of
-/// 640×480.
+/// Maximum number of frames kept for a running search; beyond it, only every second frame is kept. Chosen by hand: 44
+/// MB with 640×480 pixels.
 const MAX_BUFFERED: usize = 48;
 /// A frame that may still be needed.
 #[derive(Debug, Clone)]
@@ -20,7 +20,7 @@ pub(super) struct BufferedFrame {
     pub(super) time: Duration,
 }
 
-/// The newest frame, and those since the one being searched.
+/// The newest frame, and the frames since the searched one.
 #[derive(Debug, Clone, Default)]
 pub(super) struct FrameBuffer {
     frames: VecDeque<BufferedFrame>,
@@ -54,7 +54,7 @@ impl FrameBuffer {
         self.frames.iter().find(|frame| frame.number == number)
     }
 
-    /// The frame to which a result of frame `number` is carried next; `None` if that is the newest, into which every
+    /// The frame to which a result of frame `number` is carried next; `None` if this is the newest, into which every
     /// track is followed.
     pub(super) fn next_after(&self, number: u64, time: Duration) -> Option<&BufferedFrame> {
         let newest = self.newest()?;

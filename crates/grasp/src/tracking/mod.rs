@@ -1,26 +1,25 @@
 //! Parts followed through a sequence of pictures.
 //!
 //! ```text
-//! frame n ─┬─ each track: pose carried forward by its velocity ─ window about it ─ edges ─ score ─ followed or lost
+//! frame n ─┬─ each track: pose carried forward by its velocity ─ window around it  edges ─ score ─ followed or lost
 //!          │                                                                                          ↑
-//!          ├─ now and then: PartSearch, on another core ─ what frame n showed ─ carried forward ──────┤
+//!          ├─ now and then: PartSearch, on another core ─ detections in frame n ─ carried forward ────┤
 //!          │                                              through the frames since, or matched to tracks
-//!          └─ does not follow from frame n - 1: PartSearch, before frame n is answered ───────────────┘
+//!          └─ does not continue frame n - 1: PartSearch, before frame n is answered ──────────────────┘
 //! ```
-//! **Glossary.** *Frame of reference*: the pixels that a model works in, those of the picture or of its plan view.
-//! *Followed*: refined near the last pose, in a window; nothing outside the window is read. *Captured*: the same with a
-//! wider reach, about five times slower. *Held*: left at the pose of the last search, because the part has not moved
-//! since. *Carried forward*: a detection in an older frame, followed through the frames since until it is one of the
-//! newest.
+//! **Glossary.** *Frame of reference*: the pixels in which a model works, of the picture or of its plan view.
+//! *Followed*: refined near the last pose, in a window; nothing outside the window is read. *Captured*: followed with a
+//! wider reach, about five times slower. *Held*: kept at the pose of the last search, because the part has not moved
+//! since. *Carried forward*: a detection in an older frame is followed through the later frames up to the newest.
 //!
-//! A track is scored in every frame by the verdict that scores detections ([`crate::Contributions`]), with one
-//! difference: the comparing network, which takes the most time, is evaluated only when the agreement of edges and
-//! surface has decreased since its last evaluation; searches evaluate it too. A track whose score falls below
-//! [`TrackerConfig::lose_below`] is lost in that frame.
+//! A track is scored in every frame like a detection ([`crate::Contributions`]), with one difference: the comparing
+//! network, which takes the most time, is evaluated only in searches and if the agreement of edges and surface has
+//! changed since its last evaluation, or after a second. A track whose score falls below [`TrackerConfig::lose_below`]
+//! is lost in that frame.
 //!
 //! This module deliberately has no clock and no thread. Frames carry their times, and the owner of the [`Tracker`]
-//! decides where and when searches run, so that the same code runs on two cores, in a browser, and in a test with the
-//! same result on any machine.
+//! decides where and when searches run, so that the same code runs on two cores, in a browser, and, with the same
+//! result on any machine, in a test.
 
 mod arrival;
 mod continuity;
@@ -42,62 +41,62 @@ use crate::plan_view::PlanarPose;
 /// The state of a track.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TrackState {
-    /// It was refined in this frame, and its score is high enough.
+    /// The part was refined in this frame, and its score is high enough.
     Followed,
     /// As `Followed`, for the first time since it was lost: this frame only.
     FoundAgain,
-    /// It is not seen; the detection is the last confirmed one.
+    /// The part is not visible; the detection is the last confirmed one.
     Lost,
 }
 
 /// A part in the newest frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrackedPart {
-    /// Number of the part, which stays the same while it is followed and when it is found again; no other part gets it.
+    /// Number of the part, which is kept while the part is followed and when it is found again; no other part gets it.
     pub id: u64,
     /// Whether the part is at `detection`.
     pub state: TrackState,
-    /// Time since it was first found.
+    /// Time since the part was first found.
     pub age: Duration,
-    /// Time since it was last seen; zero while it is followed.
+    /// Time since the part was last followed; zero while it is.
     pub unseen_for: Duration,
-    /// Its detection, in pixels of the given picture, with its score in this frame; the last one while the part is
-    /// lost.
+    /// The detection in pixels of the given picture, with the score in this frame; the last confirmed detection while
+    /// the part is lost.
     pub detection: GraspDetection,
-    /// In metres, with a calibrated camera.
+    /// The pose in metres, with a calibrated camera.
     pub pose: Option<PlanarPose>,
 }
 
 impl TrackedPart {
-    /// Whether it is seen in this frame.
+    /// Whether the part is followed in this frame.
     pub fn is_followed(&self) -> bool {
         self.state != TrackState::Lost
     }
 }
 
-/// When parts are searched, lost and forgotten.
+/// The conditions under which parts are searched, lost and forgotten.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct TrackerConfig {
-    /// Time from the start of one search to that of the next while all known parts are followed, and the longest time
-    /// between frames that continue each other. As soon as one is lost, or none is known, searches run without a pause.
-    /// Chosen by hand: a new part is found within this and the time of a search.
+    /// Time between the starts of two searches while all known parts are followed, and the maximum time between frames
+    /// that continue each other. If a part is lost or none is known, searches run without a pause. Chosen by hand: a
+    /// new part is found within this time plus that of a search.
     pub search_every: Duration,
-    /// A track with a lower score is lost. It is below 0.5, the threshold for detections, because the part was there in
-    /// the last frame. Chosen by hand.
+    /// A track with a lower score is lost. The value is below 0.5, the threshold for detections, because the part was
+    /// there in the last frame. Chosen by hand.
     pub lose_below: f64,
-    /// Time after its loss during which a part is tried in every frame at the place predicted by its velocity. Chosen
-    /// by hand.
+    /// Time after its loss during which a part is searched in every frame at the place predicted by its velocity.
+    /// Chosen by hand.
     pub retry_for: Duration,
     /// A part lost for longer is forgotten; when found later, it is another part. Chosen by hand.
     pub forget_after: Duration,
-    /// Frames at most this far apart continue each other: an object that moves or covers the part is not distinguished
-    /// from another picture, and the next search finds new parts. For frames further apart, a lost part or a change
-    /// beside the followed parts causes a search before the frame is answered. Chosen by hand: just above the period of
-    /// 30 frames per second. Zero if frames wait for the tracker.
+    /// Maximum time between frames that always continue each other: a lost part or a change beside the followed parts
+    /// counts as a movement, and the next regular search finds new parts. If more time has passed, a lost part or such
+    /// a change causes a search before the frame is answered. Chosen by hand: just above the period of 30 frames per
+    /// second. Zero if frames wait for the tracker.
     pub moves_within: Duration,
-    /// Maximum number of parts that are followed at once. Chosen by hand, for time: each takes some milliseconds per
-    /// frame.
+    /// Maximum number of parts that are followed at the same time. Chosen by hand, for time: each takes some
+    /// milliseconds per frame.
     pub max_parts: usize,
 }
 

@@ -1,4 +1,4 @@
-//! A drawn part that moves, is removed and comes back; searches end some frames after the frame that they read.
+//! A drawn part moves, is removed and returns; a search ends some frames after its frame.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -11,12 +11,14 @@ use crate::drawn_part::{self, at, line};
 use crate::region::SearchRegion;
 
 const SIZE: [u32; 2] = [320, 240];
-/// From one frame to the next.
+/// Time between two frames.
 const PERIOD: Duration = Duration::from_millis(10);
-/// Duration of a search in frames.
+/// Duration of a search, in frames.
 const SEARCH_FRAMES: u64 = 7;
-/// The drawn part is flat and its picture without noise: the remaining error is the raster's.
+/// Maximum error of position: the drawn part is flat and its picture without noise, so that only the raster causes
+/// errors.
 const MAX_ERROR_PX: f64 = 0.5;
+/// Maximum error of the angle, for the same reason.
 const MAX_ERROR_RAD: f64 = 0.01;
 
 fn picture(parts: &[PlanarSimilarity]) -> RgbImage {
@@ -55,7 +57,7 @@ fn assert_at(part: &TrackedPart, pose: &PlanarSimilarity, about: &str) {
 
 #[test]
 fn a_part_is_carried_to_the_newest_frame_followed_lost_and_found_again() {
-    // To the right and turning, absent from frame 30 to 44, then elsewhere, going down.
+    // The part moves to the right and rotates, is absent from frame 30 to 44, then appears elsewhere and moves down.
     let pose = |number: u64| {
         let k = number as f64;
         match number {
@@ -87,7 +89,7 @@ fn a_part_is_carried_to_the_newest_frame_followed_lost_and_found_again() {
     }
 }
 
-/// Feeds pictures; frames that do not continue the last one are searched before they are answered, others never.
+/// Feeds pictures; only frames that do not continue the last one are searched, before they are answered.
 fn run_searching_before_answers(
     tracker: &mut Tracker,
     period: Duration,
@@ -110,7 +112,7 @@ fn run_searching_before_answers(
 fn a_frame_that_does_not_follow_is_answered_by_its_own_search() {
     let [here, there, elsewhere] = [at(80.0, 90.0, 0.0), at(230.0, 160.0, 90.0), at(240.0, 70.0, 200.0)];
     let frames = [vec![here], vec![here], vec![there], vec![], vec![elsewhere], vec![here, elsewhere], vec![elsewhere]];
-    // 10 pictures per second: a new object beside the part means another picture.
+    // At 10 pictures per second, a new object beside the part makes the frame discontinuous.
     let answers = run_searching_before_answers(&mut tracker(), Duration::from_millis(100), &frames);
     let was_searched: Vec<bool> = answers.iter().map(|(was_searched, _)| *was_searched).collect();
     assert_eq!(was_searched, [true, false, true, true, true, true, true]);
@@ -124,7 +126,7 @@ fn a_frame_that_does_not_follow_is_answered_by_its_own_search() {
             assert_at(nearest, pose, &format!("frame {number}"));
         }
     }
-    // At 100 frames per second objects move.
+    // At 100 frames per second, it counts as a movement.
     let answers = run_searching_before_answers(&mut tracker(), PERIOD, &frames);
     let was_searched: Vec<bool> = answers.iter().map(|(was_searched, _)| *was_searched).collect();
     assert_eq!(was_searched, [true, false, false, false, false, false, false]);
@@ -138,8 +140,7 @@ fn a_part_that_lies_still_stays_where_the_search_has_it() {
     let found = &answers[0].1[0].detection;
     for (was_searched, parts) in &answers[1..] {
         let mut followed = parts[0].detection.clone();
-        // A window of the picture is read at other coordinates, so that sums in single precision differ in their last
-        // bits.
+        // A window of the picture has other coordinates, so that sums in single precision differ in their last bits.
         let [seen, searched] = [&followed, found].map(|detection| [detection.agreement.unwrap(), detection.light]);
         assert!((0..2).all(|k| (seen[k] - searched[k]).abs() < 1e-6), "{seen:?} instead of {searched:?}");
         (followed.agreement, followed.light) = (found.agreement, found.light);
@@ -194,14 +195,14 @@ fn the_same_frames_give_the_same_tracks() {
     assert_eq!(one, again);
 }
 
-/// A part that leaves the region is lost there, although it is still in the picture; one that is never in it is never
-/// found.
+/// A part that leaves the region is lost, although it is still in the picture; a part that is never in the region is
+/// never found.
 #[test]
 fn with_a_region_parts_are_followed_in_it_alone() {
     let region = SearchRegion::new([40, 30, 180, 180]);
     let model = drawn_part::model(SIZE).with_region(Some(region)).unwrap();
     let mut tracker = Tracker::new(model.into(), TrackerConfig::default());
-    // To the right, 2 px per frame, and beyond the region.
+    // The part moves to the right by 2 px per frame, and beyond the region.
     let pose = |number: u64| at(110.0 + 2.0 * number as f64, 120.0, 0.0);
     let told = run(&mut tracker, 80, |number| vec![pose(number)]);
     let mut num_followed = 0;

@@ -17,27 +17,30 @@ use crate::sighting::Sighting;
 use crate::verdict::Contributions;
 use crate::verification::PlacedDemonstration;
 
-/// Share of a new measurement in the velocity. Chosen by hand: after a sudden change of direction the start is wrong by
-/// less than three frames' motion.
+/// Weight of a new measurement in the velocity. Chosen by hand: after a sudden change of direction, the expected pose
+/// is wrong by less than three frames' motion.
 const VELOCITY_GAIN: f64 = 0.4;
-/// Share of a new frame in the running means of agreement and size. Chosen by hand.
+/// Weight of a new frame in the running means of agreement and size. Chosen by hand.
 const STEADY_GAIN: f64 = 0.05;
-/// A track is captured once in this many frames: with snapping only, a long part slid along itself by 2 pixels. Chosen
-/// by hand.
+/// A track is captured once in this many frames: with snapping only, the pose of a long part drifted along the part by
+/// 2 pixels. Chosen by hand.
 const CAPTURE_EVERY: u64 = 3;
-/// Longest time over which a pose is carried forward by its velocity. Chosen by hand.
+/// Maximum time over which a pose is carried forward by its velocity. Chosen by hand.
 const MAX_FORWARD_SECS: f64 = 0.1;
-/// If the agreement is below this share of its running mean, refinement is repeated with more effort. Chosen by hand.
+/// If the agreement is below this fraction of its running mean, refinement is repeated with more effort. Chosen by
+/// hand.
 const POOR_SHARE: f64 = 0.85;
-/// Larger differences between a search and the edges alone mean another place, not a correction. In pixels of the
-/// cut-out, and in radians; chosen by hand.
+/// Maximum difference between a search's pose and the pose by edges that is a correction; larger differences indicate
+/// another place. In pixels of the cut-out; chosen by hand.
 const MAX_CORRECTION_PX: f64 = 3.0;
+/// This difference in radians. Chosen by hand.
 const MAX_CORRECTION_RAD: f64 = 0.06;
 /// Minimum gain of agreement for a search's pose to replace the followed one. Chosen by hand.
 const MIN_GAIN: f64 = 0.005;
-/// The comparing network is evaluated again if the agreement is not within this ratio of that at its last evaluation,
-/// and after this time. Chosen by hand: an evaluation takes about as long as following.
+/// The comparing network is evaluated again if the ratio of the agreement to that at its last evaluation is outside
+/// this range. Chosen by hand: an evaluation takes about as long as following.
 const SAME_LOOKS: f64 = 0.85;
+/// The comparing network is evaluated again after this time. Chosen by hand.
 const MAX_LOOK_AGE: Duration = Duration::from_secs(1);
 /// Number of frames whose poses are kept for running searches. Chosen by hand: two seconds at 100 frames per second.
 const MAX_HISTORY: usize = 200;
@@ -46,7 +49,7 @@ const MAX_HISTORY: usize = 200;
 #[derive(Debug, Clone, Copy)]
 struct LastLook {
     look: CloseLook,
-    /// Agreement of edges and surface then.
+    /// Agreement of edges and surface at that time.
     agreement: f64,
     at: Duration,
 }
@@ -59,7 +62,7 @@ struct Still {
     evidence: Contributions,
 }
 
-/// Whether a part is seen.
+/// Whether a part is followed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Standing {
     /// Found by a search of an older frame and carried forward; `replaces` is the track that it corrects.
@@ -67,7 +70,7 @@ pub(super) enum Standing {
         replaces: Option<u64>,
     },
     Followed,
-    /// Since that time.
+    /// The part is lost since this time.
     Lost(Duration),
 }
 
@@ -88,7 +91,7 @@ pub(super) struct Track {
     pub(super) standing: Standing,
     pub(super) first_seen: Duration,
     part: SizedPart,
-    /// The pose by edges in the frame at `time`, the last in which it was seen.
+    /// The pose by edges in the frame at `time`, the last in which the part was followed.
     by_edges: PlanarSimilarity,
     pub(super) time: Duration,
     pub(super) number: u64,
@@ -96,7 +99,7 @@ pub(super) struct Track {
     turn_rad_per_s: f64,
     /// The scale, smoothed over frames.
     steady_scale: f64,
-    /// `None` before the first frame.
+    /// The agreement, smoothed over frames; `None` before the first frame.
     steady_agreement: Option<f64>,
     close: Option<LastLook>,
     /// The position of the marks relative to the outline, as refined by the last search.
@@ -104,17 +107,17 @@ pub(super) struct Track {
     network_score: f64,
     keypoint_scores: Vec<f64>,
     turn_source: TurnSource,
-    /// The offset of the searches' poses from those by edges alone, in the cut-out's frame.
+    /// The offset of the searches' poses from the poses by edges alone, in the cut-out's frame.
     correction: Option<PlanarSimilarity>,
-    /// The more distant pose of the last search; tried in the next frame.
+    /// The pose of the last search if it is too distant for a correction; tried in the next frame.
     alternative: Option<PlanarSimilarity>,
-    /// `None` once it has moved.
+    /// The last search's result; `None` once the part has moved.
     still: Option<Still>,
     history: VecDeque<PastPose>,
 }
 
 impl Track {
-    /// A track from a search's result in a frame; `None` if its demonstration shows nothing to compare at that size.
+    /// A track from a search's result in a frame; `None` if its demonstration has no shape to compare at that size.
     pub(super) fn new(detector: &PartDetector, frame: &BufferedFrame, found: &Found) -> Option<Self> {
         let placement = found.placement.as_ref()?;
         let part = SizedPart::new(detector, placement, detector.frame_size(&frame.picture))?;
@@ -145,7 +148,7 @@ impl Track {
         Some(made)
     }
 
-    /// Uses the pose and the score of a search in that picture for the following frames, until the part moves.
+    /// Uses the pose and the score of a search in `picture` for the following frames, until the part moves.
     pub(super) fn hold(
         &mut self,
         detector: &PartDetector,
@@ -168,7 +171,7 @@ impl Track {
         Some((still.score, still.evidence))
     }
 
-    /// Takes over the measurements that only a search makes: the marks' shift, the network's score, the close look.
+    /// Uses the measurements that only a search makes: the marks' shift, the network's score, the close look.
     pub(super) fn take_over(&mut self, found: &Placement, time: Duration) {
         self.cutout_from_marks = found.image_from_cutout.inverse().compose(&found.image_from_marks);
         self.network_score = found.network_score;
@@ -216,7 +219,8 @@ impl Track {
         moved.compose(&self.by_edges)
     }
 
-    /// Refines the part in a frame, whatever the result; `None` if too little of it lies in the frame.
+    /// Refines the part in a frame, without a decision about the result; `None` if too little of the part lies in the
+    /// frame.
     pub(super) fn refine(
         &mut self,
         detector: &PartDetector,
@@ -246,7 +250,7 @@ impl Track {
         Some(followed)
     }
 
-    /// A close look at the refined pose; a new one only where it may have changed.
+    /// A close look at the refined pose; a new one only if the result may have changed.
     pub(super) fn close_look(
         &mut self,
         detector: &PartDetector,
@@ -277,12 +281,12 @@ impl Track {
         }
     }
 
-    /// ln of its size over the nearest nominal size, smoothed over frames.
+    /// ln of the part's size over the nearest nominal size, smoothed over frames.
     pub(super) fn log_size(&self) -> f64 {
         self.part.log_size(self.steady_scale)
     }
 
-    /// The refinement of the track in a frame, starting from the last one.
+    /// The first effort of refinement in a frame.
     pub(super) fn default_effort(&self, number: u64) -> Effort {
         if (number + self.id).is_multiple_of(CAPTURE_EVERY) { Effort::Captured } else { Effort::Snapped }
     }
@@ -292,7 +296,7 @@ impl Track {
         self.steady_agreement.is_some_and(|steady| followed.agreement < POOR_SHARE * steady)
     }
 
-    /// The place in the form that the verdict judges.
+    /// The place as an input of the verdict.
     pub(super) fn sighting<'a>(
         &self,
         detector: &'a PartDetector,
@@ -344,13 +348,13 @@ impl Track {
         self.history.push_back(PastPose { number, by_edges, image_from_cutout, agreement });
     }
 
-    /// Its pose in a frame, if it was followed there.
+    /// The track's pose in a frame, if it was followed in it.
     pub(super) fn past_pose(&self, number: u64) -> Option<PastPose> {
         let idx = self.history.binary_search_by_key(&number, |past| past.number).ok()?;
         self.history.get(idx).copied()
     }
 
-    /// Continues from another pose of the same part; its number, age and history stay.
+    /// Continues from another pose of the same part; number, age and history are kept.
     pub(super) fn replace_by(&mut self, other: Self) {
         let mut history = std::mem::take(&mut self.history);
         history.retain(|past| other.history.front().is_none_or(|first| past.number < first.number));

@@ -45,7 +45,7 @@ const MAX_CARRY_STEPS: usize = 3;
 ///     for part in parts.iter().filter(|part| part.is_followed()) {
 ///         println!("part {}: ({:.1}, {:.1})", part.id, part.detection.grasp.x, part.detection.grasp.y);
 ///     }
-///     // On another thread, while further frames come in:
+///     // On another thread, while further frames arrive:
 ///     if let Some(search) = tracker.search_due() {
 ///         tracker.take_outcome(search.run())?;
 ///     }
@@ -61,24 +61,24 @@ pub struct Tracker {
     next_number: u64,
     next_id: u64,
     tracks: Vec<Tracked>,
-    /// On their way to the newest frame.
+    /// Tracks that are carried forward to the newest frame.
     arriving: Vec<Track>,
     /// The frame that is being searched.
     searching: Option<u64>,
-    /// When the last search began.
+    /// The time at which the last search began.
     searched_at: Option<Duration>,
     /// The newest frame at low resolution; `None` before the first.
     coarse: Option<CoarseView>,
-    /// The discontinuity of the newest frame, until it was searched.
+    /// The discontinuity of the newest frame, until the frame is searched.
     gap: Option<Gap>,
 }
 
 /// The kind of discontinuity between a frame and the one before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Gap {
-    /// Nothing is known: it is the first frame, or came long after the last.
+    /// The frame is the first, or was taken long after the last.
     Unrelated,
-    /// Other objects are seen, and the parts may have moved.
+    /// Other objects are visible, and the parts may have moved.
     Changed,
 }
 
@@ -99,7 +99,7 @@ struct Refined {
 }
 
 impl Tracker {
-    /// A tracker that knows no part yet.
+    /// A tracker without parts.
     pub fn new(detector: PartDetector, config: TrackerConfig) -> Self {
         Self {
             detector: Arc::new(detector),
@@ -116,11 +116,11 @@ impl Tracker {
         }
     }
 
-    /// Follows all known parts into a frame; returns all of them, lost ones too, in the order in which they were first
-    /// found.
+    /// Follows all known parts into a frame; returns all of them, including lost ones, in the order in which they were
+    /// first found.
     ///
-    /// `captured` is the time since any moment that is the same for all frames of the sequence. Frames of another size
-    /// than the last ones start a new sequence.
+    /// `captured` is the time since a moment that is the same for all frames of the sequence. A frame of another size
+    /// starts a new sequence.
     pub fn frame(&mut self, picture: Arc<RgbImage>, captured: Duration) -> Vec<TrackedPart> {
         if self.frames.newest().is_some_and(|newest| newest.picture.dimensions() != picture.dimensions()) {
             self.restart();
@@ -146,18 +146,18 @@ impl Tracker {
 
     /// The search to be run before the newest frame is answered, because that frame does not continue the one before:
     /// it is the first, a followed part is not at its place, or the picture changed elsewhere, as far as
-    /// [`TrackerConfig::moves_within`] allows this to be detected. [`Self::answer`] takes its result. A running search
-    /// is abandoned.
+    /// [`TrackerConfig::moves_within`] allows this to be detected. Its result goes to [`Self::answer`]. A running
+    /// search is abandoned.
     pub fn search_before_answer(&mut self) -> Option<PartSearch> {
         self.gap?;
         self.search_newest()
     }
 
-    /// Makes the result of [`Self::search_before_answer`] the answer to the newest frame: parts that it did not find
-    /// are lost.
+    /// Makes the result of [`Self::search_before_answer`] the answer to the newest frame: parts that the search did not
+    /// find are lost.
     ///
     /// # Errors
-    /// Those of [`crate::GraspModel::detect`].
+    /// As for [`crate::GraspModel::detect`].
     pub fn answer(&mut self, outcome: SearchOutcome) -> Result<Vec<TrackedPart>> {
         if self.searching != Some(outcome.number) {
             return Ok(self.parts());
@@ -191,8 +191,7 @@ impl Tracker {
         Ok(self.parts())
     }
 
-    /// A search result of the newest frame as a track there, and its reported data; `None` if the camera does not show
-    /// it.
+    /// A detection in the newest frame as a track in it, and the reported data; `None` if the camera does not show it.
     fn arrived(&self, frame: &BufferedFrame, found: &Found) -> Option<(Track, Refined, Shown)> {
         let mut track = Track::new(&self.detector, frame, found)?;
         if let Some((idx, ..)) = self.matched(found, frame.number) {
@@ -205,7 +204,8 @@ impl Tracker {
         Some((track, Refined { followed, close }, shown))
     }
 
-    /// Parts of one sequence have one size, as those of one picture: a look-alike of another size is not a lost part.
+    /// The reference size: parts of one sequence have one size, like parts of one picture, so that a look-alike of
+    /// another size is not a lost part.
     fn log_size(&self) -> Option<f64> {
         self.tracks.first().map(|tracked| tracked.track.log_size())
     }
@@ -255,7 +255,7 @@ impl Tracker {
         has_changed.then_some(Gap::Changed)
     }
 
-    /// The search to be run now, on the newest frame; `None` while one is running and while none is due.
+    /// The search to be run now, on the newest frame; `None` while a search is running or none is due.
     pub fn search_due(&mut self) -> Option<PartSearch> {
         let newest = self.frames.newest()?;
         if self.searching.is_some() {
@@ -278,13 +278,13 @@ impl Tracker {
         Some(PartSearch { number, picture, detector: self.detector.clone() })
     }
 
-    /// Takes the result of a search; it is carried forward while the next frames are followed.
+    /// Takes the result of a search, which is carried forward while the next frames are followed.
     ///
     /// # Errors
-    /// Those of [`crate::GraspModel::detect`].
+    /// As for [`crate::GraspModel::detect`].
     pub fn take_outcome(&mut self, outcome: SearchOutcome) -> Result<()> {
         if self.searching != Some(outcome.number) {
-            // Of a finished sequence.
+            // The search belongs to a finished sequence.
             return Ok(());
         }
         self.searching = None;
@@ -310,7 +310,7 @@ impl Tracker {
         Ok(())
     }
 
-    /// The track that a detection of frame `number` overlaps, and its pose there.
+    /// The track that a detection of frame `number` overlaps, and its pose in that frame.
     fn matched(&self, found: &Found, number: u64) -> Option<(usize, PastPose, Match)> {
         let placement = found.placement.as_ref()?;
         self.tracks.iter().enumerate().find_map(|(idx, tracked)| {
@@ -348,7 +348,7 @@ impl Tracker {
         arrived
     }
 
-    /// Refines all tracks, and then those that arrived, in the newest frame.
+    /// Refines all tracks, and then the arrived ones, in the newest frame.
     fn refine_all(&mut self, picture: &RgbImage, captured: Duration, arrived: &mut [Track]) -> Vec<Option<Refined>> {
         let detector = &*self.detector;
         let retry_for = self.config.retry_for;
@@ -419,7 +419,7 @@ impl Tracker {
         }
     }
 
-    /// Makes an arrived track a followed one: the one that it corrects, a lost one, or a new one.
+    /// Makes an arrived track a followed one: it corrects a track, continues a lost one, or is new.
     fn enter(&mut self, mut track: Track, followed: &Followed, number: u64, captured: Duration, shown: Shown) {
         track.accept(&self.detector, followed, number, captured);
         let lost_nearest = || {
@@ -452,7 +452,7 @@ impl Tracker {
         }
     }
 
-    /// Of two tracks on one part the older one is kept.
+    /// Keeps the older of two tracks on one part.
     fn drop_doubled(&mut self) {
         let mut idx = 1;
         while idx < self.tracks.len() {
@@ -471,7 +471,7 @@ impl Tracker {
     }
 }
 
-/// A detection of the frame of reference in reported form; `None` if the camera does not show it, and outside the
+/// A detection of the frame of reference in reported form; `None` if the camera does not show it or it lies outside the
 /// searched region of the picture.
 fn shown_within(detector: &PartDetector, mut detection: GraspDetection, size: [u32; 2]) -> Option<Shown> {
     detection.bbox = detection.bbox.clip(f64::from(size[0]), f64::from(size[1]));
@@ -506,7 +506,7 @@ impl Tracked {
         self.part.unseen_for = captured.saturating_sub(self.track.time);
     }
 
-    /// Whether it was followed in the frame before.
+    /// Whether the part was followed in the frame before.
     fn was_just_lost(&self, captured: Duration) -> bool {
         self.track.standing == Standing::Lost(captured)
     }

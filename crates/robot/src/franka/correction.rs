@@ -7,24 +7,25 @@ use sdg_kinematics::{JointVector, NUM_JOINTS};
 
 use crate::arm_state::PERIOD_SECS;
 
-/// The shortest correction, s: ten times as long as the command losses for which it must converge; each longer one
-/// takes twice as long.
+/// Duration of the shortest correction, s: ten times as long as the command losses for which it must converge. Longer
+/// corrections double this duration up to [`MAX_DOUBLINGS`] times.
 const SHORTEST_SECS: f64 = 0.2;
 const MAX_DOUBLINGS: i32 = 2;
-/// Largest share of the acceleration and jerk limits used by a correction, in addition to the trajectory (which uses at
-/// most 0.4 and 0.2 of them).
+/// Largest fraction of the acceleration and jerk limits that a correction uses, in addition to the trajectory (which
+/// uses at most 0.4 and 0.2 of them).
 const SHARE: f64 = 0.3;
-/// Number of evenly spaced times at which a correction is compared with these limits.
+/// Number of evenly spaced times at which a correction is compared with the limits.
 const NUM_SAMPLES: u32 = 20;
 
-/// A reference, or the difference of two; derivatives are differences over a cycle, as the robot computes them.
+/// A reference, or the difference between two references. Derivatives are differences over a cycle, as the robot
+/// computes them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Deviation {
-    /// rad.
+    /// Positions, rad.
     pub(super) q: JointVector,
-    /// rad/s.
+    /// Velocities, rad/s.
     pub(super) dq: JointVector,
-    /// rad/s².
+    /// Accelerations, rad/s².
     pub(super) ddq: JointVector,
 }
 
@@ -45,7 +46,7 @@ pub(super) struct Correction {
 }
 
 impl Correction {
-    /// Starts at a deviation; as short as the limits allow.
+    /// Creates the shortest correction of a deviation that the limits allow.
     pub(super) fn new(deviation: Deviation, limits: &Limits) -> Self {
         let lasting = |doublings| Self::lasting(&deviation, SHORTEST_SECS * 2_f64.powi(doublings));
         let longest = lasting(MAX_DOUBLINGS);
@@ -63,7 +64,7 @@ impl Correction {
         Self { coefficients: [c0, c1, c2], duration_secs, num_cycles: 0 }
     }
 
-    /// The deviation after the next cycle; `None` from the end on.
+    /// The deviation after the next cycle; `None` once the correction has ended.
     pub(super) fn next(&mut self) -> Option<JointVector> {
         self.num_cycles += 1;
         let u = f64::from(self.num_cycles) * PERIOD_SECS / self.duration_secs;
@@ -75,7 +76,8 @@ impl Correction {
         (c0 + c1 * u + c2 * (u * u)) * (1.0 - u).powi(3)
     }
 
-    /// Whether acceleration and jerk are small beside the limits; the initial values of a deviation cannot be changed.
+    /// Whether acceleration and jerk are small fractions of the limits; the initial values of a deviation cannot be
+    /// changed.
     fn keeps_to(&self, deviation: &Deviation, limits: &Limits) -> bool {
         let step = 1.0 / f64::from(NUM_SAMPLES);
         let step_secs = step * self.duration_secs;

@@ -4,8 +4,8 @@
 //! robot's time since the last state ─ Playback ─ the trajectory's position at that time ─┐
 //! state: q_d, dq_d, ddq_d ─ difference from the last command, reduced to zero smoothly ──┴ sum ─ rate limit ─ command
 //! ```
-//! A command that comes too late is lost, and the robot continues without it at constant acceleration. The trajectory
-//! continues by the robot's time, and the next command must lead from the robot's position back to the trajectory's
+//! A command that arrives too late is lost, and the robot continues without it at constant acceleration. The trajectory
+//! follows the robot's clock, and the next command must lead from the robot's position back to the trajectory's
 //! position at that time.
 
 use sdg_fci::Limits;
@@ -17,21 +17,21 @@ use super::correction::{Correction, Deviation};
 use crate::arm_state::PERIOD_SECS;
 use crate::playback::Playback;
 
-/// A reference within this of the last command equals that command, rad: version 10 of the protocol has single
-/// precision.
+/// A reference within this distance of the last command counts as equal to it, rad. Version 10 of the protocol has
+/// single precision.
 const SAME_RAD_V5: f64 = 1e-10;
 const SAME_RAD_V10: f64 = 5e-7;
 /// A reference slower than this is at rest, rad/s and rad/s².
 const STANDING_RAD_S: f64 = 1e-4;
 const STANDING_RAD_S2: f64 = 0.05;
-/// Within this distance of the motion's end it has arrived, rad: at the tcp, a hundredth of a millimetre.
+/// A reference within this distance of the motion's end has arrived, rad: a hundredth of a millimetre at the tcp.
 const ARRIVED_RAD: f64 = 1e-5;
-/// A robot that continues for 19 cycles without commands is less than 0.01 rad from its trajectory. A reference further
-/// away is an error of the reported state, and no robot can be led back from there.
+/// Largest credible distance of a reference from the trajectory, rad. A robot that continues for 19 cycles without
+/// commands is less than 0.01 rad from its trajectory, so that a larger distance is an error of the reported state.
 const MAX_DEVIATION_RAD: f64 = 0.1;
-/// A robot that was silent for longer has left the motion.
+/// A robot that sent no state for longer has left the motion.
 const MAX_ELAPSED_MS: u64 = 1000;
-/// Number of cycles after its end at which a motion is finished, for any reported reference.
+/// Number of cycles after its end at which a motion is finished whatever the reported reference is.
 const MAX_CYCLES_AFTER_END: u32 = 2000;
 
 /// A motion's next command.
@@ -88,10 +88,10 @@ impl<'a> Follower<'a> {
         self.num_corrections
     }
 
-    /// The answer to a state that is this many milliseconds younger than the last one (0 for the first).
+    /// The command that answers a state, which is `elapsed_ms` younger than the last one (0 for the first).
     pub(super) fn next(&mut self, state: &RobotState, elapsed_ms: u64) -> Next {
         let mut is_over = false;
-        // The trajectory was evaluated at the time of the cycle after the last state.
+        // The trajectory already stands one cycle after the last state.
         for _ in 1..elapsed_ms.min(MAX_ELAPSED_MS) {
             is_over |= self.advance();
         }
@@ -113,14 +113,14 @@ impl<'a> Follower<'a> {
             self.correction = None;
         }
         let wanted = self.trajectory[0] + offset.unwrap_or_else(JointVector::zeros);
-        // From an impossible reference no limits can be applied; the motion continues unchanged.
+        // The limits are relative to the reference. If that is impossible, the motion continues unchanged.
         let limited = match is_credible {
             true => JointVector::from(limit_joint_positions(self.limits, state, &wanted.into())),
             false => wanted,
         };
         // Rounding does not count as limiting.
         let command = if (limited - wanted).amax() < 1e-12 { wanted } else { limited };
-        // The withheld part appears as a difference in the next cycle.
+        // If the rate limit changed the command, the next cycle must compute a correction.
         self.sent = (command == wanted).then_some(command);
         self.cycles_after_end = if is_over { self.cycles_after_end + 1 } else { 0 };
         let is_standing = reference.dq.amax() < STANDING_RAD_S && reference.ddq.amax() < STANDING_RAD_S2;
@@ -146,7 +146,7 @@ impl<'a> Follower<'a> {
         next.is_none()
     }
 
-    /// The trajectory in the robot's terms: derivatives are differences over a cycle.
+    /// The trajectory as the robot reports its reference: derivatives are differences over a cycle.
     fn on_trajectory(&self) -> Deviation {
         let [q, before, earlier] = self.trajectory;
         let (dq, dq_before) = ((q - before) / PERIOD_SECS, (before - earlier) / PERIOD_SECS);

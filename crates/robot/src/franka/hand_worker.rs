@@ -21,7 +21,7 @@ impl HandWorker {
         Self { stop: hand.stop_handle(), hand: Some(hand), running: None }
     }
 
-    /// Starts a motion, after waiting for a running one.
+    /// Waits for a running motion, then starts another.
     pub(super) fn start(&mut self, command: HandCommand) -> Result<()> {
         self.finish()?;
         let mut hand = self.hand.take().ok_or_else(gone)?;
@@ -36,7 +36,7 @@ impl HandWorker {
         self.running.as_ref().is_some_and(|running| !running.is_finished())
     }
 
-    /// Stops the fingers where they are; a held part stays held.
+    /// Stops moving fingers; a hand at rest keeps holding its part.
     pub(super) fn stop_motion(&self) {
         if self.is_moving() {
             self.stop();
@@ -87,7 +87,7 @@ fn execute(hand: &mut Hand, command: HandCommand) -> Result<()> {
         HandCommand::Grasp { width_m, speed_m_s, force_n } => {
             let [thinner_m, wider_m] = GRASP_TOLERANCE_M;
             let thinner_m = thinner_m.min(width_m - MIN_HELD_WIDTH_M).max(0.0);
-            // Fingers that closed on nothing are not a failure of the hand: its width shows it.
+            // Fingers that closed on nothing are not a failure of the hand: its width shows that.
             hand.grasp(width_m, speed_m_s, force_n, thinner_m, wider_m).map(drop).map_err(failed)
         }
     }

@@ -2,8 +2,8 @@
 //!
 //! ```text
 //! CheckedMotion ─ Playback ─ Follower ─ one joint position a millisecond ─► robot's joint impedance
-//!                    ▲           ▲ where the robot's reference is, after commands that were lost
-//!                    └ Watch sees every state, and may stop the motion on its path
+//!                    ▲           ▲ the robot's reference, which differs after lost commands
+//!                    └ Watch receives every state, and may stop the motion on its path
 //! ```
 //! Tested against the simulated Panda of `sdg-fci`'s server, never on hardware.
 
@@ -34,18 +34,18 @@ use follower::{Follower, Next};
 use hand_worker::HandWorker;
 pub use real_time::{Scheduling, check_real_time};
 
-/// Limits every wait for the robot. A real one stops by itself after 20 ms; a server in lockstep waits a second for a
-/// lost packet and then continues.
+/// Maximum duration of every wait for the robot. A real robot stops by itself after 20 ms; a server in lockstep waits a
+/// second for a lost packet and then continues.
 const TIMEOUT: Duration = Duration::from_secs(3);
 /// External torques (N·m) and forces (N, N·m) at which the arm stops in free motion.
 const FREE_TORQUE_NM: [f64; 7] = [20.0, 20.0, 18.0, 18.0, 16.0, 14.0, 12.0];
 const FREE_FORCE: [f64; 6] = [20.0, 20.0, 20.0, 25.0, 25.0, 25.0];
-/// Twice as much with the part, and where the table may exert forces.
+/// Factor of these thresholds while the hand holds the part, and where the table may exert forces.
 const CONTACT_FACTOR: f64 = 2.0;
 /// Radius of the ball that determines a load's inertia, m.
 const LOAD_RADIUS_M: f64 = 0.03;
 
-/// A Franka arm, connected.
+/// A connected Franka arm.
 #[derive(Debug)]
 pub struct FrankaArm {
     geometry: ArmGeometry,
@@ -60,7 +60,7 @@ impl FrankaArm {
     /// Connects to arm and hand.
     ///
     /// # Errors
-    /// [`RobotError::Unreachable`] if one of them does not answer, [`RobotError::Device`] for another version of the
+    /// [`RobotError::Unreachable`] if arm or hand does not answer, [`RobotError::Device`] for another version of the
     /// protocol, [`RobotError::Configuration`] if the kernel refuses the requested real-time scheduling.
     pub fn connect(address: &RobotAddress, scheduling: Scheduling) -> Result<Self> {
         if scheduling == Scheduling::RealTime {
@@ -75,8 +75,8 @@ impl FrankaArm {
         Ok(Self { geometry, robot, hand, address: address.clone(), scheduling, sensitivity: None })
     }
 
-    /// Refuses a robot of another model than the workcell's file names: the limits for checking motions would belong to
-    /// another robot.
+    /// Rejects a robot whose model differs from the one in the workcell file: motions would be checked against the
+    /// limits of another model.
     ///
     /// # Errors
     /// [`RobotError::Configuration`].
@@ -87,7 +87,7 @@ impl FrankaArm {
         }
         Err(RobotError::Configuration {
             what: "model of the robot".to_owned(),
-            expected: format!("\"{}\", as the workcell's file says", expected.name()),
+            expected: format!("\"{}\", as the workcell file says", expected.name()),
             found: format!("a robot that speaks the protocol of \"{}\" at {}", found.name(), self.address),
         })
     }
@@ -181,7 +181,7 @@ impl FrankaArm {
         }
     }
 
-    /// The next state, after `watch` has seen it.
+    /// The next state, checked by `watch`.
     fn observe(&mut self, watch: &mut Watch) -> Result<ArmState> {
         let state = self.state()?;
         if let Some(reason) = watch.observe(&state) {
@@ -297,7 +297,7 @@ fn arm_state(state: &RobotState) -> ArmState {
     }
 }
 
-/// At what a Franka stops by itself.
+/// The thresholds at which a Franka stops by itself.
 fn collision_behavior(sensitivity: ContactSensitivity) -> CollisionBehavior {
     let factor = match sensitivity {
         ContactSensitivity::Free => 1.0,
@@ -311,7 +311,7 @@ fn collision_behavior(sensitivity: ContactSensitivity) -> CollisionBehavior {
 mod tests {
     use super::*;
 
-    /// Twice as much where contact is wanted, never more.
+    /// The thresholds are doubled where contact is intended, and are never larger.
     #[test]
     fn a_franka_stops_at_20_n_in_free_motion_and_at_40_n_where_it_may_touch() {
         for (sensitivity, max_n, max_nm) in

@@ -5,13 +5,13 @@ use crate::error::{Result, RobotError};
 /// Scheduling of the loop that drives the arm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scheduling {
-    /// As a thread with `SCHED_FIFO`, with priority over everything else on this computer.
+    /// A thread with `SCHED_FIFO`, which has priority over all ordinary threads of this computer.
     RealTime,
-    /// As any other thread: for simulated arms.
+    /// An ordinary thread, for simulated arms.
     Ordinary,
 }
 
-/// Whether the kernel allows this process to run threads with `SCHED_FIFO`; tried in a short thread.
+/// Checks in a short thread whether the kernel allows this process to use `SCHED_FIFO`.
 ///
 /// # Errors
 /// [`RobotError::Configuration`] with the remedy.
@@ -26,7 +26,7 @@ pub(super) fn enter() -> Result<()> {
         RealtimeThreadSchedulePolicy, ThreadPriority, ThreadPriorityValue, ThreadSchedulePolicy,
         set_thread_priority_and_policy, thread_native_id,
     };
-    // No higher priority than that of interrupt threads (50) is needed: the packets come through them.
+    // The priority is below that of interrupt threads (50), because the packets arrive through them.
     const PRIORITY_SHARE: u8 = 40;
     let priority = ThreadPriorityValue::try_from(PRIORITY_SHARE).map_err(refused)?;
     let fifo = ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo);
@@ -34,7 +34,7 @@ pub(super) fn enter() -> Result<()> {
         .map_err(|error| refused(format!("{error:?}")))
 }
 
-/// Other systems have no such scheduling.
+/// Returns an error, because other systems have no `SCHED_FIFO`.
 #[cfg(not(unix))]
 pub(super) fn enter() -> Result<()> {
     Err(refused("a system without it"))

@@ -2,12 +2,13 @@
 //!
 //! ```text
 //! Sighting, Sighting ─ triangulate ─ MeasuredHeight ─┐
-//! --mark-height-mm ─ GivenHeight ─────────────────────┴─ settle ─ the more certain of both; refused where they contradict each other
+//! --mark-height-mm ─ GivenHeight ─────────────────────┴─ settle ─ the more certain of both; an error if they contradict each other
 //! ```
-//! **Frames.** All heights are z of the robot's base, of the plane of the marks. A picture shows a part in an assumed
-//! plane; for another plane, position, size and opening of the part scale about the point vertically below the camera.
+//! **Frames.** All heights are z of the plane of the marks, in the robot's base frame. A picture shows a part in an
+//! assumed plane; for another plane, position, size and opening of the part scale about the point vertically below the
+//! camera.
 //!
-//! Pictures and camera motions are elsewhere (`sequence/measure.rs`).
+//! `sequence/measure.rs` moves the camera and takes the pictures.
 
 mod settle;
 mod sighting;
@@ -22,15 +23,15 @@ pub use triangulation::{HeightError, MIN_BASELINE_M, MeasuredHeight, RELIEF_M, t
 pub struct HeightMeasurement {
     /// Height of the camera above the table for both pictures, m.
     pub camera_height_m: f64,
-    /// Sideways distance of the camera between them, m.
+    /// Sideways distance of the camera between the two pictures, m.
     pub baseline_m: f64,
-    /// Height of the marks over the surface under the part, m.
+    /// Height of the marks above the surface under the part, m.
     pub mark_height_m: f64,
-    /// Height of the grasp over the surface under the part, m.
+    /// Height of the grasp above the surface under the part, m.
     pub grasp_height_m: f64,
-    /// Distance at which a part may be seen above or below its marks, one standard deviation, m.
+    /// Standard deviation of the height of the visible edges above the marks, m.
     pub relief_m: f64,
-    /// The given height of the marks; z of the base.
+    /// The given height of the marks, z of the base frame.
     pub told: Option<GivenHeight>,
 }
 
@@ -38,8 +39,8 @@ impl HeightMeasurement {
     /// Largest height of the camera above the table for both pictures, m.
     pub const MAX_CAMERA_HEIGHT_M: f64 = 0.30;
 
-    /// Two pictures from 0.3 m, 0.12 m apart, of a part with these heights of marks and grasp over the surface under
-    /// it, m.
+    /// A measurement with two pictures from 0.3 m above the table, 0.12 m apart, of a part with these heights of marks
+    /// and grasp above the surface under it, m.
     pub fn new(mark_height_m: f64, grasp_height_m: f64) -> Self {
         Self {
             camera_height_m: Self::MAX_CAMERA_HEIGHT_M,
@@ -51,7 +52,8 @@ impl HeightMeasurement {
         }
     }
 
-    /// The height of the marks from the part itself and from the surface beside it, if both agree.
+    /// Combines the height of the marks measured by the part itself with that measured by the surface beside it. If
+    /// they contradict each other, the height by the part is used.
     pub fn combined(&self, by_part: &MeasuredHeight, surface: &MeasuredHeight) -> MeasuredHeight {
         let on_surface = MeasuredHeight { height_m: surface.height_m + self.mark_height_m, ..*surface };
         on_surface.mean(by_part).unwrap_or(*by_part)
@@ -63,17 +65,17 @@ impl HeightMeasurement {
     }
 }
 
-/// The knowledge of the height after both pictures were taken, or could not be.
+/// The result of a height measurement.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct HeightReport {
     /// The height that the grasp uses.
     pub settled: Option<SettledHeight>,
     /// The measured height: from the lines of sight to the part, and from the surface beside it if it was seen.
     pub measured: Option<MeasuredHeight>,
-    /// The same from the lines of sight alone.
+    /// The height from the lines of sight alone.
     pub by_part: Option<MeasuredHeight>,
     /// The reason why nothing was triangulated.
     pub why_not: Option<String>,
-    /// The contents of the pictures, in their order.
+    /// The part in the pictures, in their order.
     pub sightings: Vec<Sighting>,
 }

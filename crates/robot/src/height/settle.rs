@@ -2,15 +2,15 @@
 
 use super::triangulation::MeasuredHeight;
 
-/// Largest difference of given and measured height, in standard deviations of their difference.
+/// Largest difference between given and measured height, in standard deviations of that difference.
 const MAX_SIGMAS: f64 = 3.0;
 
-/// A given height of the marks; z of the base.
+/// A given height of the marks, z of the base frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GivenHeight {
     /// Height, m.
     pub height_m: f64,
-    /// Its standard deviation, m.
+    /// Standard deviation of the height, m.
     pub sigma_m: f64,
 }
 
@@ -33,22 +33,22 @@ impl HeightSource {
     }
 }
 
-/// The height of the marks that a grasp uses; z of the base.
+/// The height of the marks that a grasp uses, z of the base frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SettledHeight {
     /// Height, m.
     pub height_m: f64,
-    /// Its standard deviation, m.
+    /// Standard deviation of the height, m.
     pub sigma_m: f64,
-    /// Its source.
+    /// Source of the height.
     pub source: HeightSource,
 }
 
 /// The more certain of both heights; the measured one if both are equally certain.
 ///
 /// # Errors
-/// The reason why there is none, in one sentence: both are missing (`why_not` measured), or they differ by more than
-/// three standard deviations.
+/// The reason, in one sentence: both heights are missing (`why_not` says why none was measured), or they differ by more
+/// than three standard deviations.
 pub fn settle(
     told: Option<GivenHeight>,
     measured: Option<MeasuredHeight>,

@@ -1,19 +1,19 @@
-//! The position of a part in a picture from one place.
+//! A part in one picture: its line of sight and its apparent size.
 
 use nalgebra::{Point2, Point3, Vector2};
 
 use crate::grasp_target::GraspTarget;
 
-/// A part in a picture, as if its marks lay in an assumed plane.
+/// A part in a picture, on the assumption that its marks lie in a given plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sighting {
     /// The camera's centre, base frame, m.
     pub camera_m: Point3<f64>,
-    /// The part's centre in the plane, base frame, m; its z is the plane's.
+    /// The part's centre in the plane, base frame, m; z is the height of the plane.
     pub middle_m: Point3<f64>,
     /// Standard deviation of the centre along x and along y, m.
     pub place_sigma_m: f64,
-    /// The part's size in the plane over its own; `None` if that is not known.
+    /// Ratio of the part's apparent size in the plane to its true size; `None` if the true size is not known.
     pub size: Option<f64>,
     /// Standard deviation of the size.
     pub size_sigma: f64,
@@ -27,7 +27,7 @@ impl Sighting {
         self.camera_m.z - self.middle_m.z
     }
 
-    /// Height at which the part has its own size, m.
+    /// Height at which the part's apparent size is its true size, m.
     pub fn height_by_size_m(&self) -> Option<f64> {
         self.size.map(|size| self.camera_m.z - self.distance_m() / size)
     }
@@ -37,12 +37,12 @@ impl Sighting {
         (self.middle_m - self.camera_m).xy() / self.distance_m()
     }
 
-    /// The position of the line of sight at a height, m.
+    /// x and y of the line of sight at a height, base frame, m.
     pub fn middle_at(&self, height_m: f64) -> Point2<f64> {
         self.camera_m.xy() + self.slope() * (self.camera_m.z - height_m)
     }
 
-    /// The same part with its marks at another height, m.
+    /// Moves the part along its line of sight so that its marks are at another height, m.
     pub fn at_height(&self, height_m: f64) -> Self {
         let share = (self.camera_m.z - height_m) / self.distance_m();
         let mut target = self.target;

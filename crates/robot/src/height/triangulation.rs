@@ -4,39 +4,40 @@
 //! height = where the lines of sight come nearest     sigma² = (places' sigmas / difference of the slopes)² + relief²
 //! ```
 //! A slope is the sideways distance of a line of sight per metre downwards: two cameras 0.12 m apart at 0.27 m differ
-//! by 0.44. The relief is unknown from any picture: walls, feet and rims are edges, too, so that a part is seen
-//! slightly above or below its marks, in the same way each time.
+//! by 0.44. The relief cannot be measured in a picture: walls, feet and rims also produce edges, so that a part appears
+//! slightly above or below its marks, by the same distance each time.
 //!
-//! The sizes in both pictures only decide which of several parts is the same one: their errors are larger
-//! (docs/robot-evidence.md).
+//! The sizes in both pictures are used only to match several parts between the pictures, because the errors of a height
+//! from sizes are larger (docs/robot-evidence.md).
 
 use super::sighting::Sighting;
 
 /// Minimum sideways distance of the camera, m.
 pub const MIN_BASELINE_M: f64 = 0.080;
-/// Lines of sight whose slopes differ by less are treated as parallel: 80 mm at 0.8 m.
+/// Minimum difference of the slopes of two lines of sight; with less they count as parallel. The value corresponds to
+/// 80 mm at 0.8 m.
 const MIN_SLOPE_DIFFERENCE: f64 = 0.1;
-/// Largest distance of two lines of sight to one part, in standard deviations and in m: hand-eye calibrations are not
-/// more accurate.
+/// Largest distance between two lines of sight to one part, in standard deviations. At least [`MIN_MISS_ALLOWED_M`] is
+/// allowed, the error of a hand-eye calibration.
 const MAX_MISS_SIGMAS: f64 = 4.0;
 const MIN_MISS_ALLOWED_M: f64 = 0.004;
 /// Minimum distance of a part below the cameras, m.
 const MIN_DISTANCE_M: f64 = 0.05;
 
-/// Distance at which a part may be seen above or below its marks, one standard deviation, m: fitted on the twelve
-/// shipped parts, which by their lines of sight lie 3.2 mm below to 3.9 mm above their marks (`heights raw 4 101`).
+/// Standard deviation of the height of the visible edges above the marks, m: fitted on the twelve shipped parts, which
+/// the lines of sight place 3.2 mm below to 3.9 mm above their marks (`heights raw 4 101`).
 pub const RELIEF_M: f64 = 2.3e-3;
 
-/// The height of a part's marks, z of the base.
+/// The height of a part's marks, z of the base frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeasuredHeight {
     /// Height, m.
     pub height_m: f64,
-    /// Its standard deviation, m.
+    /// Standard deviation of the height, m.
     pub sigma_m: f64,
 }
 
-/// Measurements that differ by more standard deviations belong to different objects.
+/// Largest difference between two measurements of one object, in standard deviations.
 const MAX_APART_SIGMAS: f64 = 4.0;
 
 impl MeasuredHeight {
@@ -54,7 +55,7 @@ impl MeasuredHeight {
 /// The reason why two pictures give no height.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "the messages say what the fields are")]
+#[allow(missing_docs, reason = "the messages explain the fields")]
 pub enum HeightError {
     /// The camera did not move far enough.
     #[error(
@@ -63,10 +64,10 @@ pub enum HeightError {
         .apart_m * 1e3
     )]
     SamePlace { apart_m: f64 },
-    /// Both lines of sight have nearly the same direction.
+    /// The two lines of sight have nearly the same direction.
     #[error("expected lines of sight whose slopes differ by {MIN_SLOPE_DIFFERENCE} or more, found {difference:.3}")]
     Parallel { difference: f64 },
-    /// They cross above a camera, or directly below it.
+    /// The lines of sight cross above a camera, or directly below it.
     #[error(
         "expected a part at least {:.0} mm below the camera, which is {:.0} mm high, found lines of sight that cross at {:.0} mm",
         MIN_DISTANCE_M * 1e3,
@@ -74,7 +75,7 @@ pub enum HeightError {
         .height_m * 1e3
     )]
     BehindCamera { height_m: f64, camera_m: f64 },
-    /// They do not cross: two parts.
+    /// The lines of sight do not cross: they belong to two parts.
     #[error("expected lines of sight that pass each other within {:.1} mm, found {:.1} mm: two parts", .max_m * 1e3, .miss_m * 1e3)]
     OtherPart { miss_m: f64, max_m: f64 },
     /// A number that is not finite or not positive.
@@ -82,10 +83,12 @@ pub enum HeightError {
     NotFinite,
 }
 
-/// Height of the marks of a part from two pictures, with this relief, m.
+/// Height of the marks of a part from two pictures; `relief_m` is the standard deviation of the height of its visible
+/// edges.
 ///
 /// # Errors
-/// [`HeightError`]: pictures from one place, lines of sight that are parallel, cross above a camera or pass each other.
+/// [`HeightError`] for pictures from one place, and for lines of sight that are parallel, cross above a camera or do
+/// not cross.
 pub fn triangulate(one: &Sighting, other: &Sighting, relief_m: f64) -> Result<MeasuredHeight, HeightError> {
     let is_sound = |sighting: &Sighting| {
         let finite = sighting.camera_m.iter().chain(sighting.middle_m.iter()).all(|value| value.is_finite());
@@ -103,7 +106,7 @@ pub fn triangulate(one: &Sighting, other: &Sighting, relief_m: f64) -> Result<Me
     if apart_m < MIN_BASELINE_M {
         return Err(HeightError::SamePlace { apart_m });
     }
-    // A line of sight is at a + b z for a height z.
+    // At a height z, a line of sight is at x and y of a + b z.
     let [b_one, b_other] = [one, other].map(|sighting| -sighting.slope());
     let [a_one, a_other] =
         [(one, b_one), (other, b_other)].map(|(sighting, b)| sighting.middle_m.xy().coords - b * sighting.middle_m.z);
@@ -126,11 +129,11 @@ pub fn triangulate(one: &Sighting, other: &Sighting, relief_m: f64) -> Result<Me
     Ok(MeasuredHeight { height_m: crossing_m, sigma_m: (apart_sigma_m / difference).hypot(relief_m) })
 }
 
-/// The same if each picture shows several parts: uses the pair that is most likely one part. Their order has no
-/// meaning.
+/// Height from two pictures that show several parts, in any order, and the pair of sightings that is most likely one
+/// part; `None` if a picture shows nothing.
 ///
 /// # Errors
-/// That of the best pair if none gives a height.
+/// The error of the first pair if no pair gives a height.
 pub fn triangulate_nearest(
     ones: &[Sighting],
     others: &[Sighting],
@@ -159,11 +162,11 @@ pub fn triangulate_nearest(
     }
 }
 
-/// Standard deviation added to each height from a size, m: for the unknown walls.
+/// Standard deviation added to each height from a size, m, for walls of unknown height.
 const SIZE_LEEWAY_M: f64 = 0.004;
 
-/// The contradiction of a pair, in variances: the distance of the lines of sight, and the difference between the height
-/// from sizes and the height of their crossing.
+/// Squared misfit of a pair, in variances: the distance between the lines of sight, and the difference between the
+/// height from sizes and the height of the crossing.
 fn misfit(one: &Sighting, other: &Sighting, height: &MeasuredHeight) -> f64 {
     let [one, other] = [one, other].map(|sighting| sighting.at_height(height.height_m));
     let miss_m = (one.middle_m - other.middle_m).norm();

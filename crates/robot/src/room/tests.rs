@@ -2,7 +2,7 @@ use super::*;
 use crate::place::{Place, PlaceKind};
 use nalgebra::Point2;
 
-/// The fingers as they release a part, unless stated otherwise.
+/// Opening of the fingers beyond the part for releasing it, m.
 const MARGIN_M: f64 = 0.020;
 
 fn tray(pitch_mm: [f64; 2], yaw_rad: f64) -> Place {
@@ -25,17 +25,17 @@ fn bar() -> PartShape {
 }
 
 fn check(pitch_mm: [f64; 2], part: &PartShape, symmetry: RotationalSymmetry) -> Result<()> {
-    // At the centre, and turned: the tray's own axes count.
+    // A cell in the centre of a rotated tray: the tray's own axes count.
     tray(pitch_mm, 0.7).goal(6).unwrap().check_room(part, symmetry, MARGIN_M)
 }
 
 #[test]
 fn across_the_marked_line_fingers_need_room_for_themselves() {
-    // Half of 20 mm, 10 mm opened, 15 mm of finger, 2 mm, and half of the next: 47 mm.
+    // Half of 20 mm, 10 mm of opening, 15 mm of finger, 2 mm, and half of the next part: 47 mm.
     check([100.0, 47.0], &bar(), RotationalSymmetry::None).unwrap();
     let found = check([100.0, 46.0], &bar(), RotationalSymmetry::None).unwrap_err().to_string();
     let expected = "\"tray, cell 6\": expected a pitch of 100 x 47 mm, found 100 x 46 mm: the part is 20 mm wide \
-                    between the fingers; 15 mm thick and open to 40 mm to let it go, they come within 1.0 mm of a \
+                    between the fingers; 15 mm thick and open to 40 mm to release it, they come within 1.0 mm of a \
                     part in a neighbouring cell and at least 2 mm are required";
     assert_eq!(found, expected);
 }
@@ -46,7 +46,7 @@ fn parts_themselves_need_room() {
     let found = check([93.0, 60.0], &bar(), RotationalSymmetry::None).unwrap_err().to_string();
     assert!(found.contains("expected a pitch of 94 x 60 mm, found 93 x 60 mm"), "{found}");
     assert!(found.contains("parts in neighbouring cells are 3.0 mm apart, at least 4 mm are required"), "{found}");
-    // Too narrow along both.
+    // Too narrow along both axes.
     let found = check([80.0, 15.0], &bar(), RotationalSymmetry::None).unwrap_err().to_string();
     assert!(found.contains("expected a pitch of 94 x 47 mm, found 80 x 15 mm"), "{found}");
     assert!(found.contains("overlap by 10.0 mm"), "{found}");
@@ -62,7 +62,7 @@ fn a_round_part_is_let_go_where_there_is_room() {
     check(narrow, &disc(0.052), RotationalSymmetry::Fold(4)).unwrap();
     let goal = tray(narrow, 0.0).goal(6).unwrap();
     let turns = vec![0.0, 0.25 * TAU, 0.5 * TAU, 0.75 * TAU];
-    // Fingers along the rows, not across them.
+    // The fingers must lie along the rows, not across them.
     let kept = goal.with_room_for_fingers(&disc(0.052), 0.072, turns, |&turn_rad| goal.base_from_part(0.0, turn_rad));
     assert_eq!(kept, [0.25 * TAU, 0.75 * TAU]);
     // 60 mm along both axes: only the diagonals have room.
@@ -89,7 +89,7 @@ fn a_tall_part_meets_the_thicker_root_of_the_fingers() {
 fn alone_there_is_always_room() {
     let single = Place { kind: PlaceKind::Pose, ..tray([1.0, 1.0], 0.0) };
     single.goal(1).unwrap().check_room(&disc(0.07), RotationalSymmetry::None, MARGIN_M).unwrap();
-    // A row: it has no neighbours across.
+    // A single row has no neighbours across.
     let kind = PlaceKind::Tray { cells: [3, 1], pitch_m: [0.1, 0.01] };
     Place { kind, ..single }.goal(2).unwrap().check_room(&bar(), RotationalSymmetry::None, MARGIN_M).unwrap();
 }
@@ -101,7 +101,7 @@ fn gaps_of_polygons() {
     };
     let gap = |x: f64, y: f64| gap_m(&square(0.0, 0.0), &square(x, y));
     assert!((gap(3.0, 0.5) - 2.0).abs() < 1e-12);
-    // From corner to corner.
+    // Distance from corner to corner.
     assert!((gap(4.0, 5.0) - 5.0).abs() < 1e-12);
     assert!((gap(0.75, 0.5) + 0.25).abs() < 1e-12);
 }

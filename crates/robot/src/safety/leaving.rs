@@ -7,28 +7,28 @@ use super::limits::{CheckedMotion, SafetyLimits};
 use super::violation::Violation;
 use crate::arm_state::PERIOD_SECS;
 
-/// A straight path in joint space is curved, and the reference may be lower than the measured position, m: differences
-/// up to this do not count as moving lower.
+/// Largest descent that does not count as moving lower, m: a straight path in joint space is curved, and the reference
+/// may be lower than the measured position.
 const ASCENT_TOLERANCE_M: f64 = 0.5e-3;
-/// Largest distance of the reference below the measured tcp for an arm that rests on something, m.
+/// Largest distance of the reference below the measured tcp while the arm rests on an object, m.
 const BELOW_MEASURED_M: f64 = 1e-3;
 /// Largest sideways distance of a compliant tcp from the descent, m: joint friction and contact forces push it.
 const MAX_DESCENT_OFFSET_M: f64 = 5e-3;
 /// Largest sideways distance of the hand from its contact position until it is as high as the limits require, m.
 const MAX_ASCENT_OFFSET_M: f64 = 1e-3;
 
-/// The position of a hand that came straight down by contact, and so may be lower than the limits allow.
+/// Position of a hand that came straight down to a contact and may therefore be lower than the limits allow.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct FeltBelow {
     /// x and y of the tcp on the descent, base frame, m.
     at_m: [f64; 2],
-    /// The lowest z of the tcp there, m.
+    /// The lowest allowed z of the tcp on the descent, base frame, m.
     lowest_m: f64,
     /// Distance below the limits that was allowed for the descent, m.
     below_limits_m: f64,
 }
 
-/// The limits of a motion from a configuration: unchanged, or lower for a hand that leaves a contact.
+/// The limits of a motion from a configuration: unchanged, or lowered for a hand that leaves a contact.
 #[derive(Debug)]
 pub(crate) struct LimitsFrom<'l> {
     limits: &'l SafetyLimits,
@@ -37,8 +37,8 @@ pub(crate) struct LimitsFrom<'l> {
 }
 
 impl FeltBelow {
-    /// After a straight descent from a tcp at `from` (base frame, m) that ended at z `lowest_m`; the path was checked
-    /// against limits lowered by this distance.
+    /// Stores a straight descent from a tcp at `from` (base frame, m) to z `lowest_m`. `below_limits_m` is the distance
+    /// by which the limits were lowered for checking that descent.
     pub(crate) fn new(from: &Vector3<f64>, lowest_m: f64, below_limits_m: f64) -> Self {
         Self { at_m: [from.x, from.y], lowest_m: lowest_m - BELOW_MEASURED_M, below_limits_m }
     }
@@ -69,7 +69,7 @@ impl SafetyLimits {
             let floor_m = self.workspace.map_or(0.0, |workspace| workspace.min_m.z - tcp.z);
             let deepest_m = table_m.max(floor_m);
             let is_below = deepest_m > 0.0 && deepest_m <= felt.below_limits_m + ASCENT_TOLERANCE_M;
-            // Each is lowered only as far as necessary.
+            // Table and workspace are lowered only as far as necessary.
             let lower_m = |needed_m: f64| if needed_m > 0.0 { needed_m + ASCENT_TOLERANCE_M } else { 0.0 };
             (is_below && felt.is_here(&tcp)).then(|| self.lowered(lower_m(table_m), lower_m(floor_m)))
         });

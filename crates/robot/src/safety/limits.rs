@@ -35,21 +35,21 @@ pub struct SafetyLimits {
     pub min_table_clearance_m: f64,
     /// Minimum distance between two of the arm's own bodies, m.
     pub min_self_distance_m: f64,
-    /// The robot's own limits for its client, for the velocities that decrease near the ends of an FR3's joints.
+    /// The limits that the robot applies to its client: an FR3's velocity limits decrease near the ends of the joints.
     pub robot: Option<&'static Limits>,
     /// The arm.
     pub geometry: ArmGeometry,
 }
 
 impl Default for SafetyLimits {
-    /// The Panda's limits over a table at the base's height.
+    /// The Panda's limits above a table at the height of the base.
     fn default() -> Self {
         Self { robot: Some(&Limits::PANDA), ..Self::of(ArmGeometry::panda()) }
     }
 }
 
 impl SafetyLimits {
-    /// The limits of an arm over a table at the base's height.
+    /// The limits of an arm above a table at the height of the base.
     pub fn of(geometry: ArmGeometry) -> Self {
         Self {
             joints: geometry.limits.clone(),
@@ -64,7 +64,7 @@ impl SafetyLimits {
         }
     }
 
-    /// The FR3's limits over a table at the base's height. The tcp has the speed limit of a Panda's.
+    /// The FR3's limits above a table at the height of the base. The tcp has the same speed limit as a Panda's.
     pub fn fr3() -> Self {
         Self { robot: Some(&Limits::FR3), ..Self::of(ArmGeometry::fr3()) }
     }
@@ -77,17 +77,17 @@ pub struct CheckedMotion {
 }
 
 impl CheckedMotion {
-    /// Its duration, s.
+    /// Duration of the motion, s.
     pub fn duration_secs(&self) -> f64 {
         self.trajectory.duration_secs()
     }
 
-    /// Its start, rad.
+    /// Joint positions at the start, rad.
     pub fn start(&self) -> &JointVector {
         self.trajectory.start()
     }
 
-    /// Its end, rad.
+    /// Joint positions at the end, rad.
     pub fn end(&self) -> &JointVector {
         self.trajectory.end()
     }
@@ -98,7 +98,8 @@ impl CheckedMotion {
     }
 }
 
-/// Planned motions reach their limits exactly: rounding, and differences over a cycle, are not violations.
+/// Relative tolerance: planned motions reach their limits exactly, and rounding and differences over a cycle exceed
+/// them slightly.
 const ROUNDING: f64 = 1e-3;
 
 impl SafetyLimits {
@@ -222,17 +223,17 @@ impl SafetyLimits {
     }
 }
 
-/// The values that the next cycle is compared with.
+/// Values of the last cycle, from which the derivatives of the next one are computed.
 #[derive(Debug, Default)]
 struct Derivatives {
     ddq: Option<JointVector>,
-    /// Of the tcp: linear in m/s, angular in rad/s.
+    /// Twist of the tcp, linear in m/s, angular in rad/s.
     twist: Option<Vector6<f64>>,
     acceleration: Option<Vector6<f64>>,
 }
 
 impl Derivatives {
-    /// The joints' limits of this one with the tcp's limits of another.
+    /// The joints' values of `self` with the tcp's values of `other`.
     fn cartesian_of(self, other: &Self) -> Self {
         Self { twist: other.twist, acceleration: other.acceleration, ..self }
     }

@@ -2,11 +2,12 @@
 //!
 //! ```text
 //! Trajectory ── SafetyLimits::check ──► CheckedMotion ── Arm::follow
-//!                     └─ Violation: which limit, when, by how much; nothing moves
+//!                     └─ Violation: the limit, the time and the value; nothing moves
 //! ```
 //! The whole motion is checked before it starts, at every millisecond: joint limits, the tcp's limits, the workspace,
-//! the table, the arm against itself. These limits are no safety function in the sense of a standard: they do not cover
-//! people, obstacles in the cell, or faults of lower layers. An emergency stop remains required.
+//! the distance from the table, and the distances between the arm's bodies. These limits are not a safety function in
+//! the sense of a standard: they do not cover people, obstacles in the cell, or faults of lower layers. An emergency
+//! stop remains required.
 
 mod leaving;
 mod limits;

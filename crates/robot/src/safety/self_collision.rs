@@ -1,7 +1,7 @@
-//! Whether the arm comes close to itself.
+//! Minimum distance between the arm's own bodies.
 //!
 //! Each capsule contains the whole shape of its link with some margin, so that links with separate capsules are
-//! separate. They are fewer and wider than those of [`sdg_kinematics::collision`].
+//! separate. The capsules are fewer and wider than those of [`sdg_kinematics::collision`].
 
 use std::fmt;
 
@@ -20,7 +20,7 @@ const NAMES: [&str; NUM_BODIES] =
 pub struct SelfCollision {
     /// The bodies' names.
     pub bodies: [&'static str; 2],
-    /// Distance of their capsules, m; negative where these overlap.
+    /// Distance between the capsules of the two bodies, m; negative if they overlap.
     pub distance_m: f64,
     /// The smallest allowed distance, m.
     pub min_m: f64,
@@ -34,7 +34,7 @@ impl fmt::Display for SelfCollision {
     }
 }
 
-/// The closest two bodies, if their distance is below `min_m`, by the wide capsules of an arm.
+/// The closest two bodies, by the wide capsules of the arm, if their distance is below `min_m`.
 pub(super) fn self_collision(arm: &ArmGeometry, frames: &Frames, min_m: f64) -> Option<SelfCollision> {
     let placed: [Vec<Capsule>; NUM_BODIES] = std::array::from_fn(|body| {
         let (capsules, base_from_body) = match body {
@@ -79,8 +79,8 @@ mod tests {
         println!("{found}");
     }
 
-    /// Few configurations of the whole joint range are refused, and no pair always: the capsules are small enough to
-    /// allow all normal motions.
+    /// Only few configurations of the whole joint range are refused, and no pair of bodies is refused in all of them:
+    /// the capsules are small enough for all normal motions.
     #[test]
     fn no_pair_is_always_refused() {
         let panda = ArmGeometry::panda();

@@ -5,7 +5,7 @@ use crate::safety::self_collision::SelfCollision;
 /// The first limit that a motion violates; times in seconds from the motion's start.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "the messages say what the fields are")]
+#[allow(missing_docs, reason = "the messages explain the fields")]
 pub enum Violation {
     /// The motion does not start at the arm's position.
     #[error("it starts {apart_rad:.3} rad from the position of joint {joint}, at most {max_rad:.3} are allowed")]
@@ -45,7 +45,7 @@ pub enum Violation {
         quantity: &'static str,
         found: f64,
         max: f64,
-        /// m or rad, and their derivatives.
+        /// Unit of the values: m or rad, or a derivative of them.
         unit: &'static str,
     },
     /// The hand leaves the workspace.

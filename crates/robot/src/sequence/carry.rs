@@ -1,5 +1,5 @@
-//! Carries the held part over its place, at a turn at which its fingers have room and the compliant descent is
-//! possible.
+//! Carries the held part to above its place, in an orientation in which the fingers have room and the compliant descent
+//! is possible.
 
 use nalgebra::Isometry3;
 use sdg_geometry::RotationalSymmetry;
@@ -16,9 +16,9 @@ use crate::surroundings::{Destination, Way};
 
 /// Heights above a place at which a straight descent to it starts, m.
 const HEIGHTS_M: [f64; 3] = [0.20, 0.15, 0.10];
-/// A compliant descent starts this far above the expected contact, m.
+/// Height above the expected contact at which the compliant descent starts, m.
 pub(super) const SOFT_WAY_M: f64 = 0.015;
-/// It ends this far below, m.
+/// Distance below the expected contact at which the compliant descent ends, m.
 pub(super) const BELOW_M: f64 = 0.010;
 
 /// The goal of the part, and the tcp before the compliant descent.
@@ -35,8 +35,8 @@ enum Carried {
 }
 
 impl<A: Arm> Sequence<'_, '_, A> {
-    /// Carries the part over its place, down to the start of a compliant descent, at a turn at which the fingers have
-    /// room at this opening, m.
+    /// Carries the part to above its place, down to the start of the compliant descent, in an orientation in which the
+    /// fingers have room at this opening (m).
     pub(super) fn carry(
         &mut self,
         goal: &PlaceGoal,
@@ -46,7 +46,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
     ) -> Steps<Aim> {
         let held =
             self.known.held.clone().ok_or_else(|| Stop::Failed(GraspStep::Carry, "nothing is held".to_owned()))?;
-        // If the hand cannot open there, it need not come down.
+        // The hand opens at the place, so that the straight path is planned for the open hand.
         self.known.opening_m = opening_m;
         let mut aims: Vec<Aim> = same_turns_rad(symmetry)
             .into_iter()
@@ -80,7 +80,8 @@ impl<A: Arm> Sequence<'_, '_, A> {
                     Carried::Around(way) => way.approach.as_ref().map(|path| *path.end()),
                     Carried::Straight(approach) => Some(*approach.path.end()),
                 };
-                // A joint limit may end the descent before the contact; at another turn of the part it may not.
+                // A joint limit may end the descent before the contact in one orientation of the part and not in
+                // another.
                 if let Err(because) = end.map_or(Ok(()), |end| self.goes_on_down(&end)) {
                     why.get_or_insert(because);
                     continue;
@@ -94,7 +95,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         Err(Stop::Failed(GraspStep::Carry, format!("no path to \"{}\" at ({x:.2}, {y:.2}) m: {why}", goal.name)))
     }
 
-    /// The path to above one of the aims, and which; else the reason why there is none.
+    /// The path to above one of the aims, with the index of that aim; otherwise the reason why there is none.
     fn way_above(&mut self, aims: &[Aim], height_m: f64) -> Steps<Result<(usize, Carried), String>> {
         let poses: Vec<Isometry3<f64>> = aims.iter().map(|aim| aim.base_from_tcp).collect();
         if !self.is_surrounded() {
@@ -108,7 +109,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         }
     }
 
-    /// Above the pose that the arm reaches best, with a straight path down to it.
+    /// The straight path down to the pose that the arm reaches at the lowest cost, with the index of that pose.
     fn straight_down(&mut self, poses: &[Isometry3<f64>], height_m: f64) -> Steps<Result<(usize, Approach), String>> {
         let seed = self.robot.commanded()?;
         let mut best: Option<(usize, Approach)> = None;
@@ -128,7 +129,8 @@ impl<A: Arm> Sequence<'_, '_, A> {
         Ok(best.ok_or(why))
     }
 
-    /// Whether the arm can descend from a configuration to the lowest possible contact; else the reason.
+    /// Checks that the arm can descend from a configuration to the lowest possible contact; otherwise returns the
+    /// reason.
     fn goes_on_down(&self, from: &JointVector) -> Result<(), String> {
         let arm = self.robot.geometry();
         let lowest = above(&arm.forward(from), -(SOFT_WAY_M + BELOW_M));

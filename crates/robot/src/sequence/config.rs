@@ -13,34 +13,35 @@ use crate::pace::Pace;
 use crate::part_shape::PartShape;
 use crate::touch::TouchDown;
 
-/// Default centre of the first look on the table, base frame, m.
+/// Default centre of the first picture on the table, base frame, m.
 pub const LOOK_AT_M: [f64; 2] = [0.48, 0.0];
-/// Default height of a wrist camera above the table at every look, m: that of the shipped demonstrations, so that a
+/// Default height of a wrist camera above the table for every picture, m: that of the shipped demonstrations, so that a
 /// part has the same size in all pictures.
 pub const LOOK_HEIGHT_M: f64 = 0.58;
 
 /// A pose of the arm for finding the part.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum LookOut {
-    /// The camera on the hand looks vertically down.
+    /// The camera on the hand points vertically down.
     CameraAt {
         /// x and y of the camera in the base frame, m.
         at_m: [f64; 2],
         /// Height above the table, m.
         height_m: f64,
-        /// Turn about the vertical, rad; see [`camera_looking_down`].
+        /// Rotation about the vertical, rad; see [`camera_looking_down`].
         yaw_rad: f64,
     },
-    /// The arm is in a configuration, rad: for a camera beside the robot, outside its view.
+    /// A configuration of the arm, rad: for a camera beside the robot, one outside the camera's view.
     Joints(JointVector),
 }
 
 /// The poses of the sequence, its grasp, and its speeds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GraspConfig {
-    /// The poses at which the arm looks, one after the other, until the part is found. The first must be reachable.
+    /// The poses at which pictures are taken, one after the other, until the part is found. The first must be
+    /// reachable.
     pub look_outs: Vec<LookOut>,
-    /// Height of the wrist camera above the table at the second look, m; best equal to that of the demonstration's
+    /// Height of the wrist camera above the table for the second picture, m; best equal to that of the demonstration's
     /// photo.
     pub hover_height_m: f64,
     /// Force of each finger when closed, N.
@@ -65,11 +66,12 @@ pub struct GraspConfig {
     pub height: Option<HeightMeasurement>,
     /// Obstacles in the cell besides the table: free motions are planned around them.
     pub obstacles: Vec<Obstacle>,
-    /// Radius of the part around its grasp, m: it is also kept away from the obstacles.
+    /// Radius of the part around its grasp, m: the part is also kept away from the obstacles.
     pub part_radius_m: f64,
-    /// Its known shape, by which its room among others is judged; otherwise only its width between the fingers is used.
+    /// The known shape of the part, for its distance from other parts; with `None` only its width between the fingers
+    /// is used.
     pub part: Option<PartShape>,
-    /// Parts lying in the cell that must not be touched, as far as they are known before a picture is taken.
+    /// Parts lying in the cell that are known before a picture is taken and must not be touched.
     pub lying: Vec<LyingPart>,
     /// Speed of the motions.
     pub pace: Pace,
@@ -105,11 +107,10 @@ impl Default for GraspConfig {
 }
 
 impl LookOut {
-    /// The arm's configuration there, rad.
+    /// The arm's configuration at the look-out pose, rad.
     ///
     /// # Errors
-    /// [`RobotError::Configuration`] for an unreachable place, or for a camera that is to be moved but is not on the
-    /// hand.
+    /// [`RobotError::Configuration`] for an unreachable pose, and for a camera pose if the camera is not on the hand.
     pub fn configuration(&self, arm: &ArmGeometry, camera: &CameraPose, table_height_m: f64) -> Result<JointVector> {
         let (at_m, height_m, yaw_rad) = match (*self, camera) {
             (Self::Joints(q), _) => return Ok(q),
@@ -117,8 +118,8 @@ impl LookOut {
             (Self::CameraAt { .. }, CameraPose::InBase(_)) => {
                 return Err(RobotError::Configuration {
                     what: "look-out pose".into(),
-                    expected: "joint angles, with a camera that stands beside the robot".into(),
-                    found: "a place for the camera".into(),
+                    expected: "joint angles, since the camera is beside the robot".into(),
+                    found: "a pose of the camera".into(),
                 });
             }
         };
@@ -134,8 +135,9 @@ impl LookOut {
     }
 }
 
-/// A camera pose straight down from `height_m`, over (x, y), base frame: with yaw 0 the picture's up direction is the
-/// base's x and its right direction is -y; a positive yaw turns it counter-clockwise as seen from above.
+/// The pose of a camera at (x, y, `height_m`) in the base frame that points straight down. At yaw 0 the picture's up
+/// direction is the base's x and its right direction is -y; a positive yaw rotates it counter-clockwise as seen from
+/// above.
 pub fn camera_looking_down(x: f64, y: f64, height_m: f64, yaw_rad: f64) -> Isometry3<f64> {
     // Columns: the optical frame's x (right), y (down), z (forward) in the base frame.
     let at_yaw_zero = Matrix3::from_columns(&[-Vector3::y(), -Vector3::x(), -Vector3::z()]);
@@ -169,6 +171,6 @@ mod tests {
             "{found}"
         );
         let found = far.configuration(&panda, &CameraPose::InBase(Isometry3::identity()), 0.0).unwrap_err().to_string();
-        assert!(found.contains("joint angles, with a camera that stands beside the robot"), "{found}");
+        assert!(found.contains("joint angles, since the camera is beside the robot"), "{found}");
     }
 }

@@ -18,9 +18,9 @@ use crate::perception::GraspStep;
 const CLOSING_SPEED_M_S: f64 = 0.1;
 /// Steps by which a lift is shortened if the arm cannot reach so far, m.
 const LIFT_STEP_M: f64 = 0.05;
-/// Distance from the obstacles of the cell on straight motions, m.
+/// Minimum distance from the obstacles of the cell on straight motions, m.
 const LINE_MARGIN_M: f64 = 0.003;
-/// Fingers that moved by more since they closed have lost the part, m.
+/// Largest change of the fingers' opening since they closed, m; a larger one means that the part is lost.
 const MAX_WIDTH_CHANGE_M: f64 = 0.005;
 
 impl<A: Arm> Sequence<'_, '_, A> {
@@ -64,7 +64,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         self.judge(GraspStep::Lift, &hand)
     }
 
-    /// A straight motion without obstacles; else the reason why there is none.
+    /// A straight motion free of obstacles; otherwise the reason why there is none.
     pub(super) fn free_line(
         &self,
         start: &JointVector,
@@ -93,11 +93,11 @@ impl<A: Arm> Sequence<'_, '_, A> {
         self.judge(GraspStep::Hold, &hand)
     }
 
-    /// Whether the part is held: by the observer, who may know more, then by the hand.
+    /// Fails the step if the part is not held, by the observer's verdict first, then by the hand's.
     pub(super) fn judge(&mut self, step: GraspStep, hand: &HandState) -> Steps<()> {
         let by_hand = held(&self.known.closed.unwrap_or(*hand), hand);
         if by_hand.is_err() && self.known.held.take().is_some() && self.cell.config.load.is_some() {
-            // The controller must not compensate a lost load.
+            // The controller must not compensate a load that was lost.
             self.robot.set_load(Load::NONE)?;
         }
         self.report.hand_verdicts.push((step, by_hand.clone().err()));
@@ -106,7 +106,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
     }
 }
 
-/// Whether the hand still holds the part on which it closed; else the reason.
+/// Checks that the hand still holds the part on which it closed; otherwise returns the reason.
 fn held(closed: &HandState, now: &HandState) -> Result<(), String> {
     let [closed_mm, now_mm] = [closed.opening_m * 1e3, now.opening_m * 1e3];
     if closed.opening_m < MIN_HELD_WIDTH_M {

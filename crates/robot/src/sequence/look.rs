@@ -1,4 +1,4 @@
-//! Looks: from a distance, and from above a detection.
+//! Pictures from the look-out poses, and from above a detection.
 
 use nalgebra::{Isometry3, Vector3};
 use sdg_kinematics::{IkOptions, IkSolution, KinematicsError, with_fingers_exchanged};
@@ -15,12 +15,12 @@ use crate::surroundings::Destination;
 pub(super) const HOVER_SHIFTS_M: [[f64; 2]; 3] = [[0.0, 0.0], [-0.03, 0.03], [0.03, -0.03]];
 /// Score threshold of perception.
 pub const SURE: f64 = 0.5;
-/// A detection within this many metres and radians of the first look's part is accepted at a lower score.
+/// Score threshold of a detection that confirms the first one, that is, within [`CONFIRMING_TOLERANCE`] (m, rad) of it.
 pub const MIN_CONFIRMING_SCORE: f64 = 0.2;
 const CONFIRMING_TOLERANCE: (f64, f64) = (0.015, 0.26);
 
 impl<A: Arm> Sequence<'_, '_, A> {
-    /// Looks from one pose after the other until the part is found.
+    /// Takes pictures from one look-out pose after the other until the part is found.
     pub(super) fn look_around(&mut self) -> Steps<GraspTarget> {
         let config = self.cell.config;
         let table_height_m = self.robot.limits().table_height_m;
@@ -45,7 +45,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         Err(Stop::Failed(GraspStep::Detect, format!("the part was not found in {looks} looks")))
     }
 
-    /// Looks again from above the first look's detection: errors are smaller near the centre of the picture.
+    /// Takes a picture from above the first detection: errors are smaller near the centre of the picture.
     pub(super) fn look_from_above(&mut self, first: &GraspTarget) -> Steps<GraspTarget> {
         let mut looks = 0;
         for shift_m in HOVER_SHIFTS_M {
@@ -62,7 +62,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         Err(Stop::Failed(GraspStep::Detect, format!("the part was not found in {looks} looks from above it")))
     }
 
-    /// Takes a picture and evaluates it; a target that no hand can take is a failure.
+    /// Takes a picture and returns its accepted detection; a target that the hand cannot grasp is a failure.
     fn find(&mut self, is_accepted: impl Fn(&GraspTarget) -> bool) -> Steps<Option<GraspTarget>> {
         let target = self.finder.find(self.robot.arm())?.filter(is_accepted);
         self.note_others();
@@ -85,7 +85,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         Ok(Some(found))
     }
 
-    /// Stores the positions of other parts from the last picture.
+    /// Stores the positions of the other parts in the last picture.
     pub(super) fn note_others(&mut self) {
         let table_height_m = self.robot.limits().table_height_m;
         for other in self.finder.others() {
@@ -95,7 +95,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         }
     }
 
-    /// Refuses to start a motion that depends on an old picture.
+    /// Fails if the picture on which the next motion depends is too old.
     pub(super) fn check_age(&mut self) -> Steps<()> {
         let Some(taken) = self.known.picture_time.take() else { return Ok(()) };
         let (age_secs, max_secs) = (taken.elapsed().as_secs_f64(), self.cell.config.max_detection_age_secs);
@@ -110,13 +110,13 @@ impl<A: Arm> Sequence<'_, '_, A> {
         ))
     }
 
-    /// Moves the camera over a grasp or a point beside it, the hand turned as for one of the grasps, which are at one
-    /// place, or by half a turn more.
+    /// Moves the camera to above a grasp, shifted by `shift_m`. All grasps are at one place; the hand gets the
+    /// orientation of one of them, or the opposite one.
     pub(super) fn hover(&mut self, grasps: &[Isometry3<f64>], shift_m: [f64; 2], step: GraspStep) -> Steps<()> {
         self.look_down(grasps, shift_m, self.cell.config.hover_height_m, step)
     }
 
-    /// The same at another height above the table.
+    /// As [`Self::hover`], at another height above the table.
     pub(super) fn look_down(
         &mut self,
         grasps: &[Isometry3<f64>],
@@ -167,7 +167,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
     }
 }
 
-/// Whether a second look sees the part of the first one.
+/// Whether a second detection confirms the first one.
 fn confirms(first: &GraspTarget, second: &GraspTarget) -> bool {
     let apart = first.base_from_tcp.inverse() * second.base_from_tcp;
     second.score >= MIN_CONFIRMING_SCORE

@@ -1,4 +1,4 @@
-//! Two pictures from adjacent positions during the approach: the height of the part.
+//! Measures the height of the part with two pictures from adjacent positions during the approach.
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use sdg_geometry::Angle;
@@ -15,8 +15,8 @@ use crate::perception::GraspStep;
 /// Minimum distance of the camera from the part, m: closer pictures show too little of it.
 const MIN_DISTANCE_M: f64 = 0.18;
 
-/// Share of the sideways distance for a picture that replaces one without the part: it is then far enough from the one
-/// on the other side.
+/// Fraction of the sideways distance for a picture that replaces one without the part: it is still far enough from the
+/// picture on the other side.
 const REPLACEMENT_SHIFT_SHARE: f64 = 0.5;
 
 impl<A: Arm> Sequence<'_, '_, A> {
@@ -44,7 +44,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         self.known.surface_m = Some(settled.height_m - measurement.mark_height_m);
         let target = match (settled.source, &sightings[..]) {
             (HeightSource::Measured, [..]) => between(&sightings, settled.height_m),
-            // One picture's result is closer to the part than the look before it.
+            // Even a single picture was taken from closer to the part than the picture of its detection.
             (HeightSource::Told, [nearer]) => Some(nearer.at_height(settled.height_m).target),
             (HeightSource::Told, []) => None,
             (HeightSource::Told, several) => between(several, settled.height_m),
@@ -57,7 +57,8 @@ impl<A: Arm> Sequence<'_, '_, A> {
     }
 
     /// Takes pictures across the marked line, then along it, until two of them give a height from the surface beside
-    /// the part: on wooden grain only one of both directions does. Otherwise the part's own height is used.
+    /// the part: on wood grain only one of the two directions does. Without such a pair, the height of the part itself
+    /// is used.
     fn look_from_two_places(
         &mut self,
         seen: &GraspTarget,
@@ -77,8 +78,8 @@ impl<A: Arm> Sequence<'_, '_, A> {
         let half_m = 0.5 * measurement.baseline_m;
         let (mut pictures, mut why): (Vec<Vec<Sighting>>, Option<String>) = (Vec::new(), None);
         let mut by_part: Option<(MeasuredHeight, [Sighting; 2])> = None;
-        // If one of the first two shows nothing, the next is closer to the part: long parts fill the picture, and
-        // reflections move.
+        // If one of the first two pictures does not show the part, the next one is closer to it: long parts fill the
+        // picture, and reflections move.
         let nearer_m = REPLACEMENT_SHIFT_SHARE * half_m;
         let mut shown_at_m = None;
         for [across_m, along_m] in
@@ -117,7 +118,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
                             return Ok((measurement.combined(&height, &surface), pair));
                         }
                     }
-                    // Pictures at a right angle to each other may be too close.
+                    // One picture across the line and one along it may be too close together.
                     Some(Err(error @ HeightError::SamePlace { .. })) => why = why.or(Some(error.to_string())),
                     Some(Err(error)) => why = Some(error.to_string()),
                     None => {}
@@ -136,14 +137,14 @@ impl<A: Arm> Sequence<'_, '_, A> {
     }
 
     /// Moves the camera to a position beside a part (m along and across its marked line), looking down, with the hand
-    /// turned to it.
+    /// in the orientation of the grasp.
     fn go_beside(&mut self, seen: &GraspTarget, [along_m, across_m]: [f64; 2], height_m: f64) -> Steps<()> {
         let beside = seen.base_from_tcp.rotation * Vector3::new(along_m, across_m, 0.0);
         self.look_down(&[seen.base_from_tcp], [beside.x, beside.y], height_m, GraspStep::Hover)
     }
 }
 
-/// The mean of the grasps of several pictures of one part, with its marks at a height; `None` without pictures.
+/// The mean grasp of several sightings of one part, with its marks at a height; `None` without sightings.
 fn between(sightings: &[Sighting], height_m: f64) -> Option<GraspTarget> {
     let targets: Vec<GraspTarget> = sightings.iter().map(|sighting| sighting.at_height(height_m).target).collect();
     let first = *targets.first()?;

@@ -1,17 +1,17 @@
 //! One grasp: the paper's sequence, for every arm.
 //!
 //! ```text
-//! look ─> find ─> hover, turned ─> find ─> above ─> straight down ─> close ─> lift ─> hold
+//! look ─> find ─> hover, rotated ─> find ─> above ─> straight down ─> close ─> lift ─> hold
 //!          └ detect                 └ detect └────── approach ──┘       └───────┴───────┴ the hand's width and force decide
 //! ```
 //! If the height of parts is not given, a camera on the hand takes two pictures from adjacent positions during the
 //! approach (measure.rs).
 //!
-//! After an empty detection the arm looks from the next pose: a tall part is then seen from another side, and the arm's
-//! shadows fall elsewhere. A camera beside the robot looks once, with the arm outside its view.
+//! Without a detection, the next picture is taken from the next look-out pose: it shows a tall part from another side,
+//! and the arm's shadows fall elsewhere. A camera beside the robot takes one picture, with the arm outside its view.
 //!
-//! Placing continues from there: carry ─> come down until contact with the place ─> open, up ─> look where the part
-//! lies.
+//! Placing continues the sequence: carry ─> descend until contact with the place ─> open, up ─> measure with a picture
+//! where the part lies.
 
 mod carry;
 mod config;
@@ -44,7 +44,7 @@ pub use placing::{PlacingConfig, PlacingOutcome, PlacingReport, grasp_and_place}
 
 use held_part::HeldPart;
 
-/// Minimum height of the arm over the table during free motions, m.
+/// Minimum height of the arm above the table during free motions, m.
 pub const FREE_CLEARANCE_M: f64 = 0.05;
 /// Time that the arm stands still before a picture, s.
 const SETTLE_SECS: f64 = 0.25;
@@ -52,7 +52,7 @@ const SETTLE_SECS: f64 = 0.25;
 /// The outcome of a grasp.
 #[derive(Debug, Clone, PartialEq)]
 pub enum GraspOutcome {
-    /// The part was lifted, and held to the end.
+    /// The part was lifted and held to the end.
     Held,
     /// A step failed.
     Failed {
@@ -63,14 +63,14 @@ pub enum GraspOutcome {
     },
 }
 
-/// The outcome of a grasp, with the targets of each look and the measurements of the hand.
+/// The outcome of a grasp, with the target of each picture and the measurements of the hand.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GraspReport {
     /// The outcome.
     pub outcome: GraspOutcome,
-    /// The detections of each look above the threshold.
+    /// The detection of each picture, if it is above the threshold.
     pub targets: Vec<Option<GraspTarget>>,
-    /// Number of looks from a distance, and number from above the detections.
+    /// Numbers of pictures: from look-out poses, and from above detections.
     pub looks: [usize; 2],
     /// The hand's state after it closed.
     pub closed: Option<HandState>,
@@ -86,8 +86,8 @@ pub struct GraspReport {
 /// Grasps the part once.
 ///
 /// # Errors
-/// Errors that end the sequence other than a failed grasp: perception that could not work, and every error after which
-/// nothing moves until a person allows it. A part that stopped the arm is an exception: it is a failed grasp.
+/// Errors that end the sequence: a failure of perception, and every error after which nothing moves until a person
+/// allows it. A failed grasp is not an error, even if the part stopped the arm.
 pub fn grasp<A: Arm>(
     robot: &mut Robot<'_, A>,
     finder: &mut dyn PartFinder<A>,
@@ -100,7 +100,7 @@ pub fn grasp<A: Arm>(
     Ok(sequence.grasp_report(outcome))
 }
 
-/// As [`grasp`], with a compliant arm: it comes down as [`GraspConfig::soft_approach`] says.
+/// As [`grasp`], with a compliant arm, whose last descent is [`GraspConfig::soft_approach`].
 ///
 /// # Errors
 /// As for [`grasp`].
@@ -116,7 +116,7 @@ pub fn grasp_softly<A: CompliantArm>(
     Ok(sequence.grasp_report(outcome))
 }
 
-/// Comes down until a contact.
+/// Descends until a contact.
 type Touch<A> = fn(&mut Robot<'_, A>, &TouchDown) -> Result<Touched>;
 
 /// The reason why the sequence ended early.
@@ -158,7 +158,7 @@ struct Sequence<'s, 'r, A: Arm> {
 struct Cell<'s, A: Arm> {
     camera: CameraPose,
     config: &'s GraspConfig,
-    /// For a compliant arm.
+    /// The compliant descent; `None` for an arm that is not compliant.
     touch: Option<Touch<A>>,
 }
 
@@ -166,7 +166,7 @@ struct Cell<'s, A: Arm> {
 struct Known {
     /// The time of the picture on which the next motion depends.
     picture_time: Option<Instant>,
-    /// The hand after it closed.
+    /// State of the hand after it closed.
     closed: Option<HandState>,
     held: Option<HeldPart>,
     /// z of the surface under the part as measured, m.
@@ -175,7 +175,7 @@ struct Known {
     lying: LyingParts,
     /// The present opening of the hand, or that of the next straight path, m.
     opening_m: f64,
-    /// Opening of the hand beyond the part, both sides together, m.
+    /// Opening of the hand beyond the part's width, both sides together, m.
     opening_margin_m: f64,
 }
 
@@ -222,7 +222,7 @@ impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
         Self { robot, finder, observer, cell, known, report: GraspReport::begun() }
     }
 
-    /// Comes down compliantly until a contact; `None` if the arm is not compliant.
+    /// Descends compliantly until a contact; `None` if the arm is not compliant.
     fn touch_down(&mut self, touch_down: &TouchDown, step: GraspStep) -> Steps<Option<Touched>> {
         let Some(touch) = self.cell.touch else { return Ok(None) };
         let touched = fails_at(step, touch(self.robot, touch_down))?;
@@ -230,7 +230,7 @@ impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
         Ok(Some(touched))
     }
 
-    /// Grasps the part unless `is_wanted` refuses it after detection; returns the outcome.
+    /// Grasps the part unless `is_wanted` refuses the detection; returns the outcome.
     fn grasp(&mut self, is_wanted: impl FnOnce(&mut Self, &GraspTarget) -> Steps<()>) -> Result<GraspOutcome> {
         match self.run(is_wanted) {
             Ok(()) => Ok(GraspOutcome::Held),
@@ -256,7 +256,7 @@ impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
         self.take(&target)
     }
 
-    /// From above a found part to the lifted part.
+    /// Grasps and lifts a found part, starting above it.
     fn take(&mut self, target: &GraspTarget) -> Steps<()> {
         self.known.lying.take(&target.base_from_tcp);
         let approach = self.go_above(target)?;
@@ -266,12 +266,12 @@ impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
         self.hold()
     }
 
-    /// z of the surface under the part, m: as measured, or else the table's given height.
+    /// z of the surface under the part, m: measured if possible, otherwise the table's given height.
     fn surface_height_m(&self) -> f64 {
         self.known.surface_m.unwrap_or(self.robot.limits().table_height_m)
     }
 
-    /// Tells the observer that a step is done; a reason from it fails the step.
+    /// Reports a finished step to the observer, which may fail the step with a reason.
     fn passed(&mut self, step: GraspStep) -> Steps<()> {
         match self.observer.after(self.robot.arm(), step)? {
             None => Ok(()),

@@ -1,12 +1,12 @@
-//! Puts the held part down, by contact instead of height, and checks it with a look.
+//! Puts the held part down, by contact instead of height, and checks its position with a picture.
 //!
 //! ```text
 //! held ─> carry ─> straight down, compliant at the end, until contact ─> open, up ─> look ─> within the tolerance
-//!           ▲                                                                        └ outside: take it again,
+//!           ▲                                                                        └ outside: grasp again,
 //!           └── aim with the part's pose in the hand ◄───────────────────────────────┘ a limited number of times
 //! ```
 //! Fingers do not hold a part along the line across which they close: some parts slide there when the fingers close.
-//! The look measures this offset, and the next placement compensates it.
+//! The picture measures this offset, and the next placement compensates it.
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use sdg_geometry::{Angle, RotationalSymmetry};
@@ -41,25 +41,25 @@ const RETREAT_STEP_M: f64 = 0.05;
 pub struct PlacingConfig {
     /// The compliant descent at the end.
     pub touch_down: TouchDown,
-    /// Turns of the part that are equivalent.
+    /// Rotational symmetry of the part.
     pub symmetry: RotationalSymmetry,
     /// Opening of the hand beyond the part for releasing it, both sides together, m.
     pub release_margin_m: f64,
-    /// Height of the ascent after that, m.
+    /// Height of the ascent after the release, m.
     pub retreat_m: f64,
     /// Largest offset of the part from its place, m.
     pub tolerance_m: f64,
-    /// Largest turn, rad.
+    /// Largest angle between the part and its goal, rad.
     pub tolerance_rad: f64,
-    /// A part with a larger offset, m, or turn, rad, is grasped again: below the tolerances, because looks are not
-    /// exact.
+    /// A part with a larger offset, m, or angle, rad, is grasped again. The limits are below the tolerances, because
+    /// the measurement by a picture is not exact.
     pub aim: (f64, f64),
-    /// Maximum number of such repetitions.
+    /// Maximum number of repeated grasps.
     pub max_corrections: usize,
 }
 
 impl Default for PlacingConfig {
-    /// Within 3 mm and 3°, grasped again beyond 2 mm or 2°, twice.
+    /// Tolerances of 3 mm and 3°; beyond 2 mm or 2° the part is grasped again, at most twice.
     fn default() -> Self {
         Self {
             touch_down: TouchDown::default(),
@@ -97,17 +97,17 @@ pub struct PlacingReport {
     pub outcome: PlacingOutcome,
     /// The contacts each time the part was put down, and of compliant approaches after the first.
     pub touched: Vec<Touched>,
-    /// The part's offset from its place by each look; for a bin from its centre. None if the part was not seen in a
-    /// bin.
+    /// The part's offset from its place (for a bin, from its centre) by each picture; empty if the part was not
+    /// detected in a bin.
     pub errors: Vec<PlaceOffset>,
 }
 
 /// Grasps the part once and puts it down. A cell of a tray must have room for the part and for the fingers that release
-/// it, with parts assumed in all neighbouring cells. This is judged by [`GraspConfig::part`] before anything moves,
-/// otherwise after the part was found.
+/// it, with parts assumed in all neighbouring cells. This is checked before anything moves if [`GraspConfig::part`] is
+/// given, otherwise after the part was found.
 ///
 /// # Errors
-/// As [`super::grasp`]; [`crate::RobotError::Configuration`] if there is no room by [`GraspConfig::part`].
+/// As for [`super::grasp`]; [`crate::RobotError::Configuration`] if [`GraspConfig::part`] has no room.
 pub fn grasp_and_place<A: CompliantArm>(
     robot: &mut Robot<'_, A>,
     finder: &mut dyn PartFinder<A>,
@@ -144,7 +144,7 @@ impl PlacingOutcome {
 }
 
 impl<A: Arm> Sequence<'_, '_, A> {
-    /// Refuses a part that has no room in its place by present knowledge, and avoids parts that may lie around it.
+    /// Fails if the place has no room for the part, and adds the parts that may lie around the place as obstacles.
     fn prepare(&mut self, target: &GraspTarget, goal: &PlaceGoal, placing: &PlacingConfig) -> Steps<()> {
         let table_height_m = self.surface_height_m();
         let Some(part) = shape_of(target, table_height_m, self.cell.config) else { return Ok(()) };
@@ -162,7 +162,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
             let why = format!("\"{}\" already contains a part, at ({:.3}, {:.3}) m", goal.name, p.x, p.y);
             return Err(Stop::Failed(GraspStep::Detect, why));
         }
-        // After a part was taken from a cell's place, nothing else lies there.
+        // A part that was taken from a neighbouring cell leaves that cell empty.
         for neighbour in goal.neighbours_in_base(height_m).map(there).filter(|part| !part.overlaps(&taken)) {
             self.known.lying.suppose(neighbour);
         }
@@ -212,23 +212,24 @@ impl<A: Arm> Sequence<'_, '_, A> {
             num_corrections += 1;
             self.known.lying.take(&aim.base_from_part);
             slid = slip(&aim.base_from_part, &found.base_from_tcp, &base_from_tcp, &part_from_tcp, &error);
-            // The hand keeps the turn at which it released the part, where its fingers had room.
+            // The hand keeps the orientation in which it released the part, because its fingers had room in it.
             let mut target =
                 GraspTarget { base_from_tcp: as_aimed(&aim.base_from_part, &found.base_from_tcp, &error), ..found };
             target.base_from_tcp.translation.z = match self.cell.config.height {
-                // The place's height is given, and its contents were measured before they were taken.
+                // Heights are measured: the height of the place is given, and that of the part was measured before its
+                // grasp.
                 Some(_) => aim.base_from_part.translation.z,
                 // Perception assumes that the part lies on the table.
                 None => found.base_from_tcp.translation.z + goal.surface_m - self.robot.limits().table_height_m,
             };
             self.known.surface_m = self.cell.config.height.map(|_| goal.surface_m);
-            // The part was seen from above, with other parts next to it: the hand opens no wider than for releasing.
+            // Other parts may lie next to the part: the hand opens no wider than for releasing.
             self.known.opening_margin_m = placing.release_margin_m;
             self.take(&target)?;
         }
     }
 
-    /// Comes down compliantly until contact with the place.
+    /// Descends compliantly until contact with the place.
     fn put_down(&mut self, aim: &Aim, placing: &PlacingConfig) -> Steps<()> {
         let touch_down = TouchDown { max_way_m: SOFT_WAY_M + BELOW_M, ..placing.touch_down };
         let Some(touched) = self.touch_down(&touch_down, GraspStep::PutDown)? else {
@@ -242,11 +243,11 @@ impl<A: Arm> Sequence<'_, '_, A> {
             return Ok(());
         }
         let below_mm = (aim.base_from_tcp.translation.z - SOFT_WAY_M - touched.tcp_height_m) * 1e3;
-        let why = format!("nothing was felt down to {below_mm:.0} mm below the place; the part is still held");
+        let why = format!("no contact was measured down to {below_mm:.0} mm below the place; the part is still held");
         Err(Stop::Failed(GraspStep::PutDown, why))
     }
 
-    /// Opens the hand and moves up; returns the tcp's pose in the part's frame by the detection.
+    /// Opens the hand and moves up; returns `part_from_tcp`, the tcp's pose in the part's frame by the detection.
     fn release(&mut self, placing: &PlacingConfig) -> Steps<Isometry3<f64>> {
         let opening_m = self.release_opening_m(placing);
         self.robot.start_hand(HandCommand::Move { opening_m, speed_m_s: RELEASING_SPEED_M_S })?;
@@ -282,7 +283,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         }
     }
 
-    /// Measures where the part lies with a look.
+    /// Measures with a picture where the part lies.
     fn look_at(
         &mut self,
         goal: &PlaceGoal,
@@ -331,10 +332,10 @@ impl<A: Arm> Sequence<'_, '_, A> {
     }
 }
 
-/// Maximum number of symmetric view orientations: a hand that was turned for its fingers may not reach the one of its
-/// own turn.
+/// Maximum number of symmetric view orientations: for the picture, a hand that was rotated to make room for its fingers
+/// may be unable to keep its orientation.
 const MAX_VIEW_TURNS: usize = 4;
-/// A part farther from its place is another part, m.
+/// Largest distance of the part from its place, m; a detection farther away is another part.
 const MAX_PLACE_OFFSET_M: f64 = 0.03;
 
 fn fails(why: String) -> Stop {
@@ -363,13 +364,13 @@ fn inside(goal: &PlaceGoal, found: &Isometry3<f64>, [along_m, across_m]: [f64; 2
     apart.x.abs() <= 0.5 * along_m && apart.y.abs() <= 0.5 * across_m
 }
 
-/// The found pose turned by the part's symmetry as close as possible to the intended one.
+/// The found pose, rotated by the angle of the part's symmetry that brings it closest to the intended one.
 fn as_aimed(place: &Isometry3<f64>, found: &Isometry3<f64>, error: &PlaceOffset) -> Isometry3<f64> {
     let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), error.angle_rad);
     Isometry3::from_parts(found.translation, turn * place.rotation)
 }
 
-/// The slip of the part in its own frame when the hand closed: the tcp's pose in it at release, relative to its pose by
+/// Slip of the part when the hand closed, in the part's frame: the tcp's pose at the release relative to its pose by
 /// the detection.
 fn slip(
     place: &Isometry3<f64>,

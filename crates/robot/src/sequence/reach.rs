@@ -12,22 +12,22 @@ use crate::perception::GraspStep;
 use crate::surroundings::{Destination, Way};
 use crate::touch::TouchDown;
 
-/// Minimum distance of the finger tips to the table when closing, m.
+/// Minimum distance between finger tips and table when the hand closes, m.
 const FINGERTIP_CLEARANCE_M: f64 = 0.002;
 /// Speed at which the opening changes during the descent, m/s.
 const OPENING_SPEED_M_S: f64 = 0.2;
 /// Time that the arm stands still before the hand closes, s.
 const SETTLE_SECS: f64 = 0.1;
-/// Heights from which a straight descent is searched, m.
+/// Heights above the grasp from which a straight descent is tried, m.
 const HEIGHTS_M: [f64; 3] = [0.25, 0.15, 0.10];
 /// Opening of the hand beyond a part, both sides together, if other parts leave no room for more, m.
 const NARROW_MARGIN_M: f64 = 0.020;
-/// A compliant descent starts this far above its end, m.
+/// Length of a compliant descent, m.
 const SOFT_WAY_M: f64 = 0.020;
-/// A contact higher above the grasp is not the table, m.
+/// Largest height of a contact with the table above the grasp, m.
 const MAX_EARLY_M: f64 = 0.010;
 
-/// A path to above a grasp, with the straight descent from there.
+/// A path to above a grasp, with the straight descent to it.
 enum Reach {
     Around(Way),
     Straight(Approach),
@@ -75,7 +75,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         ))
     }
 
-    /// The path to above a grasp; else the reason why there is none.
+    /// The path to above a grasp; otherwise the reason why there is none.
     fn reach(&mut self, base_from_grasp: &Isometry3<f64>) -> Steps<Result<Reach, String>> {
         let seed = self.robot.commanded()?;
         let here = self.robot.geometry().forward(&seed).translation.z;
@@ -83,7 +83,8 @@ impl<A: Arm> Sequence<'_, '_, A> {
         for height in [&[here - base_from_grasp.translation.z], &HEIGHTS_M[..]].concat() {
             let height = height.max(0.05);
             if self.is_surrounded() {
-                // Both turns of the hand and all paths of the arm are tried: the cheapest is used.
+                // Both orientations of the hand and all paths of the arm are tried; the one with the lowest cost is
+                // used.
                 let grasps = [*base_from_grasp, with_fingers_exchanged(base_from_grasp)];
                 match self.way_to(&Destination::Approached(&grasps, height)) {
                     Ok(way) => return Ok(Ok(Reach::Around(way))),
@@ -128,7 +129,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         Ok(self.robot.wait(SETTLE_SECS)?)
     }
 
-    /// With the speed of an approach, and compliantly at its end.
+    /// Descends at the speed of an approach, and compliantly at the end.
     fn descend_softly(&mut self, path: &JointPath, touch_down: &TouchDown) -> Steps<()> {
         let base_from_grasp = self.robot.geometry().forward(path.end());
         self.go_down_to(path.start(), &above(&base_from_grasp, SOFT_WAY_M), GraspStep::Approach)?;
@@ -138,13 +139,13 @@ impl<A: Arm> Sequence<'_, '_, A> {
             .filter(|touched| touched.is_contact)
             .map_or(0.0, |touched| touched.tcp_height_m - base_from_grasp.translation.z);
         if early_m > MAX_EARLY_M {
-            let why = format!("the fingers met something {:.0} mm above the grasp", early_m * 1e3);
+            let why = format!("the fingers touched an object {:.0} mm above the grasp", early_m * 1e3);
             return Err(Stop::Failed(GraspStep::Approach, why));
         }
         Ok(())
     }
 
-    /// Straight to a pose below, with the speed of an approach.
+    /// Moves straight down to a pose at the speed of an approach.
     pub(super) fn go_down_to(
         &mut self,
         start: &JointVector,
@@ -163,7 +164,7 @@ fn no_approach() -> Stop {
     Stop::Failed(GraspStep::Approach, "the path around the obstacles has no approach".to_owned())
 }
 
-/// A pose higher up.
+/// A pose, raised by `height_m`.
 pub(super) fn above(base_from_tcp: &Isometry3<f64>, height_m: f64) -> Isometry3<f64> {
     Translation3::new(0.0, 0.0, height_m) * base_from_tcp
 }

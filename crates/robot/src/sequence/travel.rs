@@ -1,4 +1,4 @@
-//! Free motions: straight in joint space over an empty table, or around the obstacles of the cell.
+//! Free motions: straight in joint space above an empty table, or around the obstacles of the cell.
 
 use sdg_kinematics::{JointLimits, JointPath, JointVector};
 
@@ -38,7 +38,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         }
     }
 
-    /// Follows a path; its approach, if it has one, remains.
+    /// Follows a path except for its approach, which is returned.
     pub(super) fn travel(&mut self, way: Way, step: GraspStep) -> Steps<Option<JointPath>> {
         self.robot.set_contact_sensitivity(ContactSensitivity::Free)?;
         for motion in way.motions {
@@ -61,12 +61,12 @@ impl<A: Arm> Sequence<'_, '_, A> {
         let clearance = motion.clearance(arm, table_height_m);
         // The held part hangs lower than the fingers.
         let held_m = self.known.held.as_ref().map_or(0.0, |held| held.hang_m);
-        // The end is intended at any height; before it the arm must not be lower.
+        // The path may be lower than the clearance only if its destination is.
         let allowed = (FREE_CLEARANCE_M + held_m).min(arm.clearance(q, table_height_m).lowest_m - 1e-3);
         if clearance.lowest_m < allowed {
             return Err(Stop::Failed(
                 step,
-                format!("the path there passes {:.0} mm over the table", clearance.lowest_m * 1e3),
+                format!("the path there passes {:.0} mm above the table", clearance.lowest_m * 1e3),
             ));
         }
         self.robot.set_contact_sensitivity(ContactSensitivity::Free)?;

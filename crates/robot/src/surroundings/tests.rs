@@ -27,7 +27,7 @@ fn plan(obstacles: &[Obstacle], start: &JointVector, to: &Destination<'_>) -> Re
 
 #[test]
 fn a_wall_is_gone_around_and_nothing_is_touched() {
-    // Between the two sides, 0.45 m high.
+    // A wall between start and goal, 0.45 m high.
     let obstacles = [wall("wall", [0.2, 0.02, 0.225], [0.5, 0.0, 0.225])];
     let panda = ArmGeometry::panda();
     let start = panda.inverse(&down(0.45, 0.3, 0.25), &ready_pose(), &Default::default()).unwrap().q;
@@ -98,15 +98,15 @@ fn fingers_come_down_between_parts_that_lie_as_far_as_they_are_open() {
         let surroundings = Surroundings { lying: &lying, opening_m, table_clearance_m: 0.05, ..Default::default() };
         robot.plan_around(&surroundings, &Destination::Approached(&goals, 0.2), &joints)
     };
-    // As the room in a tray is judged: 20 mm of part, 20 mm opened, 15 mm of each finger, and 2 mm.
+    // The room in a tray: 20 mm of part, 20 mm of opening, 15 mm of each finger, and 2 mm.
     assert!(approach(0.040).unwrap().approach.is_some());
     let error = approach(0.060).unwrap_err().to_string();
-    assert!(error.contains("the hand is") && error.contains("that lies at (0.45, "), "{error}");
+    assert!(error.contains("the hand is") && error.contains("at (0.45, "), "{error}");
 }
 
 #[test]
 fn what_is_held_is_carried_around_parts_that_lie() {
-    // So high that the held part would run into it.
+    // A part so high that the held part would collide with it.
     let tall = PartShape::new(bar_at(0.0, 0.0).shape.outline().to_vec(), 0.02, 0.30, 0.15).unwrap();
     let lying = [LyingPart { base_from_part: down(0.45, 0.0, 0.15), shape: tall }];
     let panda = ArmGeometry::panda();

@@ -1,4 +1,4 @@
-//! Errors of a workcell's file.
+//! Errors of a workcell file.
 
 /// An error and its line.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -6,6 +6,6 @@
 pub struct WorkcellError {
     /// Counted from 1.
     pub line: usize,
-    /// The expected and the found value.
+    /// The value that was expected, and the one that was found.
     pub what: String,
 }

@@ -1,4 +1,4 @@
-//! The layout of the file, and the checks of its values.
+//! The layout of a workcell file, and the checks of its values.
 
 use nalgebra::Vector3;
 use sdg_geometry::Mount;
@@ -15,15 +15,15 @@ use crate::robot_address::RobotAddress;
 use crate::safety::WorkspaceBox;
 use crate::sequence::LookOut;
 
-/// The first line of files of this layout.
+/// Value of `format` in files of this layout.
 const FORMAT: i64 = 1;
 /// Largest distance of a table from the base's height, mm.
 const MAX_TABLE_MM: f64 = 1000.0;
 /// Largest length of a finger beyond the tcp, mm.
 const MAX_FINGERTIP_MM: f64 = 100.0;
-/// Shorter finger tips than this, except 0, are probably lengths in metres.
+/// Smallest length of a finger beyond the tcp other than 0, mm: a smaller one is probably in metres.
 const MIN_FINGERTIP_MM: f64 = 0.1;
-/// Force that the hand can hold permanently, N.
+/// Largest force that the hand can hold permanently, N.
 const MAX_FORCE_N: f64 = 70.0;
 /// Default and largest extent of a part from its grasp, mm.
 const PART_RADIUS_MM: f64 = 60.0;
@@ -32,7 +32,7 @@ const MAX_PART_MM: f64 = 500.0;
 const MAX_LOAD_KG: f64 = 3.0;
 /// Heights of a camera above the table, mm.
 const CAMERA_HEIGHTS_MM: [f64; 2] = [150.0, 1200.0];
-/// Franka's own finger tips extend this far beyond its tcp, mm.
+/// Distance of Franka's own finger tips beyond its tcp, mm.
 const FINGERTIP_MM: f64 = 9.0;
 
 #[derive(Deserialize)]
@@ -104,7 +104,7 @@ struct LookOutSection {
 }
 
 impl Workcell {
-    /// Reads a workcell's file.
+    /// Reads a workcell file.
     ///
     /// # Errors
     /// [`WorkcellError`] with the line, what was expected and what was found.
@@ -117,7 +117,7 @@ fn read(text: &str) -> Result<Workcell, WorkcellError> {
     let source = Source(text);
     let file: File = toml::from_str(text).map_err(|error| {
         let at = error.span().map_or(0, |span| span.start);
-        // The parser's message continues with the place in the text, which the line number replaces.
+        // The parser's message spans several lines.
         source.error(at, error.message().split_whitespace().collect::<Vec<_>>().join(" "))
     })?;
     if *file.format.get_ref() != FORMAT {

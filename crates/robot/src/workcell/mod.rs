@@ -1,17 +1,17 @@
-//! A workcell's file: the robot, its load, the camera, the table, and the workspace.
+//! A workcell file: the robot, its load, the camera, the table, and the workspace.
 //!
 //! ```toml
 //! format = 1
 //!
 //! [robot]
 //! model = "panda"                   # or "fr3"
-//! address = "172.16.0.2"            # may be left out; --robot sets it too
+//! address = "172.16.0.2"            # optional; --robot sets it too
 //!
-//! [tool]                            # may be left out
-//! fingertip_beyond_tcp_mm = 9.0     # how far the finger tips reach beyond the tcp
+//! [tool]                            # optional
+//! fingertip_beyond_tcp_mm = 9.0     # distance of the finger tips beyond the tcp
 //! grasp_force_n = 40.0
 //! part_mass_kg = 0.2                # given to the controller while the part is held
-//! part_radius_mm = 60               # the part reaches so far from its grasp: it is kept off the obstacles, too
+//! part_radius_mm = 60               # extent of the part from its grasp, which is kept away from the obstacles
 //!
 //! [camera]
 //! file = "camera.yaml"              # beside this file; --camera sets it too
@@ -19,44 +19,44 @@
 //!
 //! [table]
 //! height_mm = 0.0                   # its z in the robot's base frame
-//! x_mm = [100, 900]                 # where it is; with y_mm, or both left out: no place may reach over its edge
+//! x_mm = [100, 900]                 # range of the table, optional: no place may extend beyond it
 //! y_mm = [-600, 600]
 //!
-//! [workspace]                       # where tcp and flange may be, mm in the base frame
+//! [workspace]                       # allowed range of tcp and flange, mm in the base frame
 //! x_mm = [200, 800]
 //! y_mm = [-450, 450]
 //! z_mm = [0, 900]
 //!
-//! [[look_out]]                      # one or more; the first that shows the part is enough
+//! [[look_out]]                      # one or more, used in order until the part is found
 //! camera_at_mm = [480, 0, 580]      # x, y in the base frame, height above the table; or
 //! joints_deg = [0, -45, 0, -135, 0, 90, 45]
-//! yaw_deg = 0                       # with camera_at_mm; may be left out
+//! yaw_deg = 0                       # with camera_at_mm; optional
 //!
 //! [[obstacle]]                      # any number; motions are planned around them
 //! name = "fixture"
 //! box_mm = [200, 100, 300]          # or cylinder_mm = [diameter, length], along z; capsule_mm = [diameter, length over all];
-//! at_mm = [500, 300, 150]           # or plane_normal = [x, y, z], out of the solid; middle in the base frame
-//! rpy_deg = [0, 0, 30]              # roll, pitch, yaw; may be left out
+//! at_mm = [500, 300, 150]           # or plane_normal = [x, y, z], out of the solid; centre in the base frame
+//! rpy_deg = [0, 0, 30]              # roll, pitch, yaw; optional
 //!
 //! [[place]]                         # one pose for a part: sdg grasp --place shelf
 //! name = "shelf"
 //! at_mm = [450, 300]                # x, y of the part's grasp, base frame
-//! yaw_deg = 90                      # direction of its marked line; may be left out
-//! height_mm = 0                     # of its base, above the table; may be left out
+//! yaw_deg = 90                      # direction of its marked line; optional
+//! height_mm = 0                     # of its surface, above the table; optional
 //!
 //! [[tray]]                          # a grid of cells: sdg grasp --place tray:7; yaw_deg and height_mm as above
 //! name = "tray"
-//! first_mm = [350, 250]             # middle of the first cell
-//! columns = 5                       # cells along its x, which yaw_deg turns
+//! first_mm = [350, 250]             # centre of the first cell
+//! columns = 5                       # cells along its x, the direction of yaw_deg
 //! rows = 4
 //! pitch_mm = [60, 60]               # from one cell to the next along its x and its y
 //!
-//! [[bin]]                           # parts lie in it anyhow; yaw_deg and height_mm as above
+//! [[bin]]                           # parts lie in it in any pose; yaw_deg and height_mm as above
 //! name = "bin"
-//! at_mm = [450, -300]               # its middle
-//! size_mm = [200, 150]              # of its inside, along its x and its y
+//! at_mm = [450, -300]               # its centre
+//! size_mm = [200, 150]              # inner size, along its x and its y
 //! ```
-//! Every error names the line. This crate reads no files: text in, a [`Workcell`] out.
+//! Every error names the line. This crate reads no files: it converts a text to a [`Workcell`].
 
 mod error;
 mod file;
@@ -86,7 +86,7 @@ pub enum RobotModel {
 }
 
 impl RobotModel {
-    /// The name in the file.
+    /// The name in the workcell file.
     pub fn name(self) -> &'static str {
         match self {
             Self::Panda => "panda",
@@ -94,7 +94,7 @@ impl RobotModel {
         }
     }
 
-    /// Its links, limits and hand.
+    /// Links, limits and hand of the model.
     pub fn geometry(self) -> ArmGeometry {
         match self {
             Self::Panda => ArmGeometry::panda(),
@@ -108,7 +108,7 @@ impl RobotModel {
 pub struct Workcell {
     /// The robot's model.
     pub robot: RobotModel,
-    /// Its network address.
+    /// The robot's network address.
     pub address: Option<String>,
     /// Distance of the finger tips beyond the tcp, m.
     pub fingertip_beyond_tcp_m: f64,
@@ -118,7 +118,7 @@ pub struct Workcell {
     pub part_mass_kg: Option<f64>,
     /// Extent of the part to all sides of its grasp, m.
     pub part_radius_m: f64,
-    /// The camera's file, as written in the workcell's file.
+    /// The camera file, as written in the workcell file.
     pub camera_file: Option<String>,
     /// How the camera is mounted.
     pub mount: Mount,
@@ -151,7 +151,8 @@ impl Workcell {
         }
     }
 
-    /// The sequence in this workcell, at the pace of rehearsals; the part's mass is at the tcp.
+    /// The sequence's settings in this workcell, at the pace of rehearsals. The centre of the part's mass is assumed at
+    /// the tcp.
     pub fn grasp_config(&self) -> GraspConfig {
         let load = self.part_mass_kg.map(|mass_kg| crate::arm_state::Load {
             mass_kg,
@@ -167,10 +168,10 @@ impl Workcell {
         }
     }
 
-    /// The arm with its fingers at an opening (m), the table and the obstacles.
+    /// Collision model of the arm with its fingers at an opening (m), the table and the obstacles.
     ///
     /// # Errors
-    /// An opening outside the hand's range; obstacles were checked when the file was read.
+    /// [`CollisionError`] for an opening outside the hand's range; the obstacles were checked when the file was read.
     pub fn collision_model(&self, opening_m: f64) -> Result<CollisionModel, CollisionError> {
         surroundings::collision_model(&self.robot.geometry(), self.table_height_m, &self.obstacles, opening_m)
     }
@@ -178,7 +179,7 @@ impl Workcell {
     /// The place of this name, or the cell of a tray: `NAME` or `NAME:CELL`.
     ///
     /// # Errors
-    /// [`RobotError::Configuration`] with the existing places or cells.
+    /// [`RobotError::Configuration`] if there is no such place; it lists the existing places or cells.
     pub fn place(&self, text: &str) -> RobotResult<PlaceGoal> {
         let wrong = |expected: String| RobotError::Configuration {
             what: "place".to_owned(),
@@ -195,7 +196,7 @@ impl Workcell {
         let Some(place) = self.places.iter().find(|place| place.name == name) else {
             let names: Vec<&str> = self.places.iter().map(|place| place.name.as_str()).collect();
             return Err(wrong(match names.is_empty() {
-                true => "a [[place]], [[tray]] or [[bin]] in the workcell's file".to_owned(),
+                true => "a [[place]], [[tray]] or [[bin]] in the workcell file".to_owned(),
                 false => format!("one of {}", names.join(", ")),
             }));
         };

@@ -1,4 +1,4 @@
-//! `[[obstacle]]` of a workcell's file.
+//! `[[obstacle]]` of a workcell file.
 
 use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
 use sdg_kinematics::collision::{Obstacle, Shape};
@@ -9,7 +9,7 @@ use super::error::WorkcellError;
 use super::source::{MAX_REACH_MM, Numbers, Source};
 use crate::surroundings::TABLE;
 
-/// Lengths of obstacles, mm.
+/// Smallest and largest length of an obstacle, mm.
 const SIZES_MM: [f64; 2] = [1.0, 5000.0];
 
 #[derive(Deserialize)]
@@ -88,7 +88,7 @@ fn obstacle(source: &Source<'_>, section: &Spanned<ObstacleSection>) -> Result<O
                 return Err(source.error(rpy.span().start, "rpy_deg: expected with box, cylinder and capsule only"));
             }
             let onto = UnitQuaternion::rotation_between_axis(&Vector3::z_axis(), &direction);
-            // Vertically down, many turns are possible; any will do.
+            // For a normal that points vertically down the rotation is ambiguous; any of them is valid.
             let half_turn = || UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
             (Shape::Plane, onto.unwrap_or_else(half_turn))
         }

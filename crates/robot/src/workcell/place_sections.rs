@@ -1,4 +1,4 @@
-//! `[[place]]`, `[[tray]]` and `[[bin]]` of a workcell's file.
+//! `[[place]]`, `[[tray]]` and `[[bin]]` of a workcell file.
 
 use serde::Deserialize;
 use toml::Spanned;
@@ -8,11 +8,11 @@ use super::source::{MAX_REACH_MM, Numbers, Source};
 use crate::place::{Place, PlaceKind};
 use crate::safety::WorkspaceBox;
 
-/// Cells of a tray along each side.
+/// Maximum number of cells of a tray along each axis.
 const MAX_CELLS: i64 = 100;
-/// Pitch of cells, and sizes of bins, mm.
+/// Smallest and largest pitch of cells, and size of bins, mm.
 const PITCHES_MM: [f64; 2] = [5.0, 1000.0];
-/// Height of the surface under the parts above the table, mm.
+/// Smallest and largest height above the table of the surface under the parts, mm.
 const SURFACES_MM: [f64; 2] = [0.0, 500.0];
 
 #[derive(Deserialize)]
@@ -138,7 +138,7 @@ fn lengths_m(source: &Source<'_>, found: &Spanned<Numbers<2>>, name: &str) -> Re
 }
 
 impl Room<'_> {
-    /// The reason why a place is invalid: cells or corners beside the table or outside the workspace.
+    /// Checks that cells and corners of a place are on the table and in the workspace; otherwise returns the reason.
     fn check(&self, place: &Place) -> Result<(), String> {
         let name = &place.name;
         if let Some([x, y]) = self.table_m {

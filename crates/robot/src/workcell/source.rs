@@ -1,4 +1,4 @@
-//! The text of a workcell's file, for converting positions in it to lines, and readers for repeated kinds of values.
+//! The text of a workcell file, for converting positions to line numbers, and readers for repeated kinds of values.
 
 use serde::Deserialize;
 use toml::Spanned;
@@ -24,7 +24,7 @@ impl<const N: usize> TryFrom<Vec<f64>> for Numbers<N> {
     }
 }
 
-/// The text, for converting positions in it to lines.
+/// The text, for converting positions to line numbers.
 pub(super) struct Source<'t>(pub(super) &'t str);
 
 impl Source<'_> {

@@ -44,7 +44,7 @@ fn a_whole_file_is_read() {
     assert_eq!(cell.grasp_config().load.unwrap().mass_kg, 0.2);
 }
 
-/// Each line of the file made invalid once: the error names that line, the expected and the found value.
+/// Makes each line of the file invalid once: the error names that line, the expected and the found value.
 #[test]
 fn errors_name_the_line() {
     for (line, from, to, expected) in [
@@ -131,7 +131,7 @@ fn places_are_where_the_file_says() {
         assert!(error.contains(expected), "{error}");
     }
     let without = Workcell::from_toml(WHOLE).unwrap().place("a").unwrap_err().to_string();
-    assert!(without.contains("a [[place]], [[tray]] or [[bin]] in the workcell's file"), "{without}");
+    assert!(without.contains("a [[place]], [[tray]] or [[bin]] in the workcell file"), "{without}");
 }
 
 #[test]
@@ -194,7 +194,7 @@ fn obstacles_stand_where_the_file_says() {
         obstacle.shape.signed_distance_m(&local) * 1e3
     };
     for (name, p, expected) in [
-        // Turned by 90 degrees, the box is 100 mm wide along x.
+        // Rotated by 90 degrees, the box is 100 mm wide along x.
         ("fixture", [560.0, 300.0, 150.0], 10.0),
         ("fixture", [500.0, 420.0, 150.0], 20.0),
         ("fixture", [500.0, 300.0, 305.0], 5.0),

@@ -1,10 +1,10 @@
 //! Action client: a goal, its acceptance, feedback, result, and its cancellation.
 //!
-//! The first request of a writer may be lost: a Cyclone reader that has just matched the writer asks it once per second
-//! for its state, until the writer has sent something. If RustDDS receives that request while it sends its first
-//! sample, it answers first, with a heartbeat that already counts the sample, and the reader treats the sample as an
-//! old one. Later requests are not affected. Therefore a cancellation and a result request are repeated if no answer
-//! arrives. A goal is repeated only after the server has reported that it does not know it.
+//! The first request of a writer may be lost. A Cyclone reader that has just matched the writer asks for the writer's
+//! state once per second, until the writer has sent a sample. If RustDDS receives such a question while it sends its
+//! first sample, it answers before sending, with a heartbeat that already counts the sample, and the reader treats the
+//! sample as an old one. Later requests are not affected. Therefore a cancellation and a result request are repeated if
+//! no answer arrives. A goal is repeated only after the server has reported that it does not know the goal.
 
 use std::pin::pin;
 use std::time::{Duration, Instant};
@@ -20,31 +20,31 @@ use crate::cdr::Cdr;
 use crate::error::RosError;
 use crate::messages::AfterStatus;
 
-/// An action's type, as in `control_msgs/action/FollowJointTrajectory`.
+/// The type of an action, such as `control_msgs/action/FollowJointTrajectory`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ActionType {
-    /// `control_msgs`
+    /// The package, such as `control_msgs`.
     pub package: &'static str,
-    /// `FollowJointTrajectory`
+    /// The name, such as `FollowJointTrajectory`.
     pub name: &'static str,
 }
 
 /// The end of a goal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GoalEnd {
-    /// It was reached.
+    /// The goal was reached.
     Succeeded,
-    /// It was cancelled.
+    /// The goal was cancelled.
     Cancelled,
-    /// The server aborted it.
+    /// The server aborted the goal.
     Aborted,
     /// The server does not know the goal, for example after a restart.
     Unknown,
 }
 
-/// A result request is repeated after this time, once.
+/// Time after which a result request is repeated once.
 const ASK_AGAIN: Duration = Duration::from_secs(1);
-/// Number of times that a cancellation is sent.
+/// Maximum number of times that a cancellation is sent.
 const MAX_CANCELLATIONS: u32 = 3;
 
 /// Sends goals to an action's server, one at a time.
@@ -89,8 +89,8 @@ where
         &self.inner
     }
 
-    /// Sends a goal and requests its result; `None` if the server refuses it. An unanswered goal is cancelled, and sent
-    /// again if the server does not know it.
+    /// Sends a goal and requests its result; `None` if the server refuses the goal. An unanswered goal is cancelled,
+    /// and sent again if the server does not know it.
     ///
     /// # Errors
     /// No answer in time, and errors reported by the network.
@@ -165,7 +165,7 @@ where
         feedback.map(Some).map_err(|source| RosError::Malformed { topic: self.name.clone(), source })
     }
 
-    /// The last reported status of a goal, 1 to 6 as in `action_msgs/msg/GoalStatus`; `None` if none was reported.
+    /// The last reported status of a goal, 1 to 6 as in `action_msgs/msg/GoalStatus`; `None` without a report.
     ///
     /// # Errors
     /// Errors reported by the network.

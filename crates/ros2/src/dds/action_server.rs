@@ -1,4 +1,4 @@
-//! Action server with one goal at a time: a simulated arm's controllers.
+//! Action server with one goal at a time, for the controllers of a simulated arm.
 
 use ros2_client::RmwRequestId;
 use ros2_client::action::{GetResultResponse, GoalId, GoalStatusEnum, SendGoalResponse};
@@ -20,9 +20,9 @@ const MAX_ENDED: usize = 16;
 /// A client's request.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Asked<G> {
-    /// An accepted goal; the one before was aborted.
+    /// An accepted goal; the previous goal was aborted.
     Goal(G),
-    /// The goal is to be cancelled.
+    /// A cancellation of the running goal.
     Cancel,
 }
 
@@ -53,7 +53,7 @@ where
         Self { name, inner, running: None, ended: Vec::new(), waiting: Vec::new() }
     }
 
-    /// The requests since the last call, without waiting; `accepts` decides about a well-formed goal.
+    /// The next request, without waiting; `accepts` decides whether a valid goal is accepted.
     ///
     /// # Errors
     /// Errors reported by the network.

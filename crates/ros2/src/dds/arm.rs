@@ -1,12 +1,13 @@
-//! An arm behind ROS 2: motions as FollowJointTrajectory, the hand as GripperCommand, states from joint_states.
+//! An arm that is controlled over ROS 2: motions by FollowJointTrajectory, the hand by GripperCommand, states from
+//! joint_states.
 //!
 //! ```text
 //! CheckedMotion ─ sampled at 100 Hz ─ FollowJointTrajectory ─► ros2_control's joint_trajectory_controller
-//! Watch ◄─ ArmState ─ joint_states                 cancelled where Watch asks to stop
+//! Watch ◄─ ArmState ─ joint_states                 cancelled when Watch asks to stop
 //! HandCommand ─ GripperCommand ─► gripper_action_controller
 //! ```
-//! The real arm must have the given geometry. Contact thresholds and loads are the driver's own.
-//! This crate never recovers the arm.
+//! The real arm must have the given geometry. The arm's driver determines contact thresholds and loads. This crate
+//! never recovers the arm.
 
 use std::time::{Duration, Instant};
 
@@ -27,11 +28,11 @@ use crate::messages::{
 
 type Result<T> = sdg_robot::Result<T>;
 
-/// Time between a trajectory's points, s: the controller's splines between them then match the motion.
+/// Time between two points of a trajectory, s, so short that the controller's splines match the motion.
 const POINT_SECS: f64 = 0.01;
 /// Timeout of the action servers' answers.
 const ANSWER: Duration = Duration::from_secs(5);
-/// Delay after the planned end at which a motion has failed, s.
+/// Delay after the planned end after which a motion counts as failed, s.
 const MAX_DELAY_SECS: f64 = 5.0;
 /// Timeout of a hand motion.
 const MAX_HAND: Duration = Duration::from_secs(15);
@@ -39,16 +40,16 @@ const MAX_HAND: Duration = Duration::from_secs(15);
 const MAX_STATE_AGE: Duration = Duration::from_millis(500);
 /// Largest gap between two states of a moving arm, s: drivers publish 20 to 1000 per second, and networks delay them.
 const MAX_SILENCE_SECS: f64 = 0.5;
-/// Interval of checking the states while a hand or an arm moves.
+/// Interval of checks while hand or arm moves.
 const POLL_INTERVAL: Duration = Duration::from_millis(5);
 
-/// An arm behind ROS 2.
+/// An arm that is controlled over ROS 2.
 pub struct TrajectoryArm {
     states: StateReader,
     motions: ActionClient<FollowJointTrajectoryGoal, FollowJointTrajectoryResult, FollowJointTrajectoryFeedback>,
     gripper: ActionClient<GripperCommandGoal, GripperCommandResult, GripperCommandFeedback>,
     config: ArmConfig,
-    /// The end of the last motion: the controller holds it, even if the measured position differs.
+    /// The end of the last motion, which the controller holds even if the measured position differs.
     commanded: Option<Joints>,
     hand: Option<(HandCommand, Goal)>,
     is_grasping: bool,
@@ -117,7 +118,7 @@ impl TrajectoryArm {
         })
     }
 
-    /// The reason to stop the arm, from `watch`; a repeated state gives no new information.
+    /// Passes a new state to `watch` and returns its reason to stop the arm.
     fn observe(&self, watch: &mut Watch, seen_secs: &mut f64) -> Result<Option<StopReason>> {
         let state = self.arm_state(ArmMode::Moving)?;
         if state.time_secs == *seen_secs {
@@ -130,7 +131,7 @@ impl TrajectoryArm {
     fn cancel(&mut self, goal: &mut Goal) -> Result<()> {
         self.motions.cancel(goal, ANSWER).map_err(|error| self.lost(error))?;
         self.motions.result(goal, ANSWER).map_err(|error| self.lost(error))?;
-        // The position where it stopped is the one that the controller holds.
+        // The controller holds the position at which the arm stopped.
         self.commanded = None;
         Ok(())
     }
@@ -205,7 +206,7 @@ impl Arm for TrajectoryArm {
                 }
                 Ok(stop) => stop,
                 Err(error) => {
-                    // It must not continue unobserved.
+                    // The motion must not continue without being observed.
                     let _ = self.cancel(&mut goal);
                     return Err(error);
                 }
@@ -287,7 +288,7 @@ impl Arm for TrajectoryArm {
         };
         let opening_m = result.position / self.config.gripper_position_per_m;
         match (command, end) {
-            // Controllers abort at a resistance, which is normal for a grasp.
+            // Controllers abort if the fingers meet resistance, which is normal for a grasp.
             (HandCommand::Grasp { .. }, GoalEnd::Succeeded | GoalEnd::Aborted) => {
                 self.is_grasping = result.stalled && opening_m > MIN_HELD_WIDTH_M;
                 let known = self.known()?;
@@ -304,21 +305,21 @@ impl Arm for TrajectoryArm {
                 opening_m * 1e3
             ))),
             (_, GoalEnd::Cancelled) => Err(RobotError::Stopped(StopReason::Interrupted)),
-            (_, GoalEnd::Unknown) => Err(RobotError::Hand(format!("{} forgot the command", self.gripper.name()))),
+            (_, GoalEnd::Unknown) => Err(RobotError::Hand(format!("{} lost the command", self.gripper.name()))),
         }
     }
 
-    /// The driver has its own thresholds.
+    /// Does nothing, because the driver has its own thresholds.
     fn set_contact_sensitivity(&mut self, _sensitivity: ContactSensitivity) -> Result<()> {
         Ok(())
     }
 
-    /// The driver gets the load in other ways.
+    /// Does nothing, because the driver gets the load in other ways.
     fn set_load(&mut self, _load: Load) -> Result<()> {
         Ok(())
     }
 
-    /// A motion ends with the call that started it; only the hand may still be moving.
+    /// Stops the hand; a motion of the arm ends with the call that started it.
     fn stop(&mut self) -> Result<()> {
         match self.hand.take() {
             Some((_, goal)) => {
@@ -328,7 +329,7 @@ impl Arm for TrajectoryArm {
         }
     }
 
-    /// Nothing is recovered over ROS 2: that is done at the arm's driver.
+    /// Recovers nothing, because errors are recovered at the arm's driver.
     fn recover(&mut self) -> Result<()> {
         self.commanded = None;
         self.known().map(drop)

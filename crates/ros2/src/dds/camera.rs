@@ -17,8 +17,8 @@ use crate::names::Naming;
 /// A message's header, and its picture or the reason why it cannot be read.
 type Taken = (Header, Result<RgbImage, String>);
 
-/// A stamp that differs this much from now comes from another clock, as of a simulation or a recording; then the time
-/// of arrival is used.
+/// Largest difference between a stamp and the present time. A larger one means that the stamp comes from another clock,
+/// such as a simulation's or a recording's; then the time of arrival is used.
 const MAX_STAMP_AGE: Duration = Duration::from_secs(60);
 
 /// The part of a camera's address after `ros2:`: `TOPIC?compressed&reliable&domain=7&rmw=cyclonedds&loopback`, with
@@ -27,11 +27,11 @@ const MAX_STAMP_AGE: Duration = Duration::from_secs(60);
 pub struct TopicAddress {
     /// The topic.
     pub topic: String,
-    /// Whether it has CompressedImage instead of Image, as a topic that ends with `/compressed` has.
+    /// Whether the topic has CompressedImage instead of Image; also if its name ends with `/compressed`.
     pub is_compressed: bool,
     /// Whether lost pictures are sent again.
     pub is_reliable: bool,
-    /// `ROS_DOMAIN_ID`, unless the option gives another.
+    /// The domain: `ROS_DOMAIN_ID`, unless the option gives another one.
     pub domain_id: u16,
     /// Whether only this computer is used.
     pub is_loopback_only: bool,
@@ -75,10 +75,10 @@ impl FromStr for TopicAddress {
     }
 }
 
-/// `ROS_DOMAIN_ID`, 0 if it is not set.
+/// The domain of `ROS_DOMAIN_ID`; 0 if it is not set.
 ///
 /// # Errors
-/// An invalid domain.
+/// An error text for an invalid domain.
 pub fn domain_of_environment() -> Result<u16, String> {
     match std::env::var("ROS_DOMAIN_ID") {
         Err(_) => Ok(0),
@@ -94,9 +94,9 @@ enum Pictures {
     Compressed(Subscription<CompressedImage>),
 }
 
-/// A topic's pictures.
+/// A camera whose pictures come from a topic.
 pub struct RosCamera {
-    // Kept alive, because its topics end with it.
+    // The node is kept because its topics end with it.
     _node: Node,
     pictures: Pictures,
     name: Arc<str>,
@@ -109,7 +109,7 @@ impl RosCamera {
     /// Subscribes to a topic; `name` is the camera's address in frames and errors.
     ///
     /// # Errors
-    /// An invalid topic, and a missing network.
+    /// [`RosError`] for an invalid topic and a missing network.
     pub fn open(address: &TopicAddress, name: &str, stall_timeout: Duration) -> Result<Self, RosError> {
         // Nodes need unique names.
         let naming = Naming::new("", &format!("sdg_camera_{}", std::process::id()), &[])?;

@@ -26,14 +26,14 @@ pub struct ArmConfig {
     pub joint_states: String,
     /// The arm's seven joints from the base.
     pub joints: [String; 7],
-    /// The joints whose positions add up to the opening between the fingers.
+    /// The joints whose positions sum to the opening between the fingers.
     pub finger_joints: Vec<String>,
-    /// The gripper's position for an opening of 1 m: 0.5 if it is that of one finger.
+    /// The gripper's position divided by the opening: 0.5 if the position is that of one finger.
     pub gripper_position_per_m: f64,
 }
 
 impl Default for ArmConfig {
-    /// As named by franka_ros2 and Panda's MoveIt configuration.
+    /// The names of franka_ros2 and of the Panda's MoveIt configuration.
     fn default() -> Self {
         Self {
             geometry: ArmGeometry::panda(),
@@ -53,12 +53,12 @@ pub(super) struct Known {
     pub(super) q: Joints,
     pub(super) dq: Joints,
     pub(super) opening_m: Option<f64>,
-    /// Of the message, s.
+    /// Stamp of the message, s.
     pub(super) stamp_secs: f64,
     pub(super) arrived: Instant,
 }
 
-/// Follows joint_states in a thread.
+/// Receives joint_states in a thread.
 pub(super) struct StateReader {
     known: Arc<Mutex<Option<Known>>>,
     is_stopped: Arc<AtomicBool>,
@@ -74,7 +74,7 @@ impl StateReader {
             (Arc::clone(&known), Arc::clone(&is_stopped), config.clone(), states.topic().to_owned());
         let thread = std::thread::spawn(move || {
             while !stop.load(Ordering::SeqCst) {
-                // Malformed messages are not states; missing states are reported.
+                // Malformed messages are skipped; missing states are reported.
                 let Ok(Some(received)) = states.receive(Duration::from_millis(100)) else { continue };
                 let mut known = shared.lock().unwrap_or_else(PoisonError::into_inner);
                 *known = merged(*known, &received.message, received.arrived, &config).or(*known);
@@ -97,8 +97,8 @@ impl Drop for StateReader {
     }
 }
 
-/// The message's values for the arm's joints, or only for the fingers' if the arm's are already known; drivers publish
-/// both on one topic.
+/// Takes the message's values for the joints of arm and fingers. Messages with finger joints only are accepted once the
+/// arm's joints are known, because drivers publish both on one topic.
 fn merged(before: Option<Known>, message: &JointState, arrived: Instant, config: &ArmConfig) -> Option<Known> {
     let value = |values: &[f64], joint: &str| {
         let at = message.name.iter().position(|name| name == joint)?;

@@ -1,6 +1,7 @@
-//! The network: nodes, topics, services, actions; a camera and an arm behind them.
+//! The network: nodes, topics, services and actions, and a camera and an arm that use them.
 //!
-//! Calls block up to a given time; there is no runtime. Everything except [`Node`] may be moved to another thread.
+//! Calls block for at most a given time; there is no asynchronous runtime. All types except [`Node`] may be moved to
+//! another thread.
 
 mod action;
 mod action_server;

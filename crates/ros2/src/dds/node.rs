@@ -23,7 +23,7 @@ use crate::error::RosError;
 use crate::messages::Message;
 use crate::names::Naming;
 
-/// The middleware whose services are used: ROS 2's two usual middlewares differ in services, not in topics.
+/// The middleware whose form of services is used: ROS 2's two usual middlewares differ in services, but not in topics.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Rmw {
     /// `rmw_fastrtps_cpp`, ROS 2's default.
@@ -54,25 +54,26 @@ impl Rmw {
     }
 }
 
-/// The highest domain that has ports.
+/// The highest domain for which there are ports.
 pub(super) const MAX_DOMAIN: u16 = 232;
-/// Larger than the system's default: a picture is a burst of hundreds of packets. The kernel limits the value.
+/// Size of a socket's buffer: larger than the system's default, because a picture is a burst of hundreds of packets.
+/// The kernel limits the value.
 const SOCKET_BUFFER_BYTES: usize = 8 << 20;
 
-/// `wait_for_service` checks the matches when it is called and then waits for events, of which `ros2-client` keeps
-/// eight and drops the rest: if the endpoints of two actions are matched within a millisecond, that of the last one may
-/// be dropped. It is therefore called repeatedly.
+/// Interval of calling `wait_for_service` again. The function checks the matches when it is called and then waits for
+/// events, of which `ros2-client` keeps eight and drops the rest: if the endpoints of two actions are matched within a
+/// millisecond, the last event may be dropped.
 const MATCH_AGAIN: Duration = Duration::from_millis(100);
-/// Cyclone's readers ask a writer that they have just matched for its state, and ignore its messages before the answer;
-/// see action.rs.
+/// Wait after a match: Cyclone's readers ask a new writer for its state, and ignore its messages before the answer; see
+/// action.rs.
 const SETTLE: Duration = Duration::from_millis(200);
 
-/// A node, before it joins.
+/// The settings of a node before it joins.
 #[derive(Debug, Clone)]
 pub struct NodeConfig {
-    /// Its name, namespace and remappings.
+    /// Name, namespace and remappings of the node.
     pub naming: Naming,
-    /// `ROS_DOMAIN_ID`.
+    /// The domain, as in `ROS_DOMAIN_ID`.
     pub domain_id: u16,
     /// The middleware of the services.
     pub rmw: Rmw,
@@ -83,7 +84,7 @@ pub struct NodeConfig {
 }
 
 impl NodeConfig {
-    /// In domain 0 on every network, without parameters.
+    /// Settings for domain 0 on all networks, without parameters.
     pub fn new(naming: Naming) -> Self {
         Self { naming, domain_id: 0, rmw: Rmw::default(), is_loopback_only: false, parameters: Vec::new() }
     }
@@ -91,7 +92,7 @@ impl NodeConfig {
 
 /// A node on the network, until it is dropped.
 pub struct Node {
-    // Dropped first: it ends the spinner.
+    // This must be dropped first, because that ends the spinner.
     node: Option<ros2_client::Node>,
     naming: Naming,
     rmw: Rmw,
@@ -102,7 +103,7 @@ impl Node {
     /// Joins the network.
     ///
     /// # Errors
-    /// No socket, or an invalid name.
+    /// [`RosError`] without a socket, and for an invalid name.
     pub fn join(config: NodeConfig) -> Result<Self, RosError> {
         let NodeConfig { naming, domain_id, rmw, is_loopback_only, parameters } = config;
         if domain_id > MAX_DOMAIN {
@@ -115,12 +116,12 @@ impl Node {
         let participant = builder.build().map_err(|error| network("ROS 2", error))?;
         let context = Context::from_domain_participant(participant).map_err(|error| network("ROS 2", error))?;
         let name = NodeName::new(naming.namespace(), naming.node()).map_err(|error| network("node", error))?;
-        // The parameter services support only Fast DDS's calls: no other middleware could use them.
+        // The parameter services of `ros2-client` support only the calls of Fast DDS.
         let mut options = NodeOptions::new().enable_rosout(true).start_parameter_services(rmw == Rmw::FastRtps);
         for (parameter, value) in &parameters {
             options = options.declare_parameter(parameter, ParameterValue::String(value.clone()));
         }
-        // The initial values are also checked by it, including use_sim_time, which every node has.
+        // This function also checks the initial values, including use_sim_time, which every node has.
         let is_fixed = move |name: &str, value: &ParameterValue| match value {
             ParameterValue::String(text) if parameters.iter().any(|(known, told)| known == name && told == text) => {
                 Ok(())
@@ -138,7 +139,7 @@ impl Node {
         Ok(Self { node: Some(node), naming, rmw, spinner: Some(spinner) })
     }
 
-    /// Names as this node resolves them.
+    /// The naming of the node, for the resolution of names.
     pub fn naming(&self) -> &Naming {
         &self.naming
     }
@@ -146,7 +147,7 @@ impl Node {
     /// Receives a topic's messages.
     ///
     /// # Errors
-    /// An invalid name, and errors reported by the network.
+    /// [`RosError`] for an invalid name, and errors reported by the network.
     pub fn subscribe<T: Message + 'static>(&mut self, topic: &str, qos: Qos) -> Result<Subscription<T>, RosError> {
         let (absolute, name) = self.name(topic)?;
         let profile = qos.profile();
@@ -192,7 +193,7 @@ impl Node {
         Ok(Server::new(absolute, inner))
     }
 
-    /// Uses an action: its three services and two topics.
+    /// Creates a client of an action: three services and two topics.
     ///
     /// # Errors
     /// As for [`Self::subscribe`].
@@ -255,7 +256,7 @@ impl Node {
     /// Waits until a server of an action exists.
     ///
     /// # Errors
-    /// No server in time.
+    /// [`RosError::Network`] if there is no server in time.
     pub fn wait_for_server<G, R, F>(&self, client: &ActionClient<G, R, F>, timeout: Duration) -> Result<(), RosError>
     where
         G: Cdr + Clone + 'static,
@@ -277,10 +278,10 @@ impl Node {
             }
         }
         let secs = timeout.as_secs_f64();
-        Err(network(client.name(), format!("nobody serves this action within {secs:.0} s")))
+        Err(network(client.name(), format!("no server of this action within {secs:.0} s")))
     }
 
-    /// Number of readers of a topic of this node.
+    /// Number of readers of a topic to which this node publishes.
     pub fn num_readers<T: Cdr>(&self, publisher: &Publisher<T>) -> usize {
         self.node.as_ref().map_or(0, |node| publisher.inner().get_subscription_count(node))
     }
@@ -290,7 +291,7 @@ impl Drop for Node {
     fn drop(&mut self) {
         self.node = None;
         if let Some(spinner) = self.spinner.take() {
-            // Its thread has already printed a panic.
+            // After a panic, its thread has already printed a message.
             let _ = spinner.join();
         }
     }

@@ -8,19 +8,19 @@ use super::wire::Wire;
 use crate::cdr::Cdr;
 use crate::error::RosError;
 
-/// The request to which an answer belongs.
+/// Identifier of the request to which an answer belongs.
 pub type RequestId = ros2_client::RmwRequestId;
 
-/// A service's type, as in `std_srvs/srv/Trigger`.
+/// The type of a service, such as `std_srvs/srv/Trigger`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ServiceType {
-    /// `std_srvs`
+    /// The package, such as `std_srvs`.
     pub package: &'static str,
-    /// `Trigger`
+    /// The name, such as `Trigger`.
     pub name: &'static str,
 }
 
-/// Answers requests.
+/// The server of a service.
 pub struct Server<Q: Cdr + 'static, A: Cdr + 'static> {
     name: String,
     inner: ros2_client::Server<Wire<Q>, Wire<A>>,
@@ -36,7 +36,8 @@ impl<Q: Cdr + 'static, A: Cdr + 'static> Server<Q, A> {
         &self.name
     }
 
-    /// The next request, or the reason why it is invalid; `None` if none arrives in time. Both must be answered.
+    /// The next request, or the reason why it is invalid; `None` if none arrives in time. An invalid request must also
+    /// be answered.
     ///
     /// # Errors
     /// Errors reported by the network.

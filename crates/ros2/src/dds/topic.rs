@@ -1,4 +1,4 @@
-//! Messages to and from topics.
+//! Sends messages to topics and receives messages from them.
 
 use std::collections::HashMap;
 use std::sync::Mutex;
@@ -22,22 +22,22 @@ pub struct Qos {
     pub is_reliable: bool,
     /// Whether late subscribers get the last messages.
     pub is_transient_local: bool,
-    /// Number of messages kept for a slow reader.
+    /// Number of messages that are kept for a slow reader.
     pub depth: usize,
 }
 
 impl Qos {
-    /// For sensors: best effort, as ROS's `SensorDataQoS`.
+    /// Settings for sensors: best effort, as in ROS's `SensorDataQoS`.
     pub const SENSORS: Self = Self { is_reliable: false, is_transient_local: false, depth: 5 };
-    /// For results: reliable.
+    /// Settings for results: reliable.
     pub const RESULTS: Self = Self { is_reliable: true, is_transient_local: false, depth: 10 };
-    /// For services: reliable.
+    /// Settings for services: reliable.
     pub const SERVICES: Self = Self::RESULTS;
-    /// For `/tf`.
+    /// Settings for `/tf`.
     pub const TRANSFORMS: Self = Self { is_reliable: true, is_transient_local: false, depth: 100 };
-    /// For `/tf_static`: late subscribers get it.
+    /// Settings for `/tf_static`: late subscribers also get the messages.
     pub const STATIC_TRANSFORMS: Self = Self { is_reliable: true, is_transient_local: true, depth: 100 };
-    /// For action statuses.
+    /// Settings for the statuses of actions.
     pub(super) const STATUSES: Self = Self { is_reliable: true, is_transient_local: true, depth: 1 };
 
     pub(super) fn profile(self) -> QosProfile {
@@ -53,7 +53,7 @@ impl Qos {
     }
 }
 
-/// Number of senders whose counts are stored.
+/// Maximum number of senders whose last message numbers are stored.
 const MAX_SENDERS: usize = 64;
 
 /// A topic's messages.
@@ -86,7 +86,7 @@ impl<T: Cdr + 'static> Subscription<T> {
     /// The next message; `None` if none arrives in time.
     ///
     /// # Errors
-    /// [`RosError::Malformed`] for an invalid message of this type; the next call continues.
+    /// [`RosError::Malformed`] for an invalid message of this type; the next call continues with the next message.
     pub fn receive(&self, timeout: Duration) -> Result<Option<Received<T>>, RosError> {
         let Some(taken) = wait_for(self.inner.async_take(), Some(Instant::now() + timeout)) else { return Ok(None) };
         let arrived = Instant::now();
@@ -103,7 +103,7 @@ impl<T: Cdr + 'static> Subscription<T> {
         self.num_lost.load(Ordering::Relaxed)
     }
 
-    /// Senders number their messages consecutively.
+    /// Counts the messages of a sender that are missing before this one, which the sender numbers consecutively.
     fn count(&self, sender: Gid, number: i64) {
         let mut last_numbers = self.last_numbers.lock().unwrap_or_else(PoisonError::into_inner);
         if last_numbers.len() >= MAX_SENDERS && !last_numbers.contains_key(&sender) {
@@ -141,7 +141,7 @@ impl<T: Cdr> Publisher<T> {
     /// Sends a message.
     ///
     /// # Errors
-    /// A reliable reader that accepts nothing.
+    /// [`RosError::Network`] if the queue of a reliable reader stays full.
     pub fn send(&self, message: T) -> Result<(), RosError> {
         self.inner.publish(Wire(Ok(message))).map_err(|error| network(&self.topic, error.forget_data()))
     }

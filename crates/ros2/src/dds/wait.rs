@@ -8,12 +8,12 @@ use std::task::{Context, Poll, Wake, Waker};
 use std::thread::Thread;
 use std::time::{Duration, Instant};
 
-/// Longest time before a future is polled again: then events are noticed that `ros2-client` dropped from a full
+/// Interval after which a future is polled again without being woken, because `ros2-client` drops events from a full
 /// channel.
 const POLL_EVERY: Duration = Duration::from_millis(100);
 
-/// Whether the future is to be polled, in addition to the thread's own token, which code below the future consumes if
-/// it parks the thread itself.
+/// Whether the future was woken, and the thread to unpark. The thread's own token is not sufficient: code below the
+/// future consumes it if that code parks the thread.
 struct Woken(AtomicBool, Thread);
 
 impl Wake for Woken {
@@ -23,7 +23,7 @@ impl Wake for Woken {
     }
 }
 
-/// The output of the future; `None` if the deadline comes first. Without a deadline it waits forever.
+/// The output of the future; `None` if the deadline comes first. Without a deadline, the wait is unlimited.
 pub(super) fn wait_for<F: Future>(future: F, deadline: Option<Instant>) -> Option<F::Output> {
     let woken = Arc::new(Woken(AtomicBool::new(false), std::thread::current()));
     let waker = Waker::from(Arc::clone(&woken));
@@ -63,12 +63,12 @@ mod tests {
                 return Poll::Ready(());
             }
             context.waker().wake_by_ref();
-            // As a waiting channel does: afterwards the thread's token is consumed.
+            // The future consumes the thread's token, like a waiting channel.
             std::thread::park();
             Poll::Pending
         });
         assert_eq!(wait_for(future, None), Some(()));
-        assert!(begun.elapsed() < POLL_EVERY, "it was polled again at the wake-up, not at the next turn");
+        assert!(begun.elapsed() < POLL_EVERY, "the future was polled at the wake-up, not after the interval");
     }
 
     #[test]

@@ -1,5 +1,5 @@
-//! Our messages in the form of `ros2-client`, which requires serde: a message's bytes, one by one, as CDR writes a
-//! tuple of them.
+//! This crate's messages for `ros2-client`, which requires serde: a message is serialized as a tuple of its bytes,
+//! which CDR writes unchanged.
 
 use std::fmt;
 use std::marker::PhantomData;
@@ -11,11 +11,10 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use crate::cdr::{self, Cdr, CdrError};
 use crate::encoding::MAX_BYTES;
 
-/// A picture and the fields around it.
+/// Maximum size of a message: a picture and its other fields.
 const MAX_MESSAGE_BYTES: usize = MAX_BYTES + (1 << 16);
 
-/// A message in transfer. An unreadable message is reported with its position, not dropped, so that a service can still
-/// answer.
+/// A message in transfer. An unreadable message is kept as an error, so that a service can still answer it.
 #[derive(Debug, Clone)]
 pub(super) struct Wire<T>(pub(super) Result<T, CdrError>);
 
@@ -48,7 +47,7 @@ impl<'de, T: Cdr> Visitor<'de> for AllBytes<T> {
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut bytes: A) -> Result<Wire<T>, A::Error> {
         let mut all = Vec::new();
-        // The end of the message is the first missing byte.
+        // The message ends at the first missing byte.
         while let Ok(Some(byte)) = bytes.next_element::<u8>() {
             all.push(byte);
             if all.len() > MAX_MESSAGE_BYTES {

@@ -18,19 +18,19 @@ structure! {
 impl Copy for Duration {}
 
 impl Duration {
-    /// From seconds, to the nanosecond; 0 for a negative value or NaN.
+    /// Converts from seconds, to the nanosecond; 0 for a negative value or NaN.
     pub fn from_secs(secs: f64) -> Self {
         let nanos = (secs.max(0.0) * 1e9).round().min(f64::from(i32::MAX) * 1e9) as u64;
         Self { sec: i32::try_from(nanos / 1_000_000_000).unwrap_or(i32::MAX), nanosec: (nanos % 1_000_000_000) as u32 }
     }
 
-    /// Seconds.
+    /// The duration in seconds.
     pub fn secs(self) -> f64 {
         f64::from(self.sec) + f64::from(self.nanosec) * 1e-9
     }
 }
 
-/// A result as in `*_GetResult_Response`: after the status's one byte, which shifts its alignment.
+/// A result as in `*_GetResult_Response`, where the one byte of the status precedes it and shifts its alignment.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct AfterStatus<T>(pub T);
 
@@ -49,15 +49,15 @@ impl<T: Cdr> Cdr for AfterStatus<T> {
 structure! {
     /// `trajectory_msgs/msg/JointTrajectoryPoint`.
     JointTrajectoryPoint {
-        /// rad, in the order of the trajectory's names.
+        /// Positions in rad, in the order of the trajectory's names.
         positions: Vec<f64>,
-        /// rad/s; may be empty.
+        /// Velocities in rad/s; may be empty.
         velocities: Vec<f64>,
-        /// rad/s²; may be empty.
+        /// Accelerations in rad/s²; may be empty.
         accelerations: Vec<f64>,
-        /// Nm; may be empty.
+        /// Torques in Nm; may be empty.
         effort: Vec<f64>,
-        /// From the trajectory's start.
+        /// Time from the start of the trajectory.
         time_from_start: Duration,
     }
 }
@@ -69,7 +69,7 @@ structure! {
         header: Header,
         /// The moving joints.
         joint_names: Vec<String>,
-        /// In the order of time.
+        /// The points, in order of time.
         points: Vec<JointTrajectoryPoint>,
     }
 }
@@ -77,13 +77,13 @@ structure! {
 structure! {
     /// `trajectory_msgs/msg/MultiDOFJointTrajectoryPoint`, not used here.
     MultiDofTrajectoryPoint {
-        /// Of the frames.
+        /// The transforms of the joints.
         transforms: Vec<Transform>,
-        /// Their velocities.
+        /// The velocities of the joints.
         velocities: Vec<Twist>,
-        /// Their accelerations.
+        /// The accelerations of the joints.
         accelerations: Vec<Twist>,
-        /// From the trajectory's start.
+        /// Time from the start of the trajectory.
         time_from_start: Duration,
     }
 }
@@ -91,11 +91,11 @@ structure! {
 structure! {
     /// `trajectory_msgs/msg/MultiDOFJointTrajectory`, not used here.
     MultiDofTrajectory {
-        /// Time.
+        /// Stamp and frame.
         header: Header,
         /// Names of the joints.
         joint_names: Vec<String>,
-        /// In the order of time.
+        /// The points, in order of time.
         points: Vec<MultiDofTrajectoryPoint>,
     }
 }
@@ -105,11 +105,11 @@ structure! {
     JointTolerance {
         /// The joint.
         name: String,
-        /// rad.
+        /// Tolerance of the position, rad.
         position: f64,
-        /// rad/s.
+        /// Tolerance of the velocity, rad/s.
         velocity: f64,
-        /// rad/s².
+        /// Tolerance of the acceleration, rad/s².
         acceleration: f64,
     }
 }
@@ -121,11 +121,11 @@ structure! {
         joint_name: String,
         /// The degree of freedom.
         component: u16,
-        /// rad or m.
+        /// Tolerance of the position, rad or m.
         position: f64,
-        /// Their rates.
+        /// Tolerance of the velocity.
         velocity: f64,
-        /// Their accelerations.
+        /// Tolerance of the acceleration.
         acceleration: f64,
     }
 }
@@ -135,15 +135,15 @@ structure! {
     FollowJointTrajectoryGoal {
         /// The joint positions over time.
         trajectory: JointTrajectory,
-        /// Empty here.
+        /// Always empty.
         multi_dof_trajectory: MultiDofTrajectory,
-        /// Tolerances during the motion; empty: the controller's own.
+        /// Tolerances during the motion; if empty, the controller uses its own.
         path_tolerance: Vec<JointTolerance>,
-        /// Empty here.
+        /// Always empty.
         component_path_tolerance: Vec<JointComponentTolerance>,
         /// Tolerances at the end.
         goal_tolerance: Vec<JointTolerance>,
-        /// Empty here.
+        /// Always empty.
         component_goal_tolerance: Vec<JointComponentTolerance>,
         /// Largest delay of the end after the trajectory's time.
         goal_time_tolerance: Duration,
@@ -153,9 +153,9 @@ structure! {
 structure! {
     /// `control_msgs/action/FollowJointTrajectory_Result`.
     FollowJointTrajectoryResult {
-        /// 0 is success.
+        /// Error code; 0 means success.
         error_code: i32,
-        /// In words.
+        /// Description of the error.
         error_string: String,
     }
 }
@@ -163,7 +163,7 @@ structure! {
 structure! {
     /// `control_msgs/action/FollowJointTrajectory_Feedback`; the further fields of a newer version are not read.
     FollowJointTrajectoryFeedback {
-        /// Time.
+        /// Stamp and frame.
         header: Header,
         /// The joints.
         joint_names: Vec<String>,
@@ -181,7 +181,7 @@ structure! {
     GripperCommandGoal {
         /// The desired position of the gripper's joint, m.
         position: f64,
-        /// N.
+        /// The maximum force, N.
         max_effort: f64,
     }
 }
@@ -191,11 +191,11 @@ structure! {
     GripperCommandResult {
         /// The position of the gripper's joint, m.
         position: f64,
-        /// N.
+        /// The force, N.
         effort: f64,
-        /// Whether it pushes without moving.
+        /// Whether the gripper pushes without moving.
         stalled: bool,
-        /// Whether it reached its desired position.
+        /// Whether the gripper reached its desired position.
         reached_goal: bool,
     }
 }
@@ -205,11 +205,11 @@ structure! {
     GripperCommandFeedback {
         /// The position of the gripper's joint, m.
         position: f64,
-        /// N.
+        /// The force, N.
         effort: f64,
-        /// Whether it pushes without moving.
+        /// Whether the gripper pushes without moving.
         stalled: bool,
-        /// Whether it reached its desired position.
+        /// Whether the gripper reached its desired position.
         reached_goal: bool,
     }
 }
@@ -223,7 +223,7 @@ mod tests {
     fn a_result_behind_the_status_is_aligned_with_it() {
         let result = FollowJointTrajectoryResult { error_code: 7, error_string: "a".to_owned() };
         let bytes = to_bytes(&AfterStatus(result.clone()));
-        // By hand: the status would be byte 0, so that three bytes of padding precede the i32.
+        // Computed by hand: the status would be byte 0, so that three bytes of padding precede the i32.
         assert_eq!(bytes, [0, 0, 0, 7, 0, 0, 0, 2, 0, 0, 0, b'a', 0]);
         assert_eq!(from_bytes::<AfterStatus<FollowJointTrajectoryResult>>(&bytes).unwrap().0, result);
     }

@@ -1,4 +1,4 @@
-//! diagnostic_msgs.
+//! Messages of diagnostic_msgs.
 
 use super::{Header, message, structure};
 
@@ -19,11 +19,11 @@ structure! {
         level: u8,
         /// Name of the source.
         name: String,
-        /// Text, one line.
+        /// A text of one line.
         message: String,
-        /// The device.
+        /// Identifier of the device.
         hardware_id: String,
-        /// Numbers.
+        /// Further values.
         values: Vec<KeyValue>,
     }
 }
@@ -31,11 +31,11 @@ structure! {
 impl DiagnosticStatus {
     /// No error.
     pub const OK: u8 = 0;
-    /// It works with restrictions.
+    /// The source works with restrictions.
     pub const WARN: u8 = 1;
-    /// It does not work.
+    /// The source does not work.
     pub const ERROR: u8 = 2;
-    /// No data are received.
+    /// No data is received.
     pub const STALE: u8 = 3;
 }
 

@@ -1,4 +1,4 @@
-//! geometry_msgs.
+//! Messages of geometry_msgs.
 
 use nalgebra::{Isometry3, Quaternion as Quat, Translation3, UnitQuaternion};
 
@@ -67,7 +67,7 @@ structure! {
     PoseWithCovariance {
         /// The pose.
         pose: Pose,
-        /// Row by row: x, y, z, and rotations about them; zeros for unknown values.
+        /// Covariance of x, y, z and of the rotations about them, row by row; zeros for unknown values.
         covariance: Covariance,
     }
 }
@@ -109,13 +109,13 @@ structure! {
 }
 
 structure! {
-    /// `geometry_msgs/msg/TransformStamped`: the pose of the child's frame in the header's.
+    /// `geometry_msgs/msg/TransformStamped`: the pose of the child's frame in the frame of the header.
     TransformStamped {
         /// Time, and the parent's frame.
         header: Header,
         /// The child's frame.
         child_frame_id: String,
-        /// parent_from_child.
+        /// The pose `parent_from_child`.
         transform: Transform,
     }
 }
@@ -123,14 +123,14 @@ structure! {
 structure! {
     /// `geometry_msgs/msg/Twist`.
     Twist {
-        /// m/s.
+        /// Linear velocity, m/s.
         linear: Vector3,
-        /// rad/s.
+        /// Angular velocity, rad/s.
         angular: Vector3,
     }
 }
 
-/// A quaternion with a length this far from 1 is not a rotation.
+/// Largest deviation of a rotation's quaternion from length 1.
 const MAX_LENGTH_ERROR: f64 = 1e-2;
 
 impl Quaternion {
@@ -148,7 +148,7 @@ impl From<UnitQuaternion<f64>> for Quaternion {
 }
 
 impl Transform {
-    /// As an isometry; `None` if a number is not finite or the rotation is invalid.
+    /// The transform as an isometry; `None` if a number is not finite or the rotation is invalid.
     pub fn isometry(&self) -> Option<Isometry3<f64>> {
         let Vector3 { x, y, z } = self.translation;
         let rotation = self.rotation.rotation()?;

@@ -1,4 +1,4 @@
-//! sdg_interfaces; its definitions are in crates/ros2/sdg_interfaces.
+//! Messages of sdg_interfaces, which is defined in crates/ros2/sdg_interfaces.
 
 use super::geometry::PoseStamped;
 use super::structure;
@@ -7,9 +7,9 @@ use super::vision::Detection2DArray;
 structure! {
     /// `sdg_interfaces/srv/Detect_Request`.
     DetectRequest {
-        /// Minimum score of the returned detections; 0 for the node's own.
+        /// Minimum score of the returned detections; 0 for the node's setting.
         min_score: f64,
-        /// Time to wait for a picture taken after the call; 0 for 5 s.
+        /// Maximum wait for a picture taken after the call; 0 for 5 s.
         timeout_secs: f64,
     }
 }
@@ -17,15 +17,15 @@ structure! {
 structure! {
     /// `sdg_interfaces/srv/Detect_Response`.
     DetectResponse {
-        /// Whether a picture was searched; it may have no part.
+        /// Whether a picture was searched, with or without a part.
         success: bool,
         /// The result, or the reason why nothing was searched.
         message: String,
-        /// Best first.
+        /// The detections, best first.
         detections: Detection2DArray,
-        /// For each detection, if the camera's pose is known: the tool centre point when closing.
+        /// The pose of the tool centre point when the hand closes, for each detection, if the camera's pose is known.
         poses: Vec<PoseStamped>,
-        /// For each pose: the width of the part between the fingers.
+        /// The width of the part between the fingers, for each pose.
         openings_m: Vec<f64>,
     }
 }
@@ -33,23 +33,23 @@ structure! {
 structure! {
     /// `sdg_interfaces/srv/Teach_Request`.
     TeachRequest {
-        /// Files on the node's computer: the photo.
+        /// Path of the photo on the node's computer.
         photo_path: String,
-        /// Its annotation; empty for the file beside the photo.
+        /// Path of the annotation; empty for the file beside the photo.
         annotation_path: String,
         /// The annotation itself, as COCO or LabelMe JSON, instead of a path.
         annotation: String,
-        /// A to D or S; empty for C.
+        /// Kind of the grasp model: A to D or S; empty for C.
         model: String,
         /// The file for the grasp model.
         out_path: String,
-        /// Height of the marks over the table; 0 for a model without lengths.
+        /// Height of the marks above the table; 0 for a model without lengths.
         mark_height_mm: f64,
-        /// 0 for none.
+        /// Maximum time for training; 0 for no limit.
         time_budget_secs: f64,
-        /// The seed of the samples.
+        /// Seed of the training samples.
         seed: u64,
-        /// Whether the node then detects with the model.
+        /// Whether the node then uses the model for detection.
         use_it: bool,
     }
 }
@@ -59,11 +59,11 @@ structure! {
     TeachResponse {
         /// Whether a model was taught.
         success: bool,
-        /// The reason, if not.
+        /// The reason for a failure.
         message: String,
-        /// The grasp model.
+        /// Path of the grasp model.
         model_path: String,
-        /// The duration.
+        /// Duration of the teaching.
         seconds: f64,
     }
 }
@@ -73,7 +73,7 @@ structure! {
     GraspRequest {
         /// Plan and check without motion.
         dry_run: bool,
-        /// Share of the joints' velocity limits; 0 for the node's own.
+        /// Fraction of the joints' velocity limits; 0 for the node's setting.
         speed: f64,
     }
 }
@@ -83,13 +83,13 @@ structure! {
     GraspResponse {
         /// Whether the part is held; for a dry run, whether it can be grasped.
         success: bool,
-        /// The reason, if not.
+        /// The reason for a failure.
         message: String,
         /// The last started step: detect, hover, approach, close, lift or hold.
         step: String,
         /// The pose at which the hand closed.
         pose: PoseStamped,
-        /// Width between the fingers at the end.
+        /// Width between the fingers at the end, in metres.
         closed_width_m: f64,
     }
 }

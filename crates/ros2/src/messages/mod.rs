@@ -28,13 +28,13 @@ pub use vision::{
 
 /// A message with its package and name.
 pub trait Message: Cdr {
-    /// As in `sensor_msgs`.
+    /// Name of the package, such as `sensor_msgs`.
     const PACKAGE: &'static str;
-    /// As in `Image`.
+    /// Name of the message, such as `Image`.
     const NAME: &'static str;
 }
 
-/// A plain structure with its fields in sequence.
+/// Defines a structure whose fields are encoded in sequence.
 macro_rules! structure {
     ($(#[$doc:meta])* $name:ident { $($(#[$field_doc:meta])* $field:ident: $type:ty,)+ }) => {
         $(#[$doc])*
@@ -55,7 +55,7 @@ macro_rules! structure {
     };
 }
 
-/// A structure that is also a message.
+/// Defines a structure that is also a message.
 macro_rules! message {
     ($package:literal, $(#[$doc:meta])* $name:ident { $($fields:tt)+ }) => {
         $crate::messages::structure! { $(#[$doc])* $name { $($fields)+ } }
@@ -69,7 +69,7 @@ macro_rules! message {
 
 use {message, structure};
 
-/// A message without fields is one byte on the network.
+/// A message without fields, which is one byte on the network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Empty;
 
@@ -80,7 +80,7 @@ impl Cdr for Empty {
         0_u8.write(to);
     }
 
-    /// Some senders omit the byte.
+    /// Reads nothing, because some senders omit the byte.
     fn read(_from: &mut Reader<'_>) -> Result<Self, CdrError> {
         Ok(Self)
     }

@@ -1,4 +1,4 @@
-//! sensor_msgs, and the message of transforms.
+//! Messages of sensor_msgs, and the message of transforms.
 
 use super::geometry::TransformStamped;
 use super::{Header, message, structure};
@@ -8,9 +8,9 @@ message! { "sensor_msgs",
     Image {
         /// Time of the picture, and the camera's optical frame.
         header: Header,
-        /// Rows.
+        /// Height, in pixels.
         height: u32,
-        /// Pixels per row.
+        /// Width, in pixels.
         width: u32,
         /// Encoding, such as `rgb8`.
         encoding: String,
@@ -18,7 +18,7 @@ message! { "sensor_msgs",
         is_bigendian: u8,
         /// Bytes per row.
         step: u32,
-        /// The rows, each of `step` bytes.
+        /// The pixels: `height` rows of `step` bytes.
         data: Vec<u8>,
     }
 }
@@ -30,7 +30,7 @@ message! { "sensor_msgs",
         header: Header,
         /// Format, such as `jpeg` or `rgb8; jpeg compressed bgr8`.
         format: String,
-        /// The file.
+        /// The bytes of the file.
         data: Vec<u8>,
     }
 }
@@ -42,9 +42,9 @@ structure! {
         x_offset: u32,
         /// Upper edge.
         y_offset: u32,
-        /// Rows; 0 for all.
+        /// Height, in pixels; 0 for the whole picture.
         height: u32,
-        /// Pixels per row; 0 for all.
+        /// Width, in pixels; 0 for the whole picture.
         width: u32,
         /// Whether the picture is to be rectified.
         do_rectify: bool,
@@ -56,23 +56,23 @@ message! { "sensor_msgs",
     CameraInfo {
         /// Header of the picture.
         header: Header,
-        /// Rows of the calibrated picture.
+        /// Height of the calibrated picture, in pixels.
         height: u32,
-        /// Pixels per row.
+        /// Width of the calibrated picture, in pixels.
         width: u32,
         /// Lens model, such as `plumb_bob`.
         distortion_model: String,
-        /// For `plumb_bob`: k1, k2, p1, p2, k3.
+        /// The coefficients of the lens; for `plumb_bob`: k1, k2, p1, p2, k3.
         d: Vec<f64>,
         /// The camera matrix, row by row.
         k: [f64; 9],
-        /// For a stereo camera.
+        /// The rectification matrix of a stereo camera, row by row.
         r: [f64; 9],
         /// The matrix of the rectified picture, row by row.
         p: [f64; 12],
-        /// Number of pixels that were added up; 0 means 1.
+        /// Number of columns that were combined into one pixel; 0 means 1.
         binning_x: u32,
-        /// The same for rows.
+        /// Number of rows that were combined into one pixel; 0 means 1.
         binning_y: u32,
         /// The part of the picture that was sent.
         roi: RegionOfInterest,
@@ -82,15 +82,15 @@ message! { "sensor_msgs",
 message! { "sensor_msgs",
     /// `sensor_msgs/msg/JointState`.
     JointState {
-        /// Time.
+        /// Stamp.
         header: Header,
         /// Names of the joints.
         name: Vec<String>,
-        /// rad or m.
+        /// Positions, rad or m.
         position: Vec<f64>,
-        /// rad/s or m/s; may be empty.
+        /// Velocities, rad/s or m/s; may be empty.
         velocity: Vec<f64>,
-        /// Nm or N; may be empty.
+        /// Torques or forces, Nm or N; may be empty.
         effort: Vec<f64>,
     }
 }
@@ -98,7 +98,7 @@ message! { "sensor_msgs",
 structure! {
     /// `tf2_msgs/msg/TFMessage`.
     TfMessage {
-        /// Each with its stamp.
+        /// The transforms, each with its own stamp.
         transforms: Vec<TransformStamped>,
     }
 }

@@ -1,4 +1,4 @@
-//! vision_msgs 4, as from Humble on.
+//! Messages of vision_msgs 4, which is used from Humble on.
 
 use super::geometry::PoseWithCovariance;
 use super::{Header, message, structure};
@@ -6,9 +6,9 @@ use super::{Header, message, structure};
 structure! {
     /// `vision_msgs/msg/Point2D`, pixels.
     Point2D {
-        /// To the right.
+        /// x, to the right.
         x: f64,
-        /// Down.
+        /// y, down.
         y: f64,
     }
 }
@@ -18,7 +18,7 @@ structure! {
     Pose2D {
         /// Position.
         position: Point2D,
-        /// rad, from x to y.
+        /// Angle from x to y, rad.
         theta: f64,
     }
 }
@@ -26,11 +26,11 @@ structure! {
 structure! {
     /// `vision_msgs/msg/BoundingBox2D`.
     BoundingBox2D {
-        /// Its centre and its turn.
+        /// Centre and rotation of the box.
         center: Pose2D,
-        /// Width before the turn, pixels.
+        /// Width before the rotation, in pixels.
         size_x: f64,
-        /// Height before the turn, pixels.
+        /// Height before the rotation, in pixels.
         size_y: f64,
     }
 }
@@ -38,9 +38,9 @@ structure! {
 structure! {
     /// `vision_msgs/msg/ObjectHypothesis`.
     ObjectHypothesis {
-        /// Its class.
+        /// Name of the class.
         class_id: String,
-        /// 0 to 1.
+        /// Score, 0 to 1.
         score: f64,
     }
 }
@@ -50,7 +50,7 @@ structure! {
     ObjectHypothesisWithPose {
         /// The class and the score.
         hypothesis: ObjectHypothesis,
-        /// Its pose.
+        /// Pose of the object.
         pose: PoseWithCovariance,
     }
 }
@@ -60,9 +60,9 @@ structure! {
     Detection2D {
         /// Header of the picture.
         header: Header,
-        /// Its possible classes.
+        /// The possible classes of the object.
         results: Vec<ObjectHypothesisWithPose>,
-        /// Its box in the picture.
+        /// Box of the object in the picture.
         bbox: BoundingBox2D,
         /// Number of the track.
         id: String,
@@ -74,7 +74,7 @@ message! { "vision_msgs",
     Detection2DArray {
         /// Header of the picture.
         header: Header,
-        /// Best first.
+        /// The detections, best first.
         detections: Vec<Detection2D>,
     }
 }

@@ -1,4 +1,4 @@
-"""An arm's driver played over Cyclone DDS: FollowJointTrajectory, GripperCommand and joint_states, each endpoint of the actions.
+"""Plays an arm's driver over Cyclone DDS: FollowJointTrajectory, GripperCommand and joint_states, each endpoint of the actions.
 
 python arm_peer.py PROGRAM: the built example arm_against_peer, whose lines are compared with what the peer did.
 """
@@ -40,13 +40,13 @@ class Action:
         self.status((1).to_bytes(4, "little") + goal + bytes(8) + bytes([status]))
 
     def end(self, goal, status, result):
-        """The status is one byte, and what follows is aligned behind it: the result begins with padding."""
+        """The status is one byte, and the result is aligned after it: it begins with padding."""
         self.tell(goal, status)
         self.ended[goal] = bytes([status]) + result
         self.serve()
 
     def serve(self):
-        """Answers questions for results of goals that have ended, and cancellations of goals that do not run."""
+        """Answers requests for the results of ended goals, and cancellations of goals that are not running."""
         self.asked += [(content[:16], head) for head, content in self.results.requests()]
         for goal, head in self.asked:
             if goal in self.ended:
@@ -55,7 +55,7 @@ class Action:
         self.cancelled(None)
 
     def cancelled(self, running):
-        """Whether the goal that runs is cancelled."""
+        """Whether the running goal is cancelled."""
         found = False
         for head, content in self.cancels.requests():
             goal = content[:16]
@@ -143,7 +143,7 @@ def main(program):
     failed = 0
     for name, expected in [
         ("first", "arrived"), ("second", "path tolerance violated joint 7 was held"), ("third", "refused the trajectory"),
-        ("fourth", "a person asked for it"), ("open", "80 mm, holds nothing"), ("grasp", "30 mm, holds"),
+        ("fourth", "a person requested it"), ("open", "80 mm, holds nothing"), ("grasp", "30 mm, holds"),
         ("silent", "no joint states on /joint_states"),
     ]:
         good = expected in told.get(name, "")

@@ -1,4 +1,4 @@
-"""Topics and services of ROS 2 over Cyclone DDS, with rosbags' bytes: what a ROS node of another vendor would send and get."""
+"""Topics and services of ROS 2 over Cyclone DDS, with rosbags' bytes, as a ROS node of another vendor sends and receives them."""
 
 import dataclasses
 import os
@@ -37,11 +37,11 @@ def transient_local(depth):
 
 
 def raw_type(type_name):
-    """A type with this name whose samples are bytes as they are on the network, without the four that name the encoding."""
+    """A type with this name whose samples are the bytes on the network, without the four bytes of the encoding."""
 
     @dataclasses.dataclass
     class Raw(IdlStruct, typename=type_name):
-        # Cyclone checks that samples begin like their type; what follows the first byte it passes on.
+        # Cyclone checks only the first byte of a sample and passes the others on.
         first: uint8
 
         def serialize(self, *_, **__):
@@ -61,7 +61,7 @@ def sample_of(raw, data):
 
 
 def dds_type(name):
-    """sensor_msgs/msg/Image as DDS names it."""
+    """The DDS name of a type such as sensor_msgs/msg/Image."""
     package, kind, message = name.split("/")
     return f"{package}::{kind}::dds_::{message}_"
 
@@ -75,7 +75,7 @@ def unpack(data, name):
 
 
 def make(type_name, /, **fields):
-    """A message with these fields, and others as they are empty."""
+    """A message with these fields; the others are empty."""
     empty = {"string": "", "bool": False}
     values = []
     for field, (kind, details) in STORE.get_msgdef(type_name).fields:
@@ -135,7 +135,7 @@ class Peer:
 
 
 class Client:
-    """A service's client as rmw_cyclonedds_cpp has it: half of the client's identifier and a number before the content."""
+    """A service's client as in rmw_cyclonedds_cpp: half of the client's identifier and a number precede the content."""
 
     def __init__(self, participant, service, request, response, kind):
         package, name = request.split("/")
@@ -154,7 +154,7 @@ class Client:
         return self.number
 
     def call(self, content, timeout=10.0):
-        """The answer's bytes and the seconds until it came; None where none comes."""
+        """The answer's bytes and the seconds until it arrived; None without an answer."""
         number, begun = self.send(content), time.monotonic()
         while time.monotonic() < begun + timeout:
             for sample in self.reader.take(100):

@@ -1,4 +1,4 @@
-"""Grasps over ROS 2 in the cell of MuJoCo (example ros2_cell), beside the same attempts in one process.
+"""Grasps over ROS 2 in a cell of MuJoCo (example ros2_cell), compared with the same attempts in one process.
 
 python grasp_tests.py SDG FOLDER CELL ATTEMPTS [PART ...]
 python grasp_tests.py call DOMAIN: calls /sdg/grasp once.
@@ -28,7 +28,7 @@ def grasp(peer, timeout=180.0):
 
 
 def over_ros(sdg, cell, model, part, seed, domain):
-    """Whether the answer says held, whether the cell saw the part lifted, and the answer's words."""
+    """Whether the answer says held, whether the part was lifted in the cell, and the text of the answer."""
     simulated = subprocess.Popen([cell, part, str(seed), str(domain), "cyclonedds"], stdout=subprocess.PIPE, text=True)
     said = []
     reader = threading.Thread(target=lambda: said.extend(simulated.stdout), daemon=True)
@@ -44,7 +44,7 @@ def over_ros(sdg, cell, model, part, seed, domain):
         reader.join(5)
     lifted = sum("lifted" in line for line in said) > sum("down" in line for line in said)
     held = bool(answer and answer.success)
-    # Without an answer the node's own lines are what tells why.
+    # Without an answer, the node's lines give the reason.
     words = f"{answer.step}: {answer.message}" if answer else f"no answer in {secs:.0f} s; the node said {node.lines[-4:]}"
     return held, lifted, words
 

@@ -1,4 +1,4 @@
-"""Messages with random values: bytes of rosbags against ours, for every type that the node exchanges.
+"""Messages with random values: compares the bytes of rosbags with ours, for every type that the node exchanges.
 
 python message_bytes.py PROGRAM: the built example cdr_round_trip.
 """
@@ -47,7 +47,7 @@ DEFINITIONS = {
 
 
 def definitions():
-    """Those above, and our services' two sides as messages, from the files that a user builds."""
+    """The types above, and the requests and responses of this project's services, from the files that a user builds."""
     all_of_them = dict(DEFINITIONS)
     for name in ("Detect", "Teach", "Grasp"):
         request, response = (INTERFACES / f"{name}.srv").read_text().split("---\n")
@@ -89,7 +89,7 @@ def base_of(name, dice):
     if name.startswith("float"):
         return float(np.float32(dice.uniform(-5, 5)))
     if name in ("octet", "byte", "char"):
-        # rosbags takes some of them for signed.
+        # rosbags treats some of them as signed.
         return dice.randrange(128)
     bits = int(name.lstrip("uint"))
     return dice.randrange(2**bits) if name[0] == "u" else dice.randrange(-(2 ** (bits - 1)), 2 ** (bits - 1))
@@ -116,14 +116,14 @@ def main(program):
     sent = []
     for name in names:
         for _ in range(ROUNDS):
-            # The first four bytes name the encoding.
+            # The first four bytes identify the encoding.
             sent.append((name, bytes(store.serialize_cdr(message_of(store, name, dice), name))[4:]))
     lines = "\n".join(f"{name} {data.hex()}" for name, data in sent)
     answers = subprocess.run([program], input=lines, capture_output=True, text=True, check=True).stdout.splitlines()
     assert len(answers) == len(sent), (len(answers), len(sent))
     failed = 0
     for (name, data), answer in zip(sent, answers):
-        # rosbags pads the end of a message; the reader of one passes over it.
+        # rosbags pads the end of a message, which readers ignore.
         ours = bytes.fromhex(answer) if not answer.startswith("error") else None
         if ours is None or data[: len(ours)] != ours or any(data[len(ours):]) or len(data) - len(ours) > 7:
             failed += 1

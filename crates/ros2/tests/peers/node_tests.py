@@ -31,7 +31,7 @@ def check(condition, text):
 
 
 class Sdg:
-    """sdg ros2 in a process, whose lines on standard error are kept."""
+    """A process of sdg ros2 whose lines on standard error are kept."""
 
     def __init__(self, program, domain, *options, rmw="cyclonedds"):
         self.lines = []
@@ -94,7 +94,7 @@ def nanos(stamp):
 
 
 def send_at(writer, pixels, rate, count, varied=True):
-    """Sends pictures at a rate; the stamps. Each differs in a pixel, as a sensor's noise makes them."""
+    """Sends pictures at a rate and returns their stamps. Each differs in a pixel, as with a sensor's noise."""
     packed = bytearray(pack(image(pixels), "sensor_msgs/msg/Image"))
     stamps, begun = [], time.monotonic()
     for number in range(count):
@@ -266,7 +266,7 @@ def faults(sdg, folder):
             (image(photo()[:100, :100]), "expected pictures of 640 × 480", "a picture of another size"),
             (image(np.zeros((6000, 4000, 3), np.uint8)), "at most 64 MiB", "an oversized picture"),
         ]:
-            # The same complaint is told once in two seconds.
+            # The same message is printed only once in two seconds.
             time.sleep(2.1)
             node.lines.clear()
             send(message)
@@ -309,7 +309,7 @@ def faults(sdg, folder):
             move(make("tf2_msgs/msg/TFMessage", transforms=[one]))
 
         send_at(send, photo(), 10, 3)
-        line = node.said("nothing was heard of")
+        line = node.said("was received on /tf")
         check(line is not None, f"no transform: {line}")
         transform(3.0)
         time.sleep(0.3)
@@ -350,7 +350,7 @@ def latency(sdg, folder):
 
 
 def memory(sdg, folder, count=10_000):
-    """Small pictures without a part, so that 10^4 take minutes; the messages are whole ones all the same."""
+    """Uses small pictures without a part, so that 10^4 take minutes; the messages are still complete."""
     model = teach(sdg, folder)
     domain = 46
     with Sdg(sdg, domain, f"--grasp-model={model}", "--reliable") as node:

@@ -16,14 +16,14 @@ const BORE_RADIUS: f64 = 0.0125;
 const WIDTH: f64 = 0.015;
 const CHAMFER: f64 = 0.0010;
 
-/// Shoulders of the rings, beside the grooves.
+/// Radii of the rings' shoulders, beside the grooves.
 const OUTER_SHOULDER: f64 = 0.0222;
 const INNER_SHOULDER: f64 = 0.0169;
 
 const NUM_BALLS: u32 = 9;
 const PITCH_RADIUS: f64 = 0.01952;
 const BALL_RADIUS: f64 = 0.00397;
-/// The groove is a little rounder than the balls.
+/// Radius of the grooves, slightly larger than that of the balls.
 const GROOVE_RADIUS: f64 = 0.0041;
 
 /// The part.
@@ -111,7 +111,7 @@ pub fn ball_bearing() -> Part {
     }
 }
 
-/// A face ground in rings, equal in every direction, so that a turn of the bearing is not visible.
+/// A face ground in rings, the same in every direction, so that a rotation of the bearing is not visible.
 fn concentric(base: [f64; 3], strength: f64, seed: u64) -> Texture {
     let rings = Noise::new_stretched(1, 40, seed);
     Texture::paint(128, |u, v| {
@@ -121,8 +121,7 @@ fn concentric(base: [f64; 3], strength: f64, seed: u64) -> Texture {
     })
 }
 
-/// The appearance of a bright ball from above: the lit ceiling in the middle, the dark surroundings below it at its
-/// rim.
+/// The appearance of a bright ball from above: the lit ceiling in the centre, the dark surroundings at the rim.
 fn mirror_ball() -> Texture {
     Texture::paint(32, |u, v| {
         let radius = 2.0 * (u - 0.5).hypot(v - 0.5);

@@ -1,19 +1,20 @@
-//! Positions of everything on the circuit board, in metres: the board from above, its centre beside the grasp.
+//! Positions of all components on the circuit board as seen from above, in metres.
 
 /// Area covered by the textures of board and plastics.
 pub const SPAN: f64 = 0.11;
-/// The board from above: its centre is beside the grasp, because the connectors at -x are heavier.
+/// Length of the board; its centre is beside the grasp (`MIDDLE_X`), because the connectors at -x are heavier.
 pub const LENGTH: f64 = 0.092;
 pub const WIDTH: f64 = 0.052;
 pub const MIDDLE_X: f64 = 0.004;
 pub const THICKNESS: f64 = 0.0016;
 pub const STANDOFF: f64 = 0.0080;
 pub const TOP: f64 = STANDOFF + THICKNESS;
-/// Fixing holes at the corners as x of either end and y, and two open holes.
+/// Fixing holes at the corners: x of both ends, and y.
 pub const FIXINGS: ([f64; 2], f64) = ([-0.0385, 0.0465], 0.0225);
+/// Open holes, x and y.
 pub const OPEN_HOLES: [(f64, f64); 2] = [(-0.0210, 0.0222), (0.0190, -0.0228)];
 
-/// A cuboid on the board: middle and size in plan, height.
+/// A cuboid on the board: centre and size as seen from above, and height.
 pub struct Block {
     pub at: (f64, f64),
     pub size: (f64, f64),
@@ -38,7 +39,7 @@ pub const BUTTON: Block = block(-0.0245, -0.0215, 0.0060, 0.0060, 0.0034);
 /// Electrolytic capacitors: x, y, radius, height.
 pub const CANS: [(f64, f64, f64, f64); 3] =
     [(-0.0215, -0.0110, 0.0040, 0.0105), (-0.0110, -0.0185, 0.0040, 0.0105), (-0.0205, 0.0125, 0.00315, 0.0080)];
-/// Resistors and small capacitors: x, y, along y or not.
+/// Resistors and small capacitors: x, y, and whether they lie along y.
 pub const CHIPS: [(f64, f64, bool); 18] = [
     (-0.0090, 0.0105, false),
     (-0.0090, 0.0130, false),

@@ -1,4 +1,4 @@
-//! The print and the tracks of the circuit board, and the colours of its plastic components.
+//! Print and tracks of the circuit board, and the colours of its plastic components.
 
 use nalgebra::{Point2, Vector2};
 use rand::{Rng, SeedableRng};
@@ -43,7 +43,7 @@ struct Track {
     half_width: f64,
 }
 
-/// Tracks that run level, at 45° and upright from places on a grid, a via at either end.
+/// Horizontal, diagonal and vertical tracks from points of a grid, with a via at each end.
 fn tracks() -> Vec<Track> {
     const GRID: f64 = 0.00127;
     let mut rng = Pcg64Mcg::seed_from_u64(161);
@@ -65,7 +65,7 @@ fn tracks() -> Vec<Track> {
         .collect()
 }
 
-/// Whether a place lies on the line of half a print stroke around a rectangle.
+/// Whether a point is on the printed line around a rectangle.
 fn outlined(place: Point2<f64>, of: &Block, margin: f64) -> bool {
     const STROKE: f64 = 0.0003;
     let grown = |by: f64| in_rectangle(place, of.at, (of.size.0 + 2.0 * by, of.size.1 + 2.0 * by));
@@ -129,7 +129,7 @@ pub fn board_texture() -> Texture {
     })
 }
 
-/// The plastics from above, each in its colour, with the print on them.
+/// The plastic components from above, each in its colour, with the print on them.
 pub fn plastics_texture() -> Texture {
     let texts = [
         (Lettering::level("SDG32", 4.0, 3.6, 1.9), [0.62, 0.62, 0.60]),

@@ -163,7 +163,7 @@ pub fn screws_of(terminal: &Block) -> impl Iterator<Item = (f64, f64)> {
     (0..count).map(move |idx| (x, y + PITCH * (f64::from(idx) - f64::from(count - 1) / 2.0)))
 }
 
-/// The pins of the integrated circuits: on four sides of the controller, on two of the others.
+/// The pins of the integrated circuits: on four sides of the controller, on two sides of the others.
 fn pins() -> TriangleMesh {
     let mut mesh = TriangleMesh::default();
     for (body, count, pitch, all_sides) in
@@ -199,7 +199,7 @@ fn screw_head() -> TriangleMesh {
         ],
         28,
     );
-    // The socket is filled by a bar except for a cross.
+    // Bars leave a cross-shaped socket.
     let bar = box_solid(0.0036, 0.0006, 0.0019, 0.0002);
     let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), FRAC_PI_2 / 2.0);
     mesh.append(&bar.transformed(&Isometry3::from_parts(Translation3::identity(), turn)));

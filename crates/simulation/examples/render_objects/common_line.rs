@@ -16,12 +16,14 @@ use crate::part::{
 const RADIUS: f64 = 0.012;
 const AXIS: f64 = 0.0125;
 const HALF_LENGTH: f64 = 0.068;
-/// Where the injectors' lines are screwed on, on the side of +y, and the pump's on the other.
+/// x of the ports for the injectors' lines, at +y.
 const PORTS: [f64; 4] = [-0.059, -0.022, 0.022, 0.059];
+/// x of the inlet for the pump's line, at -y.
 const INLET: f64 = -0.0585;
 const BOSS_RADIUS: f64 = 0.0082;
-/// The lugs, on the side of -y, and where the bolt goes through.
+/// x of the lugs, at -y.
 const LUGS: [f64; 2] = [-0.0365, 0.0405];
+/// y of the lugs' bolts.
 const BOLT_Y: f64 = -0.026;
 const LUG_HEIGHT: f64 = 0.015;
 
@@ -81,9 +83,9 @@ pub fn common_line() -> Part {
         description: "Common rail of a small Diesel engine: forged tube of 24 mm with four injector ports, inlet and two \
                       lugs, pressure sensor at one end and relief valve at the other; 190 mm long",
         pieces: vec![
-            // Without the bore of 10 mm.
+            // The density allows for the bore of 10 mm.
             Piece { name: "tube", mesh: forged, density: STEEL * 0.8, material: "forged" },
-            // The part within the tube is counted with the tube.
+            // The lugs' volume within the tube is counted with the tube.
             Piece { name: "lugs", mesh: lugs.textured_from_above(0.05), density: STEEL * 0.6, material: "rough" },
             Piece { name: "faces", mesh: faces.textured_from_above(0.03), density: STEEL, material: "machined" },
             Piece { name: "screws", mesh: screws, density: STEEL * 0.8, material: "rolled" },

@@ -11,10 +11,11 @@ use sdg_simulation::shapes::texture::Texture;
 use crate::part::{Finish, PRINTED, Part, Piece, box_between, moved};
 
 const THICKNESS: f64 = 0.012;
-/// Half the width of the neck, where it is held, and of the foot.
+/// Half the width of the neck, at which the part is held.
 const NECK: f64 = 0.020;
+/// Half the width of the foot.
 const FOOT: f64 = 0.036;
-/// Where the foot starts and ends, where the neck begins, and the centre of the crown's half circle.
+/// x of the start and end of the foot, of the start of the neck, and of the centre of the crown's half circle.
 const FOOT_START: f64 = -0.092;
 const FOOT_END: f64 = -0.038;
 const NECK_START: f64 = -0.022;
@@ -39,7 +40,7 @@ pub fn cranfield_face() -> Part {
     holes.extend(round_places.map(|(x, y)| circle(Point2::new(x, y), 0.0065, 28)));
     let plate = extrude(&outline(), &holes, THICKNESS, 0.0010);
 
-    // Collars around the seats, as printed plates have them for length of guidance.
+    // Collars around the seats lengthen their guidance, as on printed plates.
     let collar = |inner: f64, outer: f64, height: f64, x: f64, y: f64| {
         moved(ring(inner, outer, height + 0.0005, 0.0006, 40), x, y, THICKNESS - 0.0005)
     };

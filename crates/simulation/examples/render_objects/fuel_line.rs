@@ -22,7 +22,7 @@ pub fn fuel_line() -> Part {
     let path = rounded_path(&corners, 0.014, 8);
     let tube = sweep(&path, tube_radius, 20);
 
-    // A lying solid's +x turned to the direction of a straight piece of the tube, `along` metres from its start.
+    // Rotates the +x of a lying solid to the direction of a straight piece of the tube, `along` metres from its start.
     let on_tube = |from: usize, along: f64| {
         let direction = (corners[from + 1] - corners[from]).normalize();
         let yaw = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), direction.y.atan2(direction.x));
@@ -30,7 +30,7 @@ pub fn fuel_line() -> Part {
     };
     let last = corners.len() - 2;
     let last_length = (corners[last + 1] - corners[last]).norm();
-    // The quarter turn lays two of the flats level.
+    // The rotation by 90° makes two of the flats horizontal.
     let lying = lying_along_x(0.0) * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), PI / 2.0);
     let lay = |mesh: TriangleMesh, along: f64| mesh.transformed(&(Isometry3::translation(along, 0.0, 0.0) * lying));
 
@@ -56,7 +56,7 @@ pub fn fuel_line() -> Part {
             a.x, a.y, a.z, b.x, b.y, b.z
         )
     };
-    // Every fourth point of the path: straight pieces whole, bends in two chords.
+    // Straight pieces stay whole; each bend becomes two chords.
     let mut knots: Vec<Point3<f64>> = vec![path[0]];
     knots.extend(path[1..path.len() - 1].chunks(9).flat_map(|bend| [bend[0], bend[4], bend[8]]));
     knots.push(path[path.len() - 1]);

@@ -1,4 +1,4 @@
-//! Lower half of a gearbox housing: cast aluminium, open at the top, its joint and its bearing seats machined.
+//! Lower half of a gearbox housing: cast aluminium, open at the top, with machined joint and bearing seats.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -13,14 +13,16 @@ use crate::part::{
 };
 
 const HEIGHT: f64 = 0.030;
-/// Half the outer length and width of the box, and the thickness of its long walls and of its floor.
+/// Half the outer length of the box.
 const HALF_LENGTH: f64 = 0.044;
+/// Half the outer width of the box.
 const HALF_WIDTH: f64 = 0.022;
+/// Thickness of the long walls.
 const WALL: f64 = 0.005;
 const FLOOR: f64 = 0.004;
 /// Depth of the machined top.
 const SKIN: f64 = 0.0010;
-/// Distance by which seats and lugs end below the long walls: overlapping faces in one plane would be lit twice.
+/// Distance by which the seats end below the long walls, because overlapping faces in one plane would be lit twice.
 const SEAT_LOWER: f64 = 0.00006;
 const LUG_LOWER: f64 = 0.00012;
 /// Bolt lugs at the corners: their centres and radii.
@@ -32,7 +34,7 @@ const FOOT_CENTRE: f64 = 0.050;
 const FOOT_END: f64 = 0.065;
 const FOOT_HEIGHT: f64 = 0.006;
 
-/// A foot at one end: a wide one with two bolts, a narrow one with one.
+/// A foot at one end: the wide one has two bolts, the narrow one has one.
 struct Foot {
     side: f64,
     half_width: f64,
@@ -48,10 +50,10 @@ const FEET: [Foot; 2] = [
 struct Seat {
     /// Start and thickness of the wall, along x.
     wall: [f64; 2],
-    /// Bore, and the boss about it (none for the partition).
+    /// Radius of the bore, and of the boss around it.
     radius: f64,
     boss_radius: f64,
-    /// Start and length of the boss.
+    /// Start and length of the boss along x; `None` for the partition.
     boss: Option<[f64; 2]>,
 }
 
@@ -216,7 +218,7 @@ fn lower_arc(radius: f64) -> impl DoubleEndedIterator<Item = Point2<f64>> {
     })
 }
 
-/// A wall of (y, z) up to the joint, with a half bore in the middle of its top, counter-clockwise.
+/// Outline (y, z) of a wall up to the joint, with a half bore in the centre of its top, counter-clockwise.
 fn saddle(half_width: f64, radius: f64) -> Vec<Point2<f64>> {
     let corners =
         [(half_width, HEIGHT - SKIN), (-half_width, HEIGHT - SKIN), (-half_width, 0.0003), (half_width, 0.0003)];

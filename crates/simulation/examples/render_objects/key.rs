@@ -12,10 +12,11 @@ use crate::shapes::rounded_polygon;
 
 const BOW_HEIGHT: f64 = 0.0092;
 const BOW_HALF_WIDTH: f64 = 0.0140;
-/// Blade: where it leaves the collar, its tip, half its width, the heights of its under side, its grooves' floor, its top.
+/// x of the blade's start and tip.
 const BLADE_START: f64 = 0.0195;
 const BLADE_TIP: f64 = 0.0545;
 const BLADE_HALF_WIDTH: f64 = 0.0043;
+/// Heights of the blade's underside, of the floor of its grooves, and of its top.
 const BLADE_HEIGHTS: [f64; 3] = [0.0034, 0.0049, 0.0058];
 /// Cuts of the bitting: depth in metres, from the shoulder to the tip.
 const CUTS: [f64; 6] = [0.0012, 0.0028, 0.0016, 0.0030, 0.0008, 0.0022];
@@ -65,7 +66,7 @@ pub fn key() -> Part {
         description: "Key with a moulded bow of 43 by 28 by 9 mm: nickel-plated brass blade, 35 mm long, six cuts and two \
                       milled grooves; slot for a ring, emblem, three grip ribs",
         pieces: vec![
-            // A transponder and the blade's root are in the bow.
+            // The density allows for a transponder and the blade's root in the bow.
             Piece { name: "bow", mesh: bow.textured_from_above(0.05), density: 1.3 * PLASTIC, material: "moulded" },
             Piece { name: "ribs", mesh: ribs.textured_from_above(0.05), density: PLASTIC, material: "moulded" },
             Piece {
@@ -116,7 +117,7 @@ fn blade_outline() -> Vec<Point2<f64>> {
         Point2::new(BLADE_TIP, -0.0012),
         Point2::new(BLADE_TIP, 0.0002),
     ];
-    // Corners of the bitting's upper envelope, from the tip back.
+    // Corners of the bitting's upper edge, from the tip to the bow.
     const STEP: f64 = 0.0002;
     let last = BLADE_TIP - 0.0032;
     let steps = ((last - start) / STEP).round() as usize;
@@ -135,7 +136,7 @@ fn edge_height(x: f64) -> f64 {
     })
 }
 
-/// The outline without points between which it does not bend.
+/// The outline without points on straight edges.
 fn without_straight_points(outline: &[Point2<f64>]) -> Vec<Point2<f64>> {
     let count = outline.len();
     (0..count)

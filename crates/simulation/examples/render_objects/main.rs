@@ -2,8 +2,9 @@
 //!
 //! `cargo run --release -p sdg-simulation --example render_objects [FOLDER]`
 //!
-//! Every part is of our own making, one file each. The object frame has z up, its origin on the table under the middle
-//! of the grasp marks, x along the marks from `grasp_start` to `grasp_end`. All lengths are in metres.
+//! Every part was designed for this project and has its own file. The object frame has z up, its origin on the table
+//! below the centre of the grasp marks, and x along the marks from `grasp_start` to `grasp_end`. All lengths are in
+//! metres.
 
 mod ball_bearing;
 mod board_layout;

@@ -36,7 +36,7 @@ pub struct Finish {
     pub shininess: f64,
 }
 
-/// A part: its visible pieces, its collision shapes, its grasp.
+/// A part with its visible pieces, collision shapes and grasp.
 pub struct Part {
     pub name: &'static str,
     pub title: &'static str,
@@ -60,7 +60,7 @@ pub fn moved(mesh: TriangleMesh, x: f64, y: f64, z: f64) -> TriangleMesh {
     mesh.transformed(&Isometry3::translation(x, y, z))
 }
 
-/// Centres the texture on a piece's own origin, one repeat over `metres`.
+/// Centres the texture on a piece's own origin; it repeats every `metres`.
 pub fn centred_texture(mesh: TriangleMesh, metres: f64) -> TriangleMesh {
     let mut mesh = mesh.textured_from_above(metres);
     for vertex in &mut mesh.vertices {
@@ -69,21 +69,22 @@ pub fn centred_texture(mesh: TriangleMesh, metres: f64) -> TriangleMesh {
     mesh
 }
 
-/// Lays a solid that stands along z on its side: from `start` along x turned by `yaw`, with its former -x on top.
+/// Lays a solid that stands along z on its side: its axis runs from `start` in the direction `yaw`, with its former -x
+/// on top.
 pub fn laid(mesh: TriangleMesh, start: Point3<f64>, yaw: f64) -> TriangleMesh {
     let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw);
     mesh.transformed(&(Isometry3::from_parts(Translation3::from(start), turn) * lying_along_x(0.0)))
 }
 
-/// As [`laid`], turned about its own axis by a quarter: two of a hexagon's flats are level.
+/// As [`laid`], and rotated by 90° about its own axis: two flats of a hexagon are then horizontal.
 pub fn laid_level(mesh: TriangleMesh, start: Point3<f64>, yaw: f64) -> TriangleMesh {
     let quarter = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), FRAC_PI_2);
     laid(mesh.transformed(&Isometry3::from_parts(Translation3::identity(), quarter)), start, yaw)
 }
 
-/// A profile of (y, z), counter-clockwise seen from +x, drawn out along x from `x` by `length`.
+/// Extrudes a profile (y, z), counter-clockwise seen from +x, by `length` along x, starting at `x`.
 pub fn drawn_along_x(profile: &[Point2<f64>], x: f64, length: f64, chamfer: f64) -> TriangleMesh {
-    // x to y, y to z, z to x: a third of a turn about the diagonal.
+    // A rotation by 120° about the diagonal maps x to y, y to z and z to x.
     let diagonal = Unit::new_normalize(Vector3::repeat(1.0));
     let turn = UnitQuaternion::from_axis_angle(&diagonal, TAU / 3.0);
     extrude(profile, &[], length, chamfer).transformed(&Isometry3::from_parts(Translation3::new(x, 0.0, 0.0), turn))

@@ -11,7 +11,7 @@ use crate::print::{Lettering, in_rectangle, plan_texture};
 use crate::shapes::{bezier, mirrored, oval_bar};
 
 const THICKNESS: f64 = 0.0100;
-/// Half the width of the joint, where the hand holds.
+/// Half the width of the joint, at which the hand holds the part.
 const JOINT_HALF_WIDTH: f64 = 0.0120;
 /// The upper half's round lap about the pivot, and the wider cut for it in the other half.
 const LAP_RADIUS: f64 = 0.0092;
@@ -27,7 +27,7 @@ const SPAN: f64 = 0.10;
 
 /// The part.
 pub fn pliers() -> Part {
-    // The upper half has its jaw at -y and its handle at +y; its pieces reach under its lap.
+    // The upper half has its jaw at -y and its handle at +y; its pieces extend below its lap.
     let mut steel = TriangleMesh::default();
     let solid = |outline: &[Point2<f64>]| moved(extrude(outline, &[], THICKNESS - 0.0002, 0.0007), 0.0, 0.0, 0.0002);
     steel.append(&solid(&jaw(CUT_RADIUS)));
@@ -133,7 +133,7 @@ fn arc(radius: f64, from_deg: f64, to_deg: f64) -> impl Iterator<Item = Point2<f
     })
 }
 
-/// The jaw at +y from above, counter-clockwise, cut out by a circle about the pivot.
+/// Outline of the jaw at +y from above, counter-clockwise, cut by a circle about the pivot.
 fn jaw(cut_radius: f64) -> Vec<Point2<f64>> {
     let mut outline = Vec::new();
     // Along the inner edge to the tip: the cutter, the pipe grip, the serrated flat.
@@ -158,7 +158,8 @@ fn jaw(cut_radius: f64) -> Vec<Point2<f64>> {
     outline
 }
 
-/// The piece from the joint into the handle at +y, from above, counter-clockwise, cut out by a circle about the pivot.
+/// Outline of the piece from the joint into the handle at +y from above, counter-clockwise, cut by a circle about the
+/// pivot.
 fn tang(cut_radius: f64) -> Vec<Point2<f64>> {
     let mut outline: Vec<_> = [
         (-0.0003, JOINT_HALF_WIDTH),
@@ -186,7 +187,7 @@ fn sleeve_half_size(part: f64) -> (f64, f64) {
     ((0.0044 + guard + belly) * fade, (0.0052 + 0.2 * belly) * fade)
 }
 
-/// Half width and half height of the inlay on a sleeve: it stands out on top.
+/// Half width and half height of the inlay on a sleeve, which it exceeds on top.
 fn inlay_half_size(part: f64) -> (f64, f64) {
     let fade = (1.0 - (2.0 * part - 1.0).abs().powi(4)).max(0.02).sqrt();
     (0.0031 * fade, 0.0050 + 0.0008 * fade)

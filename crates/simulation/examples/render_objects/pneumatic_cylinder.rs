@@ -12,19 +12,20 @@ use crate::part::{
     ALUMINIUM, Finish, PLASTIC, Part, Piece, STEEL, box_between, cylinder_between, drawn_along_x, laid, laid_level,
 };
 
-/// Half the side of the square caps; the axis lies so high.
+/// Half the side of the square caps, and the height of the axis.
 const CAP: f64 = 0.016;
-/// The caps, from and to along the axis.
+/// Start and end of the rear cap along the axis.
 const REAR_CAP: [f64; 2] = [-0.066, -0.043];
+/// Start and end of the front cap along the axis.
 const FRONT_CAP: [f64; 2] = [0.025, 0.048];
 const TUBE_RADIUS: f64 = 0.0135;
-/// Tie rods: how far from the axis in y and z, and their radius.
+/// Distance of the tie rods from the axis in y and z.
 const TIE: f64 = 0.0115;
 const TIE_RADIUS: f64 = 0.0022;
 const ROD_RADIUS: f64 = 0.005;
-/// Where the rod's thread begins and ends.
+/// Start and end of the rod's thread along the axis.
 const THREAD: [f64; 2] = [0.0755, 0.0935];
-/// Where the fittings sit, in the middle of each cap.
+/// x of the fittings, in the centre of each cap.
 const FITTINGS: [f64; 2] = [-0.0545, 0.0365];
 
 /// The part.
@@ -68,7 +69,7 @@ pub fn pneumatic_cylinder() -> Part {
     let mut collisions = vec![
         box_between([REAR_CAP[0], -CAP, 0.0], [REAR_CAP[1], CAP, 2.0 * CAP]),
         box_between([FRONT_CAP[0], -CAP, 0.0], [FRONT_CAP[1], CAP, 2.0 * CAP]),
-        // The span of the four tie rods.
+        // One box spans the four tie rods.
         box_between(
             [REAR_CAP[1], -TIE - TIE_RADIUS, CAP - TIE - TIE_RADIUS],
             [FRONT_CAP[0], TIE + TIE_RADIUS, CAP + TIE + TIE_RADIUS],
@@ -84,7 +85,7 @@ pub fn pneumatic_cylinder() -> Part {
                       four tie rods, chromed rod with M10 thread and nut, two push-in fittings",
         pieces: vec![
             Piece { name: "caps", mesh: caps.textured_from_above(0.05), density: ALUMINIUM, material: "anodised" },
-            // Wall, air, piston and the rod within, spread over the tube.
+            // The density is the mean of wall, air, piston and inner rod.
             Piece { name: "tube", mesh: tube, density: ALUMINIUM * 0.7, material: "tube" },
             Piece { name: "ties", mesh: ties, density: STEEL, material: "bright" },
             Piece { name: "nuts", mesh: nuts.textured_from_above(0.03), density: STEEL * 0.8, material: "zinc" },

@@ -1,9 +1,9 @@
-//! Textures drawn to scale from above: lettering, pads, tracks and outlines at places in metres.
+//! Textures drawn to scale from above: lettering, pads, tracks and outlines at positions in metres.
 
 use nalgebra::Point2;
 use sdg_simulation::shapes::texture::{Color, Texture};
 
-/// Rows of a letter of 5 by 7 dots from the top, the leftmost dot the highest of five bits.
+/// Rows of a letter of 5 by 7 dots from the top; the leftmost dot is the highest of five bits.
 const LETTERS: [(char, [u8; 7]); 40] = [
     ('0', [0x0E, 0x11, 0x13, 0x15, 0x19, 0x11, 0x0E]),
     ('1', [0x04, 0x0C, 0x04, 0x04, 0x04, 0x04, 0x0E]),
@@ -47,9 +47,10 @@ const LETTERS: [(char, [u8; 7]); 40] = [
     ('/', [0x00, 0x01, 0x02, 0x04, 0x08, 0x10, 0x00]),
 ];
 
-/// A texture of the plan `span` metres wide and high about the origin, `colour` given the place in metres.
+/// A texture of a square of `span` metres about the origin, seen from above; `color` returns the colour at a point in
+/// metres.
 ///
-/// It fits a mesh with `centred_texture(mesh, span)`. Each texel is the mean of nine samples.
+/// For meshes with `centred_texture(mesh, span)`. Each texel is the mean of nine samples.
 pub fn plan_texture(size: u32, span: f64, mut color: impl FnMut(Point2<f64>) -> Color) -> Texture {
     let texel = span / f64::from(size);
     Texture::paint(size, |u, v| {
@@ -68,16 +69,16 @@ pub fn plan_texture(size: u32, span: f64, mut color: impl FnMut(Point2<f64>) -> 
 /// A line of capital letters.
 pub struct Lettering {
     pub text: &'static str,
-    /// Middle of the line of text.
+    /// Centre of the line of text.
     pub centre: Point2<f64>,
     /// Height of a letter.
     pub height: f64,
-    /// Turned by a quarter to the left.
+    /// Whether the text is rotated by 90° to the left.
     pub upright: bool,
 }
 
 impl Lettering {
-    /// Level text in millimetres.
+    /// Horizontal text; lengths are in millimetres.
     pub const fn level(text: &'static str, x_mm: f64, y_mm: f64, height_mm: f64) -> Self {
         let centre = Point2::new(x_mm * 1e-3, y_mm * 1e-3);
         Self { text, centre, height: height_mm * 1e-3, upright: false }
@@ -107,7 +108,7 @@ pub fn distance_to_segment(place: Point2<f64>, from: Point2<f64>, to: Point2<f64
     (place - (from + along * part)).norm()
 }
 
-/// Whether a point lies in a level rectangle given by its centre and its size.
+/// Whether a point is inside a rectangle along the axes, given by its centre and size.
 pub fn in_rectangle(place: Point2<f64>, middle: (f64, f64), size: (f64, f64)) -> bool {
     (place.x - middle.0).abs() <= size.0 / 2.0 && (place.y - middle.1).abs() <= size.1 / 2.0
 }

@@ -47,7 +47,7 @@ pub fn rod_end() -> Part {
     profile.extend([(flat, half_ball), (bore + 0.0006, half_ball), (bore, half_ball - 0.0006)]);
     let ball = centred_texture(lathe(&profile, 48), 0.04).transformed(&Isometry3::translation(eye, 0.0, half_ball));
 
-    // Neck and bare shank, turned about x: starts inside the eye's wall.
+    // Neck and bare shank, a solid of revolution about x that starts inside the eye's wall.
     let lying = lying_along_x(half_ball);
     let along = |mesh: TriangleMesh, x: f64| mesh.transformed(&(Isometry3::translation(x, 0.0, 0.0) * lying));
     let neck_profile = [

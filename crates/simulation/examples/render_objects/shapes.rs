@@ -4,7 +4,8 @@ use nalgebra::{Point2, Point3, Vector2, Vector3};
 use sdg_simulation::shapes::mesh::{MeshVertex, TriangleMesh};
 use sdg_simulation::shapes::solids::METRES_PER_REPEAT;
 
-/// A polygon (counter-clockwise) whose corners are rounded: `(x, y, radius)` a corner, zero for a sharp one.
+/// A polygon (counter-clockwise) with rounded corners, each given as `(x, y, radius)`; the radius of a sharp corner is
+/// 0.
 pub fn rounded_polygon(corners: &[(f64, f64, f64)]) -> Vec<Point2<f64>> {
     const STEPS: usize = 6;
     let count = corners.len();
@@ -47,10 +48,9 @@ pub fn bezier(controls: [Point2<f64>; 4], steps: usize) -> Vec<Point2<f64>> {
         .collect()
 }
 
-/// A bar along a level path at height `z`, its section an ellipse with squared flanks (a superellipse of fourth power in
-/// both axes).
+/// A bar along a horizontal path at height `z`; its section is an ellipse with squared flanks (a superellipse).
 ///
-/// `half_size` gives half width and half height at a place from 0 (start of the path) to 1 (its end).
+/// `half_size` returns half width and half height at a position from 0 (start of the path) to 1 (its end).
 pub fn oval_bar(path: &[Point2<f64>], z: f64, half_size: impl Fn(f64) -> (f64, f64)) -> TriangleMesh {
     const SEGMENTS: usize = 24;
     const POWER: f64 = 0.6;
@@ -73,9 +73,9 @@ pub fn oval_bar(path: &[Point2<f64>], z: f64, half_size: impl Fn(f64) -> (f64, f
     mesh
 }
 
-/// A strip of sheet bent along a path of (x, z), its middle on y = 0.
+/// A strip of sheet bent along a path (x, z), centred on y = 0.
 ///
-/// `half_width` gives half its width at a distance along the path in metres.
+/// `half_width` returns half the width at a distance along the path in metres.
 pub fn bent_strip(path: &[Point2<f64>], thickness: f64, half_width: impl Fn(f64) -> f64) -> TriangleMesh {
     // Corners of the section as (towards the left of the path, towards -y), counter-clockwise about the path.
     const SECTION: [(f64, f64); 4] = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)];

@@ -13,12 +13,13 @@ use crate::shapes::{bent_strip, resampled, rounded_polygon};
 
 const SHEET: f64 = 0.0015;
 const HALF_WIDTH: f64 = 0.0110;
-/// The strip's middle line as (x, z): end of the lower leaf, the bend at the back, the nip, the lip's edge.
+/// The nip, as a point (x, z) of the strip's centre line.
 const NIP: (f64, f64) = (0.0240, 0.0042);
+/// Edge of the lip, as a point (x, z) of the strip's centre line.
 const LIP: (f64, f64) = (0.0360, 0.0090);
 const BACK: f64 = -0.0420;
 const BACK_HEIGHT: f64 = 0.0128;
-/// Where the tab with its holes takes over from the strip.
+/// x at which the tab with its holes starts, and its end.
 const TAB_START: f64 = 0.0240;
 const TAB_END: f64 = 0.0530;
 const SPAN: f64 = 0.10;
@@ -27,7 +28,7 @@ const SPAN: f64 = 0.10;
 pub fn spring_clip() -> Part {
     let corner = |x: f64, z: f64| Point3::new(x, 0.0, z);
     let flat = |path: Vec<Point3<f64>>| -> Vec<Point2<f64>> { path.iter().map(|p| Point2::new(p.x, p.z)).collect() };
-    // A round back: the corners' arcs meet in its middle.
+    // The back is round, because the arcs of its corners meet at its centre.
     let back = flat(rounded_path(
         &[
             corner(TAB_START, SHEET / 2.0),
@@ -137,7 +138,7 @@ fn leaf_slope() -> f64 {
     (NIP.1 - BACK_HEIGHT) / (NIP.0 - BACK)
 }
 
-/// Height of the upper leaf's middle at a place along it.
+/// Height of the upper leaf's centre line at a place along it.
 fn leaf_height(x: f64) -> f64 {
     NIP.1 + leaf_slope() * (x - NIP.0)
 }

@@ -1,10 +1,10 @@
-//! The truth about a grasp, unknown to the arm: the part's pose and its contacts.
+//! The true state of a grasp, which the arm does not know: the part's pose and its contacts.
 
 use sdg_robot::{GraspStep, Result, StepObserver};
 
 use crate::workcell::Workcell;
 
-/// Judges each step by the physics, and shakes the part if the workcell's errors ask for it.
+/// Judges each step by the simulated state, and shakes the part if the workcell's errors include a shake.
 pub(super) struct Judge {
     success_height_m: f64,
     pub(super) shake_amplitude_m: Option<f64>,

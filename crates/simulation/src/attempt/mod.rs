@@ -1,4 +1,5 @@
-//! One grasp attempt: the sequence of every arm (`sdg_robot::grasp`), from a random start, judged by the truth at every step.
+//! One grasp attempt: the grasp sequence (`sdg_robot::grasp`) from a random start, judged by the true state at every
+//! step.
 
 mod judge;
 mod report;
@@ -42,15 +43,15 @@ impl Default for AttemptConfig {
     }
 }
 
-/// The hand's angular velocity in rehearsals, rad/s. Franka's limit of 2.5 applies to motions commanded in Cartesian
-/// space; at the pace of rehearsals joint motions, which Franka limits joint by joint, turn the hand at up to twice
-/// that.
+/// Limit of the hand's angular velocity in rehearsals, rad/s. Franka's limit of 2.5 applies to motions commanded in
+/// Cartesian space. Joint motions have limits for each joint only, and at the pace of rehearsals they rotate the hand
+/// at up to twice that velocity.
 const REHEARSED_ANGULAR_VELOCITY_RAD_S: f64 = 6.0;
 const REHEARSED_ANGULAR_ACCELERATION_RAD_S2: f64 = 60.0;
 
 impl Workcell {
-    /// The limits of every motion in the workcell: Franka's limits over the table, except for the hand's rotation,
-    /// because of the pace of rehearsals.
+    /// The limits of every motion in the workcell: Franka's limits above the table, except for the hand's rotation,
+    /// which is faster at the pace of rehearsals.
     pub fn safety_limits() -> SafetyLimits {
         let mut cartesian = CartesianLimits::panda();
         cartesian.angular_velocity_rad_s = REHEARSED_ANGULAR_VELOCITY_RAD_S;
@@ -63,7 +64,7 @@ impl Workcell {
         CameraPose::OnFlange(self.panda.flange_from_tcp() * self.tcp_from_camera())
     }
 
-    /// `flange_from_camera` of the wrist camera as given to the robot: with the error of its hand-eye calibration.
+    /// `flange_from_camera` of the wrist camera as the robot knows it, with the error of its hand-eye calibration.
     pub fn told_flange_from_camera(&self) -> Isometry3<f64> {
         let camera_from_assumed = self.config().errors.camera_from_assumed.unwrap_or_else(Isometry3::identity);
         self.panda.flange_from_tcp() * self.tcp_from_camera() * camera_from_assumed
@@ -75,7 +76,7 @@ impl Workcell {
     /// attempt.
     ///
     /// # Errors
-    /// Errors of the simulation or of perception itself, and of a stopped arm; a failed grasp is a report.
+    /// Errors of the simulation, of perception and of a stopped arm; a failed grasp is not an error, but is reported.
     pub fn run_attempt(
         &mut self,
         finder: &mut dyn PartFinder<Self>,
@@ -111,7 +112,7 @@ impl Workcell {
             && goal.bin_m.is_none()
             && (error.distance_m > placing.tolerance_m || error.angle_rad > placing.tolerance_rad)
         {
-            // The look is not the truth.
+            // The measurement by a picture may be wrong, so that the true position decides.
             let (distance_mm, angle_deg) = (error.distance_m * 1e3, error.angle_rad.to_degrees());
             let why = format!("the part really lies {distance_mm:.1} mm and {angle_deg:.1}° beside its place");
             outcome = GraspOutcome::Failed { step: GraspStep::Check, why };
@@ -142,14 +143,14 @@ impl Workcell {
     /// Resets everything to the start of an attempt: the arm at rest in a configuration drawn from `seed`.
     ///
     /// # Errors
-    /// A first look-out pose that the arm cannot reach.
+    /// An error if the arm cannot reach the first look-out pose.
     pub fn reset_for_attempt(&mut self, config: &GraspConfig, seed: u64) -> Result<()> {
         let start = self.random_start(config, seed)?;
         self.reset(&start)
     }
 
-    /// A configuration near the ready pose, well above the table, from which the first look can be
-    /// reached without coming near the table.
+    /// A configuration near the ready pose, well above the table, from which the first look-out pose can be reached
+    /// without coming near the table.
     fn random_start(&self, config: &GraspConfig, seed: u64) -> Result<JointVector> {
         const SPREAD_RAD: [f64; 7] = [0.9, 0.4, 0.5, 0.4, 0.6, 0.4, 0.9];
         const NUM_TRIES: usize = 200;

@@ -9,21 +9,21 @@ use crate::objects::GraspError;
 /// The record of an attempt.
 #[derive(Debug, Clone)]
 pub struct AttemptReport {
-    /// Its outcome: held if, after lifting and waiting, the part hung high enough between both fingers.
+    /// The outcome: held if, after lifting and waiting, the part was high enough between both fingers.
     pub outcome: GraspOutcome,
     /// The seed of the start configuration.
     pub seed: u64,
     /// The part's pose at the start, in the base frame.
     pub base_from_object: Option<Isometry3<f64>>,
-    /// The target from perception at each look with a sufficient score: from a distance until the part was found, then
-    /// from above it.
+    /// The target of each picture, if its score is sufficient: from look-out poses until the part was found, then from
+    /// above it.
     pub targets: Vec<Option<GraspTarget>>,
-    /// Number of looks from a distance, and number from above the detection: one each if the part was found at the
-    /// first look.
+    /// Numbers of pictures from look-out poses and from above the detection: one each if the first pictures show the
+    /// part.
     pub looks: [usize; 2],
     /// The true offset of the part from its place, if it was to be put down.
     pub place_error: Option<GraspError>,
-    /// Distance that the hand swung to either side after lifting, in metres; `None` if it was not shaken.
+    /// Amplitude of the hand's swing after lifting, in metres; `None` if the hand was not shaken.
     pub shake_amplitude_m: Option<f64>,
     /// The verdict of the hand's width and force after each of the last steps; see [`sdg_robot::GraspReport`].
     pub hand_verdicts: Vec<(GraspStep, Option<String>)>,
@@ -31,7 +31,7 @@ pub struct AttemptReport {
     pub object_height_m: Option<f64>,
     /// Simulated time in seconds.
     pub simulated_secs: f64,
-    /// Duration, in seconds, perception included.
+    /// Duration of the attempt by the computer's clock, in seconds, including perception.
     pub wall_secs: f64,
     /// Pictures from outside, if recorded.
     pub frames: Vec<RgbImage>,

@@ -1,4 +1,4 @@
-//! The parts of `datasets/objects`, compiled in.
+//! The parts of `datasets/objects`, compiled into this crate.
 
 macro_rules! embedded {
     ($($name:literal: [$($file:literal),* $(,)?]),* $(,)?) => {
@@ -9,7 +9,7 @@ macro_rules! embedded {
     };
 }
 
-/// A file's name and bytes, compiled in.
+/// Name and bytes of a compiled-in file.
 pub(super) type EmbeddedFile = (&'static str, &'static [u8]);
 
 /// Number of the paper's parts in [`EMBEDDED`]; they come first.

@@ -1,7 +1,7 @@
-//! Look-alikes with one changed feature: a moved feature, or a stretched or shortened region.
+//! Look-alikes with one change: a moved feature, a stretched or shortened region, or a narrower bore.
 //!
-//! Everything is judged from above, as the camera sees it: a moved feature must have the same surface under it, at
-//! the same height, and the picture must change visibly.
+//! All checks use the view from above, like the camera: a moved feature must have the same surface under it, at the
+//! same height, and the view must change visibly.
 
 use nalgebra::{Point2, Point3, Vector2, Vector3};
 use rand::{Rng, SeedableRng};
@@ -16,39 +16,40 @@ use super::mjcf_tags::{Tag, map_tags};
 use super::shape::{VisualMesh, triangles};
 use crate::error::Result;
 
-/// Distance of the move, as a share of the part's box diagonal.
+/// Distance of the move, as a fraction of the diagonal of the part's bounding box.
 const MOVES: std::ops::Range<f64> = 0.05..0.10;
 
 /// Side of a cell of the views from above, in metres.
 const CELL_M: f64 = 0.001;
-/// Smaller height differences are not visible from above, in metres.
+/// Smallest height difference that is visible from above, in metres.
 const SAME_HEIGHT_M: f64 = 0.001;
-/// Surfaces that differ in height by more than this are different, in metres.
+/// Largest height difference of surfaces that count as the same, in metres.
 const SAME_GROUND_M: f64 = 0.0015;
-/// Largest share of a feature's cells with another surface than before.
+/// Largest fraction of a feature's cells below which the surface changes.
 const MAX_OTHER_GROUND: f64 = 0.04;
-/// Minimum share of the visible cells from above that must change.
+/// Minimum fraction of the cells visible from above that must change.
 const MIN_CHANGE: f64 = 0.012;
-/// Distances and directions tried for each feature.
+/// Number of random moves tried for each feature.
 const MOVES_PER_FEATURE: usize = 8;
 
-/// Length of the stretched region, as a share of the part's length.
+/// Length of the stretched region, as a fraction of the part's length.
 const STRETCHED_SHARE: f64 = 0.3;
-/// Pieces up to this share of the part's box diagonal keep their shape when a region is stretched.
+/// Size up to which pieces keep their shape when a region is stretched, as a fraction of the diagonal of the part's
+/// bounding box.
 const RIGID_SHARE: f64 = 0.3;
 
-/// The movement of a part's points.
+/// A change of the positions of a part's points.
 enum Change {
-    /// Some pieces by a vector, together.
+    /// Moves some pieces together by a vector.
     Move { feature: Vec<usize>, bounds: Bounds, by: Vector3<f64> },
-    /// The points beyond a region along x by a distance; the region itself is stretched between.
+    /// Moves the points beyond a region along x by a distance, and stretches the region itself.
     Stretch { from: f64, to: f64, by: f64 },
-    /// The bore of a round part to another radius.
+    /// Changes the radius of the bore of a round part.
     Bore { radius: f64, outer: f64, by: f64 },
 }
 
 impl ObjectSpec {
-    /// The part with one feature moved, and a description in words.
+    /// The part with one change, and a description of it.
     ///
     /// # Errors
     /// As `visual_meshes`.
@@ -79,7 +80,7 @@ impl ObjectSpec {
         let corners = meshes.iter().enumerate().flat_map(|(mesh_idx, VisualMesh { mesh, .. })| {
             mesh.positions.iter().enumerate().map(move |(idx, p)| moved(mesh_idx, idx, *p).xy())
         });
-        // Nearly straight edges become straight.
+        // Rounding makes nearly straight edges straight.
         spec.footprint = convex_hull(corners.map(|p| p.map(|value| (value * 1e5).round() / 1e5)));
         if let Change::Stretch { .. } = change {
             spec.grasp_start = change.along_x(spec.grasp_start).map(rounded);
@@ -103,7 +104,7 @@ impl Change {
             }
             Self::Stretch { .. } => self.along_x(p),
             Self::Bore { .. } => {
-                // Pieces around the axis are made narrower; a piece beside it (a ball) moves as a whole.
+                // Pieces around the axis become narrower; a piece beside the axis (a ball) moves as a whole.
                 let around_axis = bounds.contains(&Point3::new(0.0, 0.0, bounds.centre().z), 0.0);
                 if around_axis { self.radially(p) } else { p + (self.radially(bounds.centre()) - bounds.centre()) }
             }
@@ -172,7 +173,7 @@ impl Change {
                 }
                 true
             }
-            // The outer ring touches table and jaws.
+            // Collision shapes stay, because only the outer ring touches table and jaws.
             Self::Bore { .. } => false,
         }
     }
@@ -233,7 +234,7 @@ fn moved_feature(meshes: &[VisualMesh], pieces: &Pieces, rng: &mut Pcg64Mcg) -> 
     }
 }
 
-/// A part without one feature, and the feature.
+/// A part separated into one feature and the rest.
 struct Parted {
     feature_triangles: Vec<([Point3<f64>; 3], u32)>,
     rest_triangles: Vec<([Point3<f64>; 3], u32)>,
@@ -268,7 +269,7 @@ impl Parted {
             _ => false,
         };
         let others = self.cells.iter().filter(|at| !is_same(ground(at), ground(&(**at + by.xy())))).count();
-        // A feature beside the rest must touch it as much as before.
+        // After the move, the feature must touch the rest along nearly as many cells as before.
         let touching = |shift: Vector2<f64>| {
             let neighbours = [[1.5, 0.0], [-1.5, 0.0], [0.0, 1.5], [0.0, -1.5]].map(|d| Vector2::from(d) * CELL_M);
             self.cells.iter().filter(|at| neighbours.iter().any(|d| ground(&(**at + shift + d)).is_some())).count()
@@ -279,7 +280,7 @@ impl Parted {
             && after as f64 >= 0.85 * before as f64
     }
 
-    /// Share of the visible cells from above that a move changes.
+    /// Fraction of the cells visible from above that a move changes.
     fn change(&self, before: &HeightMap, by: &Vector3<f64>) -> f64 {
         let moved = self.feature_triangles.iter().map(|(corners, mesh)| (corners.map(|p| p + by), *mesh));
         let after: Vec<_> = self.rest_triangles.iter().copied().chain(moved).collect();
@@ -313,13 +314,13 @@ fn stretched(meshes: &[VisualMesh], pieces: &Pieces, rng: &mut Pcg64Mcg) -> Chan
             (0..map.height).map(height).collect()
         })
         .collect();
-    // Difference of each column from the one before it, in cells.
+    // Number of cells in which each column differs from the one before it.
     let changes: Vec<usize> = columns
         .windows(2)
         .map(|pair| pair[0].iter().zip(&pair[1]).filter(|(a, b)| a.abs_diff(**b) > 1).count())
         .collect();
     let region = ((STRETCHED_SHARE * map.width as f64) as usize).clamp(1, changes.len().max(1));
-    // Both ends are unchanged: the region keeps a distance from them.
+    // The region keeps a distance from both ends, so that they stay unchanged.
     let margin = map.width / 10;
     let starts = margin..changes.len().saturating_sub(region + margin).max(margin + 1);
     let cost = |start: usize| changes.iter().skip(start).take(region).sum::<usize>();
@@ -333,7 +334,7 @@ fn stretched(meshes: &[VisualMesh], pieces: &Pieces, rng: &mut Pcg64Mcg) -> Chan
 fn other_bore(meshes: &[VisualMesh], pieces: &Pieces, rng: &mut Pcg64Mcg) -> Change {
     let radii = meshes.iter().flat_map(|visual| visual.mesh.positions.iter().map(|p| p.x.hypot(p.y)));
     let (radius, outer) = radii.fold((f64::INFINITY, 0.0), |(low, high), r| (f64::min(low, r), f64::max(high, r)));
-    // A wall remains in the middle of the smallest bore.
+    // The bore keeps at least 0.3 of its radius.
     let by = (pieces.bounds().diagonal_m() * rng.random_range(MOVES)).min(0.7 * radius);
     Change::Bore { radius, outer, by: -by }
 }

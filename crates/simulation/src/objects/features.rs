@@ -1,17 +1,17 @@
 //! The features of a part: groups of connected pieces of its meshes that can be moved.
 //!
 //! ```text
-//! meshes ─> pieces ─> contacts between pieces ─> from the largest piece outwards: each piece with all pieces on it
+//! meshes ─> pieces ─> contacts between pieces ─> from the largest piece outwards: each piece with all pieces attached to it
 //! ```
 
 use nalgebra::{Point3, Vector3};
 
 use super::shape::VisualMesh;
 
-/// Pieces whose boxes are this close touch, in metres.
+/// Largest distance between the boxes of two pieces that touch, in metres.
 const TOUCH_M: f64 = 0.0004;
 
-/// The largest feature, as a share of the part's box diagonal.
+/// Size of the largest feature, as a fraction of the diagonal of the part's bounding box.
 const MAX_FEATURE: f64 = 0.42;
 
 /// A box along the axes.
@@ -66,7 +66,7 @@ pub(super) struct Piece {
 /// Every piece of a part, and the piece of each point.
 pub(super) struct Pieces {
     pub(super) pieces: Vec<Piece>,
-    /// For each mesh and position the index into `pieces`.
+    /// The index into `pieces` of each position of each mesh.
     pub(super) piece_of: Vec<Vec<usize>>,
 }
 

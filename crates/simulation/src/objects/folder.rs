@@ -1,4 +1,4 @@
-//! Writes a part as a folder from which it can be read.
+//! Writes a part to a folder.
 
 use std::fs;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! A part seen from above without perspective: its height and its visible piece at each point.
+//! A part seen from above without perspective: the height and the index of the visible surface at each point.
 
 use nalgebra::{Isometry2, Point2, Point3};
 
@@ -38,7 +38,7 @@ impl HeightMap {
     }
 
     fn draw(&mut self, corners: &[Point3<f64>; 3], piece: u32) {
-        // In cells, with the centre of cell (0, 0) at (0, 0).
+        // Units are cells, with the centre of cell (0, 0) at (0, 0).
         let [a, b, c] = corners.map(|p| {
             Point3::new((p.x - self.corner.x) / self.cell_m - 0.5, (p.y - self.corner.y) / self.cell_m - 0.5, p.z)
         });
@@ -91,8 +91,8 @@ impl HeightMap {
         if count == 0 { Point2::origin() } else { Point2::from(sum / f64::from(count)) }
     }
 
-    /// Share of the cells at which this map, moved, and another differ: one is filled and the other is not, or their
-    /// heights differ by more than `tolerance_m`; relative to all cells filled in either.
+    /// Fraction of the cells filled in either map at which this map, moved, and another map differ: only one of them is
+    /// filled, or their heights differ by more than `tolerance_m`.
     pub(crate) fn difference(&self, other: &Self, other_from_self: &Isometry2<f64>, tolerance_m: f64) -> f64 {
         let (mut both, mut alike, mut own) = (0usize, 0usize, 0usize);
         for (at, z, _) in self.filled() {
@@ -134,7 +134,7 @@ mod tests {
         let (one, beside) =
             (HeightMap::new(&square(0.0, 0.002, 1), 0.001), HeightMap::new(&square(0.005, 0.002, 1), 0.001));
         assert_eq!(one.difference(&one, &Isometry2::identity(), 1e-4), 0.0);
-        // Fifty of 150 cells are common.
+        // 50 of 150 cells are filled in both maps.
         assert!((one.difference(&beside, &Isometry2::identity(), 1e-4) - 2.0 / 3.0).abs() < 1e-9);
         assert_eq!(one.difference(&beside, &Isometry2::new(Vector2::new(0.005, 0.0), 0.0), 1e-4), 0.0);
         let higher = HeightMap::new(&square(0.0, 0.004, 1), 0.001);

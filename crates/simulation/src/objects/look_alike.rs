@@ -1,7 +1,7 @@
-//! Parts that resemble a part: mirrored, with one feature moved, or of another size.
+//! Parts that resemble a given part: mirrored, with one feature moved, or with another size.
 //!
 //! ```text
-//! ObjectSpec ─> meshes, marks, collision shapes, inertia changed together ─> ObjectSpec of its own name
+//! ObjectSpec ─> meshes, marks, collision shapes, inertia changed together ─> ObjectSpec with another name
 //! ```
 
 use std::f64::consts::TAU;
@@ -19,11 +19,11 @@ use crate::error::Result;
 pub enum LookAlikeKind {
     /// The mirror image in a vertical plane.
     Mirrored,
-    /// One feature is elsewhere.
+    /// The part with one feature moved.
     FeatureMoved,
     /// The whole part in another size.
     Scaled {
-        /// The size in percent of the part's.
+        /// The size in percent of the part's size.
         percent: u32,
     },
 }
@@ -53,9 +53,9 @@ impl fmt::Display for LookAlikeKind {
 /// A part that resembles another one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LookAlike {
-    /// Its difference from the part.
+    /// The difference from the part.
     pub kind: LookAlikeKind,
-    /// The part itself, placed like any other.
+    /// The look-alike as a part of its own.
     pub spec: ObjectSpec,
     /// The difference in words.
     pub description: String,
@@ -63,24 +63,24 @@ pub struct LookAlike {
 
 /// Side of a cell of the views from above, in metres.
 const CELL_M: f64 = 0.001;
-/// Smaller height differences are not visible from above, in metres.
+/// Smallest height difference that is visible from above, in metres.
 const SAME_HEIGHT_M: f64 = 0.001;
-/// Minimum difference of a part from its mirror image at the turn of greatest similarity. Of the shipped parts, the
-/// pliers (1.3 %) and the housing (2.0 %) are below it, the key (3.4 %: its cuts) and all others that differ (20 % and
-/// more) above.
+/// Minimum difference between a part and its mirror image, at the angle of greatest similarity, for a mirrored
+/// look-alike. Of the shipped parts, the pliers (1.3 %) and the housing (2.0 %) are below it; the key (3.4 %, because
+/// of its cuts) and all other parts that differ from their mirror image (20 % and more) are above it.
 const MIN_MIRROR_DIFFERENCE: f64 = 0.03;
 
 impl ObjectSpec {
-    /// The kinds of look-alikes of this part: all, except the mirror image if it equals the part.
+    /// The kinds of look-alikes of this part: all kinds, except the mirror image if it equals the part.
     ///
     /// # Errors
-    /// As [`ObjectSpec::look_alike`].
+    /// As for [`ObjectSpec::look_alike`].
     pub fn look_alike_kinds(&self) -> Result<Vec<LookAlikeKind>> {
         let is_chiral = self.mirror_difference()? >= MIN_MIRROR_DIFFERENCE;
         Ok(LookAlikeKind::ALL.into_iter().filter(|kind| *kind != LookAlikeKind::Mirrored || is_chiral).collect())
     }
 
-    /// A look-alike of this part; `seed` determines the moved feature, and its movement.
+    /// A look-alike of this part; `seed` determines the moved feature and its movement.
     ///
     /// # Errors
     /// [`crate::SimulationError::File`] for a part whose shapes are not given as OBJ meshes.
@@ -95,11 +95,11 @@ impl ObjectSpec {
         Ok(LookAlike { kind, spec, description })
     }
 
-    /// Share of the visible cells from above that differ between the part and its mirror image, at the turn of
+    /// Fraction of the cells visible from above that differ between the part and its mirror image, at the angle of
     /// greatest similarity.
     ///
     /// # Errors
-    /// As [`ObjectSpec::look_alike`].
+    /// As for [`ObjectSpec::look_alike`].
     pub fn mirror_difference(&self) -> Result<f64> {
         let (own, mirror) = (self.height_map(CELL_M)?, self.mirrored()?.height_map(CELL_M)?);
         let difference = |turn: f64, shift: Vector2<f64>| {
@@ -141,7 +141,7 @@ impl ObjectSpec {
             };
             tag.map_numbers("pos", negate(&[1]));
             tag.map_numbers("fromto", negate(&[1, 4]));
-            // A turn is mirrored by reversing the rotation about x and z.
+            // A mirrored rotation has the opposite angles about x and z.
             tag.map_numbers("quat", negate(&[1, 3]));
             tag.map_numbers("euler", negate(&[0, 2]));
             tag.map_numbers("axisangle", negate(&[0, 2]));
@@ -208,7 +208,7 @@ impl ObjectSpec {
     }
 }
 
-/// A nanometre or a microgram: numbers then have few digits, and are read back unchanged.
+/// Rounds to a nanometre or a microgram, so that numbers have few digits and are read back unchanged.
 pub(super) fn rounded(value: f64) -> f64 {
     (value * 1e9).round() / 1e9
 }

@@ -1,4 +1,4 @@
-//! `object.json`: its content, and the checks beyond its types.
+//! The content of `object.json`, and the checks of its values.
 
 use nalgebra::Point3;
 use sdg_geometry::RotationalSymmetry;
@@ -8,7 +8,7 @@ use serde::Deserialize;
 /// Version of `object.json` that this reader understands.
 pub const OBJECT_FORMAT: u32 = 1;
 
-/// The widest part that the Panda's hand can take, in metres.
+/// Largest width of a part that the Panda's hand can grasp, in metres.
 pub const LARGEST_JAW_WIDTH_M: f64 = HAND_OPENING_MAX_M;
 
 /// The content of `object.json`.
@@ -26,7 +26,7 @@ pub(super) struct Metadata {
     pub(super) jaw_width_m: f64,
     pub(super) grasp_height_m: f64,
     pub(super) mark_height_m: f64,
-    /// Equal to `mark_height_m` if it is missing.
+    /// Default: `mark_height_m`.
     pub(super) seen_height_m: Option<f64>,
     pub(super) rest_height_m: f64,
     pub(super) symmetry: RotationalSymmetry,
@@ -35,7 +35,7 @@ pub(super) struct Metadata {
 }
 
 impl Metadata {
-    /// Checks beyond the types; the error names the field, the expected and the found value.
+    /// Checks the values; the error states the field, the expected and the found value.
     pub(super) fn check(&self) -> std::result::Result<(), String> {
         if self.format != OBJECT_FORMAT {
             return Err(format!("format: expected {OBJECT_FORMAT}, found {}", self.format));

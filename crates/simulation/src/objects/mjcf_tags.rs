@@ -1,6 +1,6 @@
 //! The tags of an MJCF text and their attributes, changed in place.
 
-/// One tag: its name and attributes in the order in which they are written.
+/// One tag: its name, and its attributes in their order.
 pub(super) struct Tag {
     pub(super) name: String,
     attributes: Vec<(String, String)>,
@@ -38,7 +38,7 @@ impl Tag {
         self.get(key)?.split_ascii_whitespace().map(|word| word.parse().ok()).collect()
     }
 
-    /// Sets an attribute that is there, or adds it.
+    /// Sets an attribute, or adds it if it is missing.
     pub(super) fn set(&mut self, key: &str, value: String) {
         match self.attributes.iter_mut().find(|(known, _)| known == key) {
             Some((_, old)) => *old = value,
@@ -46,7 +46,7 @@ impl Tag {
         }
     }
 
-    /// Replaces the numbers of an attribute, if it is there.
+    /// Replaces the numbers of an attribute, if the tag has it.
     pub(super) fn map_numbers(&mut self, key: &str, map: impl FnOnce(&mut Vec<f64>)) {
         if let Some(mut numbers) = self.numbers(key) {
             map(&mut numbers);

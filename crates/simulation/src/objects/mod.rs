@@ -1,12 +1,12 @@
-//! The grasped parts: their masses, marks and grasps, and their MJCF.
+//! The parts to grasp: their masses, marks and grasps, and their MJCF.
 //!
 //! A part is a folder with `object.json` (numbers and marks, see [`ObjectSpec`]), `object.xml` (MJCF with one body
 //! named `object` and its free joint `object_joint`) and the meshes and textures that the MJCF names. The parts of
 //! `datasets/objects` are compiled in; any other folder can be read by [`ObjectSpec::from_folder`].
 //!
-//! The **object frame** has z up as the part rests on the table. The **marks** `grasp_start` and `grasp_end` lie
-//! along the part's axis where the gripper holds it: the jaws close across the line between them, and the tool
-//! centre point moves to their mean in x and y, at `grasp_height_m` above the table.
+//! In the **object frame**, z points up while the part rests on the table. The **marks** `grasp_start` and `grasp_end`
+//! are on the part's axis, at the place where the gripper holds it: the jaws close across the line between them, and
+//! the tool centre point moves to their mean in x and y, at `grasp_height_m` above the table.
 
 mod embedded;
 mod extruded;
@@ -41,40 +41,40 @@ pub(crate) use height_map::HeightMap;
 pub use look_alike::{LookAlike, LookAlikeKind};
 pub use sdg_geometry::RotationalSymmetry;
 
-/// The body tag that occurs once in every `object.xml`; the part's pose is written into it.
+/// The body tag, which occurs once in every `object.xml`. The part's pose is inserted into it.
 const BODY_TAG: &str = "<body name=\"object\">";
 
-/// One part: its numbers in metres and kilograms, its marks in the object frame, its MJCF.
+/// A part: its lengths in metres and mass in kilograms, its marks in the object frame, and its MJCF.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ObjectSpec {
     /// Name at the command line, such as `fuel_line`.
     pub name: String,
-    /// Name for people, such as "Fuel line".
+    /// Name in texts, such as "Fuel line".
     pub title: String,
     /// Description of the part.
     pub description: String,
     /// Mass in kilograms.
     pub mass_kg: f64,
-    /// Coefficient of sliding friction of its surface.
+    /// Coefficient of sliding friction of the surface.
     pub friction: f64,
     /// First mark, in the object frame.
     pub grasp_start: Point3<f64>,
     /// Second mark, in the object frame.
     pub grasp_end: Point3<f64>,
-    /// Width of the part between the jaws.
+    /// Width of the part between the jaws, in metres.
     pub jaw_width_m: f64,
-    /// Height of the tool centre point over the table when the part is held.
+    /// Height of the tool centre point above the table when the part is held.
     pub grasp_height_m: f64,
-    /// Height of the marks over the table: the plane of the marks in a picture.
+    /// Height of the marks above the table: the plane of the marks in a picture.
     ///
     /// For a round bar this is the height of its axis, because its outline in a picture stays centred on the
     /// axis for any camera position above it.
     pub mark_height_m: f64,
-    /// Height over the table of the visible surface at the marks; above `mark_height_m` for a round bar.
+    /// Height above the table of the visible surface at the marks; above `mark_height_m` for a round bar.
     pub seen_height_m: f64,
-    /// Height of the object frame's origin over the table for the part at rest.
+    /// Height of the object frame's origin above the table for the part at rest.
     pub rest_height_m: f64,
-    /// The turns about z that change neither the appearance nor the grasp of the part.
+    /// The rotations about z that change neither the appearance nor the grasp of the part.
     pub symmetry: RotationalSymmetry,
     /// The convex hull of the part from above, counter-clockwise, in the object frame.
     pub footprint: Vec<Point2<f64>>,
@@ -102,8 +102,8 @@ impl ObjectSpec {
         Self::names().take(NUM_PAPER_PARTS)
     }
 
-    /// The names of four parts of another kind: no constant may be fitted on them, and their results are reported
-    /// separately from those of the paper's parts.
+    /// The names of four further parts. No constant may be fitted on them, and their results are reported separately
+    /// from those of the paper's parts.
     pub fn held_out_names() -> impl Iterator<Item = &'static str> {
         Self::names().skip(NUM_PAPER_PARTS)
     }
@@ -129,7 +129,7 @@ impl ObjectSpec {
         })
     }
 
-    /// A user's own part, from its folder.
+    /// Reads a user's own part from its folder.
     ///
     /// # Errors
     /// [`SimulationError::File`] if a file is missing, cannot be read or lacks required content.
@@ -179,7 +179,7 @@ impl ObjectSpec {
         })
     }
 
-    /// The pose of the part at rest on the table (z = 0) with its origin over (x, y), turned by `yaw_rad`.
+    /// The pose of the part at rest on the table (z = 0), with its origin above (x, y), rotated by `yaw_rad`.
     pub fn base_from_object(&self, x: f64, y: f64, yaw_rad: f64) -> Isometry3<f64> {
         Isometry3::from_parts(
             Translation3::new(x, y, self.rest_height_m),
@@ -203,7 +203,7 @@ impl ObjectSpec {
 
     /// Offset of a grasp from the marked one, for a part at rest, up to the part's symmetry.
     ///
-    /// `base_from_tcp` has its x along the line across which the jaws close.
+    /// In `base_from_tcp`, x points along the line across which the jaws close.
     pub fn grasp_error(&self, base_from_object: &Isometry3<f64>, base_from_tcp: &Isometry3<f64>) -> GraspError {
         let (marked, direction_rad) = self.grasp_in_base(base_from_object);
         let along = base_from_tcp * Vector3::x();
@@ -220,8 +220,8 @@ impl ObjectSpec {
         MjcfFragment { sections: self.mjcf.replace(BODY_TAG, &placed), files: self.files.clone() }
     }
 
-    /// One more body of the part, `instance_{index}`, in a scene that already contains [`ObjectSpec::fragment`]: it
-    /// shares the meshes and materials.
+    /// One more body of the part, `instance_{index}`, in a scene that already contains [`ObjectSpec::fragment`], whose
+    /// meshes and materials it uses.
     pub(crate) fn instance_fragment(&self, index: usize, base_from_object: &Isometry3<f64>) -> MjcfFragment {
         const OPEN: &str = "<worldbody>";
         const CLOSE: &str = "</worldbody>";
@@ -249,7 +249,7 @@ fn sections_of(text: &str) -> std::result::Result<&str, String> {
         .ok_or("expected a <mujoco> element")?;
     let bodies = inside.matches(BODY_TAG).count();
     if bodies != 1 {
-        return Err(format!("expected {BODY_TAG} once, found it {bodies} times"));
+        return Err(format!("expected {BODY_TAG} once, found {bodies} times"));
     }
     if !inside.contains("name=\"object_joint\"") {
         return Err("expected a free joint named object_joint in the body".to_owned());
@@ -262,7 +262,7 @@ fn files_named_in(mjcf: &str) -> impl Iterator<Item = &str> {
     mjcf.split(" file=\"").skip(1).filter_map(|rest| rest.split('"').next())
 }
 
-/// The folder of this repository that holds the parts, for tools that write there.
+/// The folder of this repository that contains the parts, for tools that write them.
 pub fn source_folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets/objects")
 }
@@ -316,14 +316,14 @@ mod tests {
     fn outlines_are_as_symmetric_as_declared() {
         for name in ObjectSpec::names() {
             let spec = ObjectSpec::by_name(name).unwrap();
-            // Largest change of the outline by a turn.
+            // Largest change of the outline by a rotation.
             let change_m = |turn: f64| {
                 (0..180)
                     .map(|degrees| f64::from(2 * degrees).to_radians())
                     .map(|angle| (reach_m(&spec, angle) - reach_m(&spec, angle + turn)).abs())
                     .fold(0.0, f64::max)
             };
-            // These turns represent all others.
+            // These rotations represent all others.
             for turn in [2.0, 3.0, 4.0].map(|parts| std::f64::consts::TAU / parts) {
                 let hidden = spec.symmetry.distance(Angle::from_radians(turn), Angle::ZERO) < 1e-9;
                 let change_m = change_m(turn);

@@ -1,4 +1,4 @@
-//! Triangle meshes of a part as in its OBJ files: read, moved, written again.
+//! Reads, changes and writes the triangle meshes of a part's OBJ files.
 
 use std::fmt::Write as _;
 
@@ -24,9 +24,9 @@ pub(crate) struct ObjMesh {
 }
 
 impl ObjMesh {
-    /// Reads OBJ text of triangles: `v`, `vt`, `vn` and `f`; other lines are ignored.
+    /// Reads the lines `v`, `vt`, `vn` and `f` of an OBJ text of triangles; other lines are ignored.
     ///
-    /// The error names the unreadable line.
+    /// The error contains the number and text of the invalid line.
     pub(crate) fn parse(text: &str) -> Result<Self, String> {
         let mut mesh = Self { positions: Vec::new(), texcoords: Vec::new(), normals: Vec::new(), faces: Vec::new() };
         for (number, line) in text.lines().enumerate() {
@@ -75,7 +75,7 @@ impl ObjMesh {
     /// Writes the mesh as OBJ text.
     pub(crate) fn to_obj(&self) -> String {
         let mut text = String::new();
-        // Micrometres, so that scaled coordinates have no meaningless digits.
+        // Rounds to micrometres, so that scaled coordinates have no meaningless digits.
         let rounded = |value: f64| (value * 1e6).round() / 1e6 + 0.0;
         for p in &self.positions {
             let _ = writeln!(text, "v {} {} {}", rounded(p.x), rounded(p.y), rounded(p.z));
@@ -122,7 +122,7 @@ impl ObjMesh {
         self
     }
 
-    /// Moves every point; normals are kept, so that the shading is right if the map rotates little.
+    /// Moves every point. Normals are kept, so that the shading is correct only if `map` hardly rotates the surface.
     pub(crate) fn mapped(mut self, map: impl Fn(usize, Point3<f64>) -> Point3<f64>) -> Self {
         for (idx, position) in self.positions.iter_mut().enumerate() {
             *position = map(idx, *position);
@@ -135,9 +135,9 @@ impl ObjMesh {
         face.map(|corner| self.positions[corner.position as usize])
     }
 
-    /// For each position, the index of its connected piece, from zero, and the number of pieces.
+    /// The index (from zero) of the connected piece of each position, and the number of pieces.
     ///
-    /// Positions at the same point belong together, so that a seam of the texture divides nothing.
+    /// Positions at the same point count as connected, so that a seam of the texture does not divide a piece.
     pub(crate) fn pieces(&self) -> (Vec<usize>, usize) {
         let mut parent: Vec<usize> = (0..self.positions.len()).collect();
         let mut first_at = std::collections::HashMap::new();

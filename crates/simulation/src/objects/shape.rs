@@ -11,7 +11,7 @@ use crate::error::{Result, SimulationError};
 /// A visible mesh of a part.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct VisualMesh {
-    /// Name of its file.
+    /// Name of the mesh's file.
     pub(super) file: String,
     pub(super) mesh: ObjMesh,
 }
@@ -47,7 +47,7 @@ impl ObjectSpec {
         Ok(meshes)
     }
 
-    /// The part from above, in the object frame.
+    /// The height map of the part from above, in the object frame.
     ///
     /// # Errors
     /// As for `visual_meshes`.

@@ -8,26 +8,26 @@ use super::distractor_pieces::scaled_pieces;
 use crate::fragment::{MjcfFragment, pose_attributes};
 use crate::shapes::footprint::placed;
 
-/// A distractor of one size and finish at one place.
+/// A distractor with its size, finish and pose.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Distractor {
-    /// Its kind.
+    /// Kind of the distractor.
     pub kind: DistractorKind,
-    /// The pose of its frame in the base frame; it rests on the table.
+    /// Pose of the distractor, at rest on the table, in the base frame.
     pub base_from_distractor: Isometry3<f64>,
-    /// Its convex outline from above, in the base frame, counter-clockwise.
+    /// The distractor's convex outline from above, in the base frame, counter-clockwise.
     pub footprint: Vec<Point2<f64>>,
     seed: u64,
     scale: f64,
 }
 
 impl Distractor {
-    /// Makes a distractor; `seed` determines its size and finish.
+    /// Creates a distractor; `seed` determines its size and finish.
     pub fn new(kind: DistractorKind, table_from_distractor: &Isometry2<f64>, seed: u64) -> Self {
         Self::scaled(kind, table_from_distractor, seed, 1.0)
     }
 
-    /// As [`Distractor::new`], all lengths times `scale`.
+    /// As [`Distractor::new`], with all lengths multiplied by `scale`.
     pub fn scaled(kind: DistractorKind, table_from_distractor: &Isometry2<f64>, seed: u64, scale: f64) -> Self {
         let pieces = scaled_pieces(kind, seed, scale);
         let lowest = pieces.iter().map(|piece| piece.mesh.bounds().0.z).fold(f64::INFINITY, f64::min);
@@ -51,7 +51,7 @@ impl Distractor {
         Self::scaled(self.kind, table_from_distractor, self.seed, self.scale)
     }
 
-    /// Its triangles in its own frame.
+    /// The distractor's triangles in its own frame.
     pub(crate) fn triangles(&self) -> impl Iterator<Item = [Point3<f64>; 3]> {
         scaled_pieces(self.kind, self.seed, self.scale)
             .into_iter()

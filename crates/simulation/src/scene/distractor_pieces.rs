@@ -1,4 +1,4 @@
-//! Shapes and materials of distractors: the pieces of each kind, with size and finish drawn from a seed.
+//! Shapes and materials of distractors: the pieces of each kind, with size and finish sampled by a seed.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -19,7 +19,7 @@ use crate::shapes::texture::{Color, Texture};
 pub(super) struct Finish {
     color: Color,
     look: Look,
-    /// In kg/m³.
+    /// Density in kg/m³.
     pub density: f64,
 }
 
@@ -94,7 +94,7 @@ pub(super) struct Piece {
     pub finish: Finish,
 }
 
-/// Turns a solid that stands along z into one that lies along x with its axis at `height`, two flats level.
+/// Lays a solid that stands along z along x, with its axis at `height` and two flats horizontal.
 fn laid(mesh: TriangleMesh, x: f64, height: f64) -> TriangleMesh {
     let quarter = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), FRAC_PI_2);
     mesh.transformed(&(Isometry3::translation(x, 0.0, 0.0) * lying_along_x(height) * quarter))
@@ -104,7 +104,7 @@ fn raised(mesh: TriangleMesh, z: f64) -> TriangleMesh {
     mesh.transformed(&Isometry3::translation(0.0, 0.0, z))
 }
 
-/// The pieces in the distractor's frame, all lengths times `scale`.
+/// The pieces in the distractor's frame, with all lengths multiplied by `scale`.
 pub(super) fn scaled_pieces(kind: DistractorKind, seed: u64, scale: f64) -> Vec<Piece> {
     let mut pieces = pieces(kind, seed);
     if scale != 1.0 {
@@ -115,7 +115,7 @@ pub(super) fn scaled_pieces(kind: DistractorKind, seed: u64, scale: f64) -> Vec<
     pieces
 }
 
-/// The pieces in the distractor's frame: z up as it rests, about the origin in x and y.
+/// The pieces in the distractor's frame: z points up in the resting pose, and x and y are centred on the origin.
 fn pieces(kind: DistractorKind, seed: u64) -> Vec<Piece> {
     let rng = &mut Pcg64Mcg::seed_from_u64(seed);
     let any = Finish::any(rng);
@@ -131,7 +131,7 @@ fn pieces(kind: DistractorKind, seed: u64) -> Vec<Piece> {
             let plain = length * 0.4;
             mesh.append(&laid(cylinder(radius, plain, 0.0, 24), radius * 1.3, 0.0));
             mesh.append(&laid(thread(radius, pitch, length - plain, 14), radius * 1.3 + plain, 0.0));
-            // It rests on a flat of its head and on the end of its thread.
+            // The bolt rests on a flat of its head and on the end of its thread.
             let tilt = ((across / 2.0 - radius) / (length + radius * 1.3)).atan();
             let turn = Isometry3::from_parts(
                 Translation3::identity(),
@@ -151,7 +151,7 @@ fn pieces(kind: DistractorKind, seed: u64) -> Vec<Piece> {
         DistractorKind::Plate => {
             let (length, width) = (rng.random_range(0.04..0.10), rng.random_range(0.025..0.05));
             let hole: f64 = rng.random_range(0.002..0.005);
-            // A narrow plate's holes keep a distance from each other.
+            // The holes of a narrow plate keep a distance from each other.
             let (x, y) = (length / 2.0 - 0.009, (hole + 0.0015).max(width / 2.0 - 0.009));
             let mut holes: Vec<_> = [(x, y), (-x, y), (-x, -y), (x, -y)]
                 .iter()
@@ -291,7 +291,7 @@ fn pieces(kind: DistractorKind, seed: u64) -> Vec<Piece> {
     }
 }
 
-/// A round bar along a path, in metal with the bands of a round bar.
+/// A round bar along a path; if it is metal, usually with the bands of a round bar.
 fn bar(path: &[Point3<f64>], radius: f64, finish: Finish, rng: &mut Pcg64Mcg) -> Vec<Piece> {
     let look = if rng.random_bool(0.8) { Look::RoundBar } else { finish.look };
     vec![Piece { mesh: sweep(path, radius, 18), finish: Finish { look, ..finish } }]
@@ -316,11 +316,11 @@ fn gear_outline(teeth: usize, outer: f64) -> Vec<Point2<f64>> {
 mod tests {
     use super::*;
 
-    /// MuJoCo refuses a mesh in which two faces run along an edge in the same direction.
+    /// MuJoCo rejects a mesh in which two faces have an edge in the same direction.
     #[test]
     fn no_edge_is_walked_twice_in_one_direction() {
         for kind in DistractorKind::ALL {
-            // The last ones make tubes with nearly straight corners, and a narrow plate with large holes.
+            // The last seeds give tubes with nearly straight corners, and a narrow plate with large holes.
             for seed in (0..12).chain([453, 1383, 1453, 6896900381503141468]) {
                 for piece in pieces(kind, seed) {
                     let obj = piece.mesh.to_obj();

@@ -7,14 +7,14 @@ use rand_pcg::Pcg64Mcg;
 use crate::fragment::MjcfFragment;
 use crate::shapes::texture::Color;
 
-/// The centre of the table area that the camera sees, at which lamps are aimed (metres, base frame).
+/// The centre of the table area in the camera's view, at which lamps are aimed (metres, base frame).
 const AIM: Point3<f64> = Point3::new(0.5, 0.0, 0.0);
 
-/// Radius around the aim within which shadows are drawn, in metres: slightly more than the wrist camera's view.
+/// Radius around the aim within which shadows are rendered, in metres: slightly larger than the wrist camera's view.
 const SHADOW_RADIUS_M: f64 = 0.5;
 
-/// Share of a lamp's cone that its shadow map covers. The map has the same number of texels for any area: a wide
-/// lamp with a narrow map lights evenly and still draws shadows with a sharpness of a millimetre.
+/// Fraction of a lamp's cone that its shadow map covers. The map has the same number of texels for any area: a wide
+/// lamp with a narrow map gives even light and still shadows that are sharp to a millimetre.
 const SHADOW_PART_OF_CONE: f64 = 0.35;
 
 /// The half angle of the cone, in degrees, for which a lamp's shadows reach [`SHADOW_RADIUS_M`].
@@ -25,17 +25,17 @@ fn cutoff_deg(distance_m: f64) -> f64 {
 /// A lamp above the table.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lamp {
-    /// Its position, in metres in the base frame.
+    /// Position in the base frame, in metres.
     pub position: Point3<f64>,
-    /// Its direction.
+    /// The point at which the lamp is aimed, in the base frame, in metres.
     pub target: Point3<f64>,
-    /// Its colour times its strength, each channel from 0 to 1.
+    /// Colour of the diffuse light times its strength, each channel from 0 to 1.
     pub diffuse: Color,
-    /// Strength of its highlights.
+    /// Strength of the highlights.
     pub specular: f64,
-    /// Half of its cone's angle in degrees.
+    /// Half of the cone's angle, in degrees.
     pub cutoff_deg: f64,
-    /// Whether it casts shadows.
+    /// Whether the lamp casts shadows.
     pub casts_shadows: bool,
 }
 
@@ -44,9 +44,9 @@ pub struct Lamp {
 pub struct Lighting {
     /// Ambient light.
     pub ambient: Color,
-    /// Light from the camera's own direction: the diffuse light of a bright hall.
+    /// Light from the camera's direction, which represents the diffuse light of a bright hall.
     pub from_camera: Color,
-    /// Each aimed at a point of the table.
+    /// The lamps.
     pub lamps: Vec<Lamp>,
 }
 
@@ -71,14 +71,15 @@ impl Lighting {
         }
     }
 
-    /// One to three lamps anywhere above, of warm to cold white, strong or weak, and a varying amount of ambient light.
+    /// Samples one to three lamps anywhere above the table, warm to cold white, strong or weak, and a varying amount of
+    /// ambient light.
     pub fn sample(rng: &mut Pcg64Mcg) -> Self {
         let tint = |rng: &mut Pcg64Mcg| {
             let warmth = rng.random_range(-1.0..1.0);
             [1.0 + 0.08 * warmth, 1.0, 1.0 - 0.10 * warmth]
         };
         let scaled = |color: Color, strength: f64| color.map(|channel| (channel * strength).clamp(0.0, 1.0));
-        // The total light of lamps and surroundings stays within a camera's exposure range.
+        // The total light stays within a camera's exposure range.
         let total = rng.random_range(0.62..1.10);
         let surrounding = rng.random_range(0.32..0.62);
         let num_lamps = rng.random_range(1..=3);
@@ -101,7 +102,7 @@ impl Lighting {
                     diffuse: scaled(tint(rng), total * (1.0 - surrounding) * share / sum / elevation.sin()),
                     specular: rng.random_range(0.2..0.9) * share,
                     cutoff_deg: cutoff_deg(distance),
-                    // At most two shadows: a third cannot be distinguished from them and costs another pass.
+                    // Only two lamps cast shadows: a third shadow is hardly visible and costs another rendering pass.
                     casts_shadows: idx < 2,
                 }
             })

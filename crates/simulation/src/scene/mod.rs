@@ -5,8 +5,8 @@
 //!              shapes: solids ─> mesh            surfaces: texture
 //! ```
 //!
-//! The table's top is the plane z = 0 of the robot's base frame. Each aspect of a scene has its own random stream:
-//! another number of distractors does not change the lamps. The same seed gives the same scene, bit for bit.
+//! The table's top is the plane z = 0 of the robot's base frame. Each aspect of a scene has its own random stream, so
+//! that a different number of distractors does not change the lamps. The same seed gives the same scene, bit for bit.
 
 mod distractor;
 mod distractor_kind;
@@ -42,7 +42,7 @@ pub struct VariationConfig {
     pub distractors: RangeInclusive<usize>,
     /// Minimum distance between any two objects on the table, in metres.
     pub clearance_m: f64,
-    /// Whether lamps, table and their colours vary, too, or stay nominal.
+    /// Whether lamps, table and their colours also vary; otherwise they are nominal.
     pub appearance: bool,
 }
 
@@ -58,16 +58,16 @@ impl Default for VariationConfig {
     }
 }
 
-/// The object with its pose.
+/// A part with its pose on the table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlacedObject {
     /// The part.
     pub spec: ObjectSpec,
-    /// Its pose at rest, in the robot's base frame.
+    /// Pose of the part at rest, in the robot's base frame.
     pub base_from_object: Isometry3<f64>,
 }
 
-/// Everything in a scene that can vary, apart from the robot.
+/// All contents of a scene except the robot.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SceneVariation {
     /// The part to grasp; `None` for a table without it.
@@ -102,7 +102,7 @@ impl Stream {
 }
 
 impl SceneVariation {
-    /// The scene of demonstrations: even light, light table, nothing else.
+    /// The scene of demonstrations: the part alone on a light table in even light.
     pub fn nominal(object: Option<(&ObjectSpec, Isometry3<f64>)>) -> Self {
         Self {
             object: object.map(|(spec, base_from_object)| PlacedObject { spec: spec.clone(), base_from_object }),
@@ -113,7 +113,8 @@ impl SceneVariation {
         }
     }
 
-    /// The scene of a seed: the object, if given, at any place and turn; light, table and distractors at random.
+    /// Samples the scene of a seed: the object, if given, at a random position and angle, with random light, table and
+    /// distractors.
     pub fn sample(object: Option<&ObjectSpec>, config: &VariationConfig, seed: u64) -> Self {
         let rng = &mut Stream::Object.rng(seed);
         let object = object.map(|spec| {
@@ -155,33 +156,33 @@ impl PlacedObject {
         footprint::placed(&self.spec.footprint, &self.table_from_object())
     }
 
-    /// The area of the open gripper when it comes down on the marks.
+    /// The area that the open gripper covers when it descends to the marks.
     pub fn gripper_footprint(&self) -> Vec<Point2<f64>> {
         let (centre, direction) = self.spec.grasp_in_base(&self.base_from_object);
         let table_from_gripper = Isometry2::new(centre.xy().coords, direction);
         footprint::placed(&GRIPPER_FOOTPRINT.map(Point2::from), &table_from_gripper)
     }
 
-    /// Its place and turn on the table.
+    /// The part's planar pose on the table.
     pub(crate) fn table_from_object(&self) -> Isometry2<f64> {
         let x_axis = self.base_from_object.rotation * nalgebra::Vector3::x();
         Isometry2::new(self.base_from_object.translation.vector.xy(), x_axis.y.atan2(x_axis.x))
     }
 }
 
-/// Room for two fingers opened to 0.08 m and their thickness: x along the marks, y along the jaws' motion.
+/// Outline of two fingers, opened to 0.08 m, with their thickness: x along the marks, y along the jaws' motion.
 const GRIPPER_FOOTPRINT: [[f64; 2]; 4] = [[-0.016, -0.062], [0.016, -0.062], [0.016, 0.062], [-0.016, 0.062]];
 
-/// Number of attempts to find a free place for one distractor before the table counts as full.
+/// Number of places that are tried for a distractor before the table counts as full.
 const PLACEMENT_TRIES: usize = 40;
 
-/// Distance of distractors beyond the object's range, in metres.
+/// Distance by which the range of distractors extends beyond the object's range, in metres.
 const DISTRACTOR_MARGIN_M: f64 = 0.05;
 
 /// At most `count` distractors of a seed with centres between bounds in the base frame, in metres.
 pub(crate) fn sample_distractors_between(x_m: Range<f64>, y_m: Range<f64>, count: usize, seed: u64) -> Vec<Distractor> {
     let within = |range: Range<f64>| range.start + DISTRACTOR_MARGIN_M..range.end - DISTRACTOR_MARGIN_M;
-    // A strip narrower than the margins keeps its centre line.
+    // In a range narrower than the margins, distractors are placed near its centre.
     let ordered = |range: Range<f64>| if range.start < range.end { range } else { range.end..range.start + 1e-6 };
     let config = VariationConfig {
         object_x_m: within(x_m),
@@ -194,7 +195,7 @@ pub(crate) fn sample_distractors_between(x_m: Range<f64>, y_m: Range<f64>, count
     sample_distractors(Vec::new(), &config, &mut Stream::Distractors.rng(seed))
 }
 
-/// Distractors at random places that keep a distance from each other and from the areas in `taken`.
+/// Distractors at random places, at a distance from each other and from the areas in `taken`.
 pub(crate) fn sample_distractors(
     mut taken: Vec<Vec<Point2<f64>>>,
     config: &VariationConfig,
@@ -263,7 +264,7 @@ mod tests {
                 }
             }
         }
-        // Room is found for nearly all.
+        // Nearly all distractors find room.
         assert!(placed >= 3 * 8 * 5, "{placed} of 144");
     }
 }

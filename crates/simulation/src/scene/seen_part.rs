@@ -1,26 +1,26 @@
-//! A part whose outline a camera has seen: drawn in plans, without collisions.
+//! A part whose outline was detected by a camera. It is shown in pictures of plans and has no collisions.
 
 use nalgebra::{Isometry3, Point2};
 
 use crate::fragment::MjcfFragment;
 use crate::shapes::solids::extrude;
 
-/// Minimum visible thickness, m.
+/// Minimum thickness, m, so that the part is visible.
 const MIN_HEIGHT_M: f64 = 2e-3;
-/// Outlines of a smaller area, m², are not drawn.
+/// Minimum area of an outline that is rendered, m².
 const MIN_AREA_M2: f64 = 1e-6;
 
-/// A part as a camera has seen it.
+/// A part as a camera detected it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SeenPart {
-    /// Its outline in the robot's base frame, m, in either direction of turn.
+    /// The outline in the robot's base frame, m, clockwise or counter-clockwise.
     pub outline_in_base: Vec<Point2<f64>>,
-    /// The z of the surface under it and the z of its outline, m in the base frame.
+    /// z of the surface under the part, and z of its outline, base frame, m.
     pub z_m: [f64; 2],
 }
 
 impl SeenPart {
-    /// The outline raised from the table, in a colour of no shipped part.
+    /// The extruded outline, in a colour that no shipped part has.
     pub(crate) fn fragment(&self) -> MjcfFragment {
         let mut fragment = MjcfFragment::default();
         let [bottom_m, top_m] = self.z_m;

@@ -1,4 +1,4 @@
-//! The table: its top is the plane z = 0 of the base frame, its surface one of several kinds.
+//! The table, whose top is the plane z = 0 of the base frame, with one of several surfaces.
 
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -6,10 +6,10 @@ use rand_pcg::Pcg64Mcg;
 use crate::fragment::MjcfFragment;
 use crate::shapes::texture::{Color, Noise, Texture};
 
-/// Metres of table per repeat of the surface's picture.
+/// Metres of table per repeat of the texture.
 const METRES_PER_REPEAT: f64 = 0.5;
 
-/// Texels along one side of that picture: about one per pixel of the wrist camera.
+/// Texels along one side of the texture: about one per pixel of the wrist camera.
 const TEXELS: u32 = 512;
 
 /// The material of the top.
@@ -50,13 +50,13 @@ impl TableSurface {
 /// A table top.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Table {
-    /// Its material.
+    /// Material of the top.
     pub surface: TableSurface,
-    /// Its main colour.
+    /// Main colour.
     pub base: Color,
-    /// The colour of its grain, lines or speckles.
+    /// Colour of grain, lines or speckles.
     pub accent: Color,
-    /// Seed of its pattern.
+    /// Seed of the pattern.
     pub seed: u64,
 }
 
@@ -66,7 +66,7 @@ impl Table {
         Self { surface: TableSurface::Plain, base: [0.66, 0.66, 0.64], accent: [0.6, 0.6, 0.58], seed: 1 }
     }
 
-    /// Any surface in a plausible colour for it.
+    /// Samples a surface with a plausible colour.
     pub fn sample(rng: &mut Pcg64Mcg) -> Self {
         let surface = TableSurface::ALL[rng.random_range(0..TableSurface::ALL.len())];
         let grey = |rng: &mut Pcg64Mcg, low: f64, high: f64| {
@@ -130,7 +130,7 @@ impl Table {
             }
             TableSurface::CuttingMat => Texture::paint(TEXELS, |u, v| {
                 let line = |t: f64, lines: f64, width: f64| (t * lines).fract() < width;
-                // Fifty centimetres per repeat: fine lines every centimetre, bold ones every five.
+                // A repeat is 50 cm: thin lines every centimetre, thick lines every 5 cm.
                 let strength = if line(u, 10.0, 0.04) || line(v, 10.0, 0.04) {
                     0.65
                 } else if line(u, 50.0, 0.1) || line(v, 50.0, 0.1) {

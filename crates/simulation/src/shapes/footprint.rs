@@ -1,4 +1,4 @@
-//! The area of an object on the table: convex outlines seen from above, and whether two of them are separate.
+//! Areas of objects on the table: convex outlines seen from above, and the distance between two of them.
 
 use nalgebra::{Isometry2, Point2, Vector2};
 
@@ -7,9 +7,9 @@ pub fn placed(outline: &[Point2<f64>], table_from_outline: &Isometry2<f64>) -> V
     outline.iter().map(|point| table_from_outline * point).collect()
 }
 
-/// The widest gap between two convex outlines along any of their edges' normals; negative when they overlap.
+/// The largest gap between two convex outlines along the normals of their edges; negative if they overlap.
 ///
-/// It is the true distance for outlines that face each other with an edge, otherwise less.
+/// This is the true distance if an edge is nearest, and less than the true distance between two corners.
 pub fn separation(a: &[Point2<f64>], b: &[Point2<f64>]) -> f64 {
     let along = |normal: &Vector2<f64>, points: &[Point2<f64>]| {
         points

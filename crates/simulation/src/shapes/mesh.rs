@@ -1,18 +1,18 @@
-//! Closed triangle meshes that carry texture coordinates, made in code and written as OBJ text.
+//! Closed triangle meshes with texture coordinates, created by code and written as OBJ text.
 //!
-//! Positions are stored without normals. [`TriangleMesh::to_obj`] derives one normal per face corner by
-//! averaging the neighbouring faces that meet it at less than [`CREASE_DEG`]: round surfaces appear
-//! smooth, edges stay sharp, and builders need not handle shading.
+//! Positions are stored without normals. [`TriangleMesh::to_obj`] computes one normal per face corner as the average
+//! over the adjacent faces whose angle is below [`CREASE_DEG`]: round surfaces appear smooth, edges stay sharp, and
+//! builders need not handle shading.
 
 use std::collections::HashMap;
 use std::fmt::Write as _;
 
 use nalgebra::{Isometry3, Matrix3, Point2, Point3, Vector3};
 
-/// Faces that meet at more than this angle have a sharp edge between them when shaded.
+/// Angle between two faces above which the edge between them is shaded as a sharp edge.
 pub const CREASE_DEG: f64 = 38.0;
 
-/// Positions closer than this count as one point when neighbouring faces are searched (metres).
+/// Distance below which two positions count as one point in the search for adjacent faces, in metres.
 const WELD_M: f64 = 1e-7;
 
 /// A point of a mesh.
@@ -27,7 +27,7 @@ pub struct MeshVertex {
 /// A triangle mesh whose faces are counter-clockwise seen from outside.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct TriangleMesh {
-    /// The points; a seam of the texture holds the same position twice.
+    /// The points; at a seam of the texture the same position occurs twice.
     pub vertices: Vec<MeshVertex>,
     /// Three indices into `vertices` per face.
     pub faces: Vec<[u32; 3]>,
@@ -36,7 +36,7 @@ pub struct TriangleMesh {
 /// Volume, centre and second moments of a closed mesh at unit density.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MassProperties {
-    /// Volume in cubic metres (at unit density: the mass).
+    /// Volume in cubic metres, which is the mass at unit density.
     pub volume: f64,
     /// Centre of mass in metres.
     pub centre: Point3<f64>,
@@ -52,9 +52,9 @@ impl TriangleMesh {
         index
     }
 
-    /// Adds a grid of points `rows × cols` and two triangles per cell.
+    /// Adds a grid of `rows × cols` points and two triangles per cell.
     ///
-    /// Counter-clockwise faces look towards (next column) × (next row).
+    /// The faces point in the direction (next column) × (next row).
     pub fn push_grid(&mut self, rows: usize, cols: usize, point: impl Fn(usize, usize) -> MeshVertex) {
         let base = self.vertices.len() as u32;
         for row in 0..rows {
@@ -140,7 +140,7 @@ impl TriangleMesh {
         }
     }
 
-    /// Writes OBJ text: positions to a hundredth of a millimetre, texture coordinates, normals.
+    /// Writes OBJ text: positions, to a hundredth of a millimetre, texture coordinates and normals.
     pub fn to_obj(&self) -> String {
         let normals = self.corner_normals();
         let mut text = String::new();
@@ -170,7 +170,8 @@ impl TriangleMesh {
         text + &body
     }
 
-    /// One normal per face corner (see the module documentation), neighbours weighted by their angle at the corner.
+    /// One normal per face corner (see the module documentation); adjacent faces are weighted by their angle at the
+    /// corner.
     fn corner_normals(&self) -> Vec<[Vector3<f64>; 3]> {
         let key = |p: Point3<f64>| {
             [(p.x / WELD_M).round() as i64, (p.y / WELD_M).round() as i64, (p.z / WELD_M).round() as i64]
@@ -216,7 +217,7 @@ impl TriangleMesh {
     }
 }
 
-/// Lines of text that get an index at their first occurrence, counted from one as in OBJ.
+/// Lines of text, each with an index from its first occurrence, counted from 1 as in OBJ.
 #[derive(Default)]
 struct Interned {
     lines: Vec<String>,

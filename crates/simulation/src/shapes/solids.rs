@@ -1,4 +1,4 @@
-//! Solids from which parts are built: extrusions with chamfered edges, turned bodies, bent tubes, screw threads.
+//! Solids from which parts are built: extrusions with chamfered edges, solids of revolution, bent tubes, screw threads.
 //!
 //! Every function returns a closed mesh in metres, standing on z = 0 unless stated otherwise, with texture
 //! coordinates in which 1 is one repeat of the texture.
@@ -13,7 +13,8 @@ use super::mesh::{MeshVertex, TriangleMesh};
 /// Default metres of surface per repeat of a texture.
 pub const METRES_PER_REPEAT: f64 = 0.05;
 
-/// Shorter chords (metres) would collapse to one point: OBJ text has hundredths of a millimetre.
+/// Minimum length of a chord in metres: shorter ones would collapse to a point, because OBJ text has hundredths of a
+/// millimetre.
 const MIN_CHORD_M: f64 = 2e-5;
 
 /// A circle of `count` points, counter-clockwise.
@@ -26,7 +27,7 @@ pub fn circle(centre: Point2<f64>, radius: f64, count: usize) -> Vec<Point2<f64>
         .collect()
 }
 
-/// A regular hexagon by its width across flats, two of its flats parallel to x.
+/// A regular hexagon with a given width across flats; two flats are parallel to x.
 pub fn hexagon(across_flats: f64) -> Vec<Point2<f64>> {
     circle(Point2::origin(), across_flats / 3f64.sqrt(), 6)
 }
@@ -44,12 +45,12 @@ pub fn rounded_rectangle(length: f64, width: f64, radius: f64) -> Vec<Point2<f64
     points
 }
 
-/// The outline of two discs joined by a bar of constant width with filleted corners, as a lever has.
+/// The outline of a lever: two discs, joined by a bar of constant width with filleted corners.
 ///
 /// `left` and `right` are (x of the centre, radius) on the x axis; `fillet` rounds the four inner corners.
 pub fn lever_outline(left: (f64, f64), right: (f64, f64), bar_width: f64, fillet: f64) -> Vec<Point2<f64>> {
     let half = bar_width / 2.0;
-    // A fillet circle touches the bar's edge from outside (its centre at y = half + fillet) and the disc.
+    // A fillet circle touches the disc, and the bar's edge from outside (centre at y = half + fillet).
     let reach = |radius: f64| {
         let touching = radius + fillet;
         let height = half + fillet;
@@ -84,7 +85,7 @@ pub fn lever_outline(left: (f64, f64), right: (f64, f64), bar_width: f64, fillet
     upper.into_iter().chain(lower).collect()
 }
 
-/// Moves an outline by `distance` towards its inside (its left), mitred at the corners.
+/// Moves an outline by `distance` to its inside (its left), with mitred corners.
 fn inset(outline: &[Point2<f64>], distance: f64) -> Vec<Point2<f64>> {
     let count = outline.len();
     (0..count)
@@ -98,12 +99,12 @@ fn inset(outline: &[Point2<f64>], distance: f64) -> Vec<Point2<f64>> {
         .collect()
 }
 
-/// An outline (counter-clockwise) with holes (each given counter-clockwise too), raised from z = 0 to `height`.
+/// Extrudes an outline with holes, all counter-clockwise, from z = 0 to `height`.
 ///
-/// The upper edges of outline and holes are broken by a chamfer of `chamfer` metres (zero: none).
+/// The upper edges of outline and holes have a chamfer of `chamfer` metres; 0 for none.
 pub fn extrude(outline: &[Point2<f64>], holes: &[Vec<Point2<f64>>], height: f64, chamfer: f64) -> TriangleMesh {
     let mut rings = vec![outline.to_vec()];
-    // A hole in clockwise direction has the material on its left, like the outline.
+    // A clockwise hole has the material on its left, like the outline.
     rings.extend(holes.iter().map(|hole| hole.iter().rev().copied().collect::<Vec<_>>()));
     let top_rings: Vec<Vec<Point2<f64>>> =
         rings.iter().map(|ring| if chamfer > 0.0 { inset(ring, chamfer) } else { ring.clone() }).collect();
@@ -148,17 +149,17 @@ pub fn extrude(outline: &[Point2<f64>], holes: &[Vec<Point2<f64>>], height: f64,
     mesh
 }
 
-/// A cuboid about the z axis standing on z = 0, its upper edges broken by `chamfer`.
+/// A cuboid about the z axis on z = 0, with chamfered upper edges.
 pub fn box_solid(length: f64, width: f64, height: f64, chamfer: f64) -> TriangleMesh {
     let (x, y) = (length / 2.0, width / 2.0);
     let outline = [Point2::new(-x, -y), Point2::new(x, -y), Point2::new(x, y), Point2::new(-x, y)];
     extrude(&outline, &[], height, chamfer)
 }
 
-/// Turns a profile of (radius, z) about the z axis.
+/// The solid of revolution of a profile (radius, z) about the z axis.
 ///
-/// The profile runs counter-clockwise around the material in the (radius, z) half plane. It is closed if it starts
-/// and ends on the axis, otherwise its last point is joined to its first (a ring).
+/// The profile runs counter-clockwise around the material in the (radius, z) half plane. If it does not start and end
+/// on the axis, its last point is joined to its first one (a ring).
 pub fn lathe(profile: &[(f64, f64)], segments: usize) -> TriangleMesh {
     let mut profile = profile.to_vec();
     let on_axis = profile.first().is_some_and(|p| p.0 == 0.0) && profile.last().is_some_and(|p| p.0 == 0.0);
@@ -175,7 +176,7 @@ pub fn lathe(profile: &[(f64, f64)], segments: usize) -> TriangleMesh {
     mesh
 }
 
-/// A ring with chamfered edges standing on z = 0.
+/// A ring with chamfered edges on z = 0.
 pub fn ring(inner_radius: f64, outer_radius: f64, height: f64, chamfer: f64, segments: usize) -> TriangleMesh {
     let c = chamfer;
     let profile = [
@@ -191,7 +192,7 @@ pub fn ring(inner_radius: f64, outer_radius: f64, height: f64, chamfer: f64, seg
     lathe(&profile, segments)
 }
 
-/// A cylinder with chamfered edges standing on z = 0.
+/// A cylinder with chamfered edges on z = 0.
 pub fn cylinder(radius: f64, height: f64, chamfer: f64, segments: usize) -> TriangleMesh {
     let c = chamfer;
     lathe(
@@ -200,18 +201,18 @@ pub fn cylinder(radius: f64, height: f64, chamfer: f64, segments: usize) -> Tria
     )
 }
 
-/// A hexagonal prism about the z axis whose corners are turned off at 30° at both ends, as on nuts and heads.
+/// A hexagonal prism about the z axis whose corners are chamfered at 30° at both ends, as on nuts and bolt heads.
 pub fn hex_prism(across_flats: f64, height: f64, bore_radius: f64) -> TriangleMesh {
     let segments = 48;
     let apothem = across_flats / 2.0;
-    // Rim of the hexagon at a polar angle, and the shortening of its ends by a 30° cone that starts at the flats.
+    // Radius of the hexagon at a polar angle, and the shortening of its ends by a 30° cone that starts at the flats.
     let rim = |angle: f64| apothem / ((angle + PI / 6.0).rem_euclid(PI / 3.0) - PI / 6.0).cos();
     let taken = |radius: f64| (radius - apothem * 0.98).max(0.0) * (PI / 6.0).tan();
     let mut mesh = TriangleMesh::default();
     let hollow = bore_radius > 0.0;
     let rows = if hollow { 7 } else { 6 };
     mesh.push_grid(rows, segments + 1, |row, col| {
-        // Flats lie across y = ±apothem, hence the quarter turn.
+        // The angle is offset by 90°, so that flats are at y = ±apothem.
         let angle = TAU * (col % segments) as f64 / segments as f64;
         let outer = rim(angle + PI / 2.0);
         let (radius, z) = match row {
@@ -228,14 +229,14 @@ pub fn hex_prism(across_flats: f64, height: f64, bore_radius: f64) -> TriangleMe
     mesh
 }
 
-/// A screw thread about the z axis from z = 0 to `length`: a 60° ridge that rises by `pitch` per turn.
+/// A screw thread about the z axis from z = 0 to `length`: a 60° ridge that rises by `pitch` per revolution.
 pub fn thread(major_radius: f64, pitch: f64, length: f64, segments: usize) -> TriangleMesh {
     let depth = 0.54 * pitch;
     let rows = (length / pitch * 4.0).ceil() as usize + 1;
     let mut mesh = TriangleMesh::default();
     let radius_at = |angle: f64, z: f64| {
         let phase = (z / pitch - angle / TAU).rem_euclid(1.0);
-        // The ends are chamfered, so that the last turns fade into the core.
+        // The ends are chamfered, so that the ridge fades into the core.
         let fade = ((length - z).min(z) / pitch).clamp(0.0, 1.0);
         let ridge = (1.0 - (2.0 * phase - 1.0).abs() * 1.25).clamp(0.0, 1.0);
         major_radius - depth + depth * ridge * fade
@@ -250,8 +251,8 @@ pub fn thread(major_radius: f64, pitch: f64, length: f64, segments: usize) -> Tr
     mesh
 }
 
-/// Rounds the corners of a polyline by arcs of `radius` metres; each arc gets `steps` chords. A nearly straight corner
-/// is not changed.
+/// Rounds the corners of a polyline by arcs of `radius` metres with `steps` chords each. Nearly straight corners are
+/// not changed.
 pub fn rounded_path(corners: &[Point3<f64>], radius: f64, steps: usize) -> Vec<Point3<f64>> {
     let mut path = vec![corners[0]];
     for window in corners.windows(3) {
@@ -275,8 +276,8 @@ pub fn rounded_path(corners: &[Point3<f64>], radius: f64, steps: usize) -> Vec<P
     path
 }
 
-/// A round bar of `radius` metres along a path, flat at both ends, or closed in itself when the path lies in a plane
-/// and ends where it starts. Texture u runs around the bar (0 and 1 below, 0.5 on top).
+/// A round bar of `radius` metres along a path, with flat ends. If the path lies in a plane and ends at its start, the
+/// bar is closed. Texture coordinate u runs around the bar (0 and 1 below, 0.5 on top).
 pub fn sweep(path: &[Point3<f64>], radius: f64, segments: usize) -> TriangleMesh {
     let count = path.len();
     let closed = path[0] == path[count - 1];
@@ -288,7 +289,7 @@ pub fn sweep(path: &[Point3<f64>], radius: f64, segments: usize) -> TriangleMesh
         })
         .map(|tangent| tangent.normalize())
         .collect();
-    // Transported along the path with the smallest rotation, so that the bar does not twist.
+    // The direction is transported along the path with the smallest rotation, so that the bar does not twist.
     let mut up = vec![perpendicular(&tangents[0])];
     for pair in tangents.windows(2) {
         let turn = UnitQuaternion::rotation_between(&pair[0], &pair[1]).unwrap_or_else(UnitQuaternion::identity);
@@ -307,7 +308,7 @@ pub fn sweep(path: &[Point3<f64>], radius: f64, segments: usize) -> TriangleMesh
         let side = tangents[idx].cross(&up[idx]);
         let capping = caps == 1 && (row == 0 || row == count + 1);
         let offset = if capping { 0.0 } else { radius };
-        // `up`, then `side = tangent × up`: increasing angle turns about the tangent, so that faces look outwards.
+        // With `side = tangent × up`, an increasing angle rotates about the tangent, so that faces point outwards.
         let position = path[idx] + (up[idx] * angle.cos() + side * angle.sin()) * offset;
         MeshVertex { position, texcoord: Point2::new(col as f64 / segments as f64, along[idx] / METRES_PER_REPEAT) }
     });
@@ -320,7 +321,7 @@ fn perpendicular(tangent: &Vector3<f64>) -> Vector3<f64> {
     (up - tangent * tangent.dot(&up)).normalize()
 }
 
-/// Turns a solid that stands along z so that z points along +x, and its former +y stays +y; its axis is at `height`.
+/// The transform that lays a solid along x: z becomes +x, +y stays +y, and the axis is at `height`.
 pub fn lying_along_x(height: f64) -> Isometry3<f64> {
     Isometry3::from_parts(
         nalgebra::Translation3::new(0.0, 0.0, height),
@@ -333,7 +334,7 @@ mod tests {
     use super::*;
     use approx::assert_relative_eq;
 
-    /// Round solids are polygons of many sides: their volume is too small by at most this share.
+    /// Largest relative error of volumes: round solids are polygons of many sides.
     const FACET_TOLERANCE: f64 = 0.02;
 
     fn volume_is(mesh: &TriangleMesh, expected: f64) {
@@ -361,7 +362,7 @@ mod tests {
         let tube = sweep(&rounded_path(&corners, bend, 12), radius, 32);
         let length = 2.0 * (0.1 - bend) + bend * PI / 2.0;
         volume_is(&tube, PI * radius * radius * length);
-        // Pappus: a bend keeps the area times the path of the centre.
+        // Pappus: the volume is the area times the length of the centre's path.
         let (low, high) = tube.bounds();
         assert_relative_eq!(high.x, 0.1 + radius, epsilon = 2e-4);
         assert_relative_eq!(low.z, 0.01 - radius, epsilon = 1e-9);

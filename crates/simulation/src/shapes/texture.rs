@@ -1,4 +1,4 @@
-//! Textures painted in code: grain, brushing, turning marks, printed layers, and the tops of tables.
+//! Textures created by code: grain, brushing, turning marks, printed layers, and table tops.
 
 use image::{ImageEncoder, Rgb, RgbImage};
 use rand::{Rng, SeedableRng};
@@ -7,7 +7,7 @@ use rand_pcg::Pcg64Mcg;
 /// A colour, each channel from 0 to 1.
 pub type Color = [f64; 3];
 
-/// A square picture that tiles without a seam.
+/// A square picture that can be tiled without a seam.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Texture {
     /// The pixels.
@@ -15,7 +15,7 @@ pub struct Texture {
 }
 
 impl Texture {
-    /// Paints every texel; `colour` gets (u, v) from 0 to 1.
+    /// Computes every texel; `color` gets (u, v) from 0 to 1.
     pub fn paint(size: u32, mut color: impl FnMut(f64, f64) -> Color) -> Self {
         let image = RgbImage::from_fn(size, size, |x, y| {
             let (u, v) = ((f64::from(x) + 0.5) / f64::from(size), (f64::from(y) + 0.5) / f64::from(size));
@@ -24,10 +24,10 @@ impl Texture {
         Self { image }
     }
 
-    /// The PNG for MuJoCo.
+    /// Encodes the texture as PNG for MuJoCo.
     ///
     /// # Panics
-    /// Never for a picture in memory: the encoder fails only if its writer does.
+    /// Never: the encoder fails only if its writer fails, and memory does not.
     pub fn to_png(&self) -> Vec<u8> {
         use image::codecs::png::{CompressionType, FilterType, PngEncoder};
         let mut bytes = Vec::new();
@@ -57,7 +57,7 @@ impl Texture {
         })
     }
 
-    /// A turned face: rings about the centre of the texture, and the two bright fans of turning marks.
+    /// A turned metal face: rings about the centre of the texture, and the two bright sectors of turning marks.
     pub fn turned(size: u32, base: Color, strength: f64, seed: u64) -> Self {
         let rings = Noise::new_stretched(1, 64, seed);
         Self::paint(size, |u, v| {
@@ -80,9 +80,10 @@ impl Texture {
         })
     }
 
-    /// A round bar seen from above, with u around it (0.5 on top): bright along the top, dark flanks, a lighter rim.
+    /// A round bar seen from above, with u around it (0.5 on top): bright on top, dark flanks, a lighter rim.
     ///
-    /// The renderer has no reflections; a bar on a table shows these bands from any direction above.
+    /// The renderer has no reflections of the surroundings; on a real table, a bar shows these bands from any direction
+    /// above.
     pub fn round_bar(size: u32, base: Color, gloss: f64, seed: u64) -> Self {
         let lines = Noise::new_stretched(4, size as usize, seed);
         Self::paint(size, |u, v| {
@@ -106,7 +107,7 @@ impl Texture {
     }
 }
 
-/// Value noise on a periodic lattice: -1 to 1, smooth, deterministic for a seed.
+/// Value noise on a periodic lattice: smooth, from -1 to 1, the same for the same seed.
 #[derive(Debug, Clone)]
 pub struct Noise {
     columns: usize,
@@ -120,7 +121,7 @@ impl Noise {
         Self::new_stretched(cells, cells, seed)
     }
 
-    /// A lattice with different numbers of columns (u) and rows (v): few columns make streaks along u.
+    /// A lattice with different numbers of columns (u) and rows (v); few columns give streaks along u.
     pub fn new_stretched(columns: usize, rows: usize, seed: u64) -> Self {
         let mut rng = Pcg64Mcg::seed_from_u64(seed);
         Self { columns, rows, values: (0..columns * rows).map(|_| rng.random_range(-1.0..1.0)).collect() }

@@ -1,4 +1,4 @@
-//! The scene of a camera over the table, and its text form in an address.
+//! The configuration of a camera above the table, and its text form in an address.
 
 use std::ops::Range;
 use std::str::FromStr;
@@ -8,14 +8,15 @@ use sdg_robot::LOOK_HEIGHT_M;
 use crate::error::{Result, SimulationError};
 use crate::objects::{LookAlikeKind, ObjectSpec};
 
-/// The motion under the camera. Its text is `PART?name=value&…`, as in `sim:pendulum?speed=50&fps=100&hide=2..3`.
+/// The scene under the camera and its motion. The text form is `PART?name=value&…`, as in
+/// `sim:pendulum?speed=50&fps=100&hide=2..3`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TableCameraConfig {
     /// Name of the part (text before `?`).
     pub part: String,
-    /// Speed over the table in metres per second (`speed`, in mm/s).
+    /// Speed along the table in metres per second (`speed`, in mm/s).
     pub speed_m_s: f64,
-    /// Rate of turning in radians per second; its direction changes (`turn`, in degrees per second).
+    /// Angular speed in radians per second, in changing directions (`turn`, in degrees per second).
     pub turn_rad_s: f64,
     /// Frames per second (`fps`).
     pub fps: f64,
@@ -25,25 +26,26 @@ pub struct TableCameraConfig {
     pub duration_secs: Option<f64>,
     /// Number of instances of the part, 1 to 4 (`count`).
     pub count: usize,
-    /// Another part beside it (`beside`): a part's name, or a look-alike of this one, `mirrored`, `feature-moved` or a
-    /// size as `0.9`.
+    /// Another part beside the first (`beside`): the name of a part, or a look-alike of the first: `mirrored`,
+    /// `feature-moved`, or a size such as `0.9`.
     pub beside: Option<String>,
-    /// Distractors beside it (`things`).
+    /// Number of distractors (`things`).
     pub num_things: usize,
-    /// Interval in which the first part is off the table, in seconds; afterwards it lies elsewhere (`hide`, as `2..3`).
+    /// Interval in which the first part is not on the table, in seconds; afterwards it lies at another place (`hide`,
+    /// as `2..3`).
     pub hidden_secs: Option<Range<f64>>,
-    /// Interval in which a card lies over the first part, in seconds (`cover`, as `2..3`).
+    /// Interval in which a card covers the first part, in seconds (`cover`, as `2..3`).
     pub covered_secs: Option<Range<f64>>,
     /// Standard deviation of the sensor's noise in grey values (`noise`).
     pub noise: f64,
-    /// Height of the camera over the table in metres (`height`, in mm).
+    /// Height of the camera above the table in metres (`height`, in mm).
     pub height_m: f64,
     /// Tilt of the camera about the table's x in radians (`tilt`, in degrees).
     pub tilt_rad: f64,
 }
 
 impl TableCameraConfig {
-    /// One part that moves at 50 mm/s and turns at 30 degrees per second, seen from the wrist camera's height.
+    /// One part that moves at 50 mm/s and rotates at 30 degrees per second, seen from the wrist camera's height.
     pub fn new(part: &str) -> Self {
         Self {
             part: part.to_owned(),
@@ -89,7 +91,7 @@ impl TableCameraConfig {
         Ok(())
     }
 
-    /// The part beside it, if one is requested.
+    /// The other part beside `part`, if one is requested.
     pub(super) fn part_beside(&self, part: &ObjectSpec) -> Result<Option<ObjectSpec>> {
         let Some(beside) = &self.beside else { return Ok(None) };
         let kind = match beside.as_str() {

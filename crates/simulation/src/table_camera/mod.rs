@@ -1,12 +1,12 @@
-//! A fixed camera over the table that shows moving parts: `sim:PART?speed=50&seed=1&fps=100&…`.
+//! A fixed camera above the table that shows moving parts: `sim:PART?speed=50&seed=1&fps=100&…`.
 //!
 //! ```text
 //! TableCameraConfig ─ scene by seed, a lane of the table for each part ─ Mover: place and yaw at each frame
 //!                                                                              │
-//!                                      Renderer ─ noise ─ TableView { picture, truth of every part }
+//!                                      Renderer ─ noise ─ TableView { picture, ground truth of every part }
 //! ```
-//! Frames are `1 / fps` of simulated time apart and are drawn as fast as the computer can. The same configuration gives
-//! the same frames, bit for bit. The scene contains no robot.
+//! Frames are `1 / fps` of simulated time apart and are rendered as fast as possible. The same configuration gives the
+//! same frames, bit for bit. The scene contains no robot.
 
 mod config;
 mod motion;
@@ -36,28 +36,28 @@ use crate::views::GraspTruth;
 
 /// Height of the card above the table, in metres.
 const CARD_HEIGHT_M: f64 = 0.05;
-/// Number of noise values that are drawn once; every frame starts at another offset.
+/// Number of noise values that are sampled once; every row of a frame starts at another offset.
 const NUM_NOISE: usize = 1 << 16;
 
 /// A part on the table in one frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MovingTruth {
-    /// Its pose, and its grasp in the base frame and in pixels.
+    /// The part's pose, and its grasp in the base frame and in pixels.
     pub grasp: GraspTruth,
-    /// Whether the picture shows it: it is on the table and not under the card.
+    /// Whether the picture shows the part: it is on the table and not under the card.
     pub is_shown: bool,
 }
 
-/// One frame and the truth about it.
+/// One frame with its ground truth.
 #[derive(Debug, Clone)]
 pub struct TableView {
-    /// Counted from 0.
+    /// Number of the frame, from 0.
     pub number: u64,
     /// Simulated time since the first frame.
     pub time: Duration,
     /// The camera's picture, with noise.
     pub picture: RgbImage,
-    /// All instances of the part, in a fixed order; the objects beside are not included.
+    /// Ground truth of all instances of the part, in a fixed order; other objects are not included.
     pub truths: Vec<MovingTruth>,
 }
 
@@ -66,12 +66,12 @@ struct Moving {
     joint: Id<Joint>,
     mover: Mover,
     spec: ObjectSpec,
-    /// Centre of its outline from above, in the object frame.
+    /// Centre of the part's outline from above, in the object frame.
     middle: Point2<f64>,
     is_away: bool,
 }
 
-/// The camera.
+/// A camera above a table with moving parts.
 pub struct TableCamera {
     config: TableCameraConfig,
     data: Data,
@@ -90,7 +90,7 @@ impl TableCamera {
     /// Builds the scene.
     ///
     /// # Errors
-    /// [`crate::SimulationError::UnknownName`] for a part that does not exist; as [`Renderer::new`].
+    /// [`crate::SimulationError::UnknownName`] for a part that does not exist, and as for [`Renderer::new`].
     pub fn new(config: &TableCameraConfig) -> Result<Self> {
         let spec = ObjectSpec::by_name(&config.part)?;
         let beside = config.part_beside(&spec)?;
@@ -142,10 +142,10 @@ impl TableCamera {
         })
     }
 
-    /// The camera of an address without its `sim:`; frame times count from now.
+    /// Opens the camera of an address (without `sim:`); the times of frames start now.
     ///
     /// # Errors
-    /// As [`TableCameraConfig`]'s `from_str` and [`Self::new`].
+    /// As for [`TableCameraConfig`]'s `from_str` and [`Self::new`].
     pub fn open(text: &str) -> Result<Self> {
         let mut made = Self::new(&text.parse()?)?;
         made.address = format!("sim:{text}").into();
@@ -153,7 +153,7 @@ impl TableCamera {
         Ok(made)
     }
 
-    /// Its configuration.
+    /// The camera's configuration.
     pub fn config(&self) -> &TableCameraConfig {
         &self.config
     }
@@ -166,7 +166,7 @@ impl TableCamera {
     /// The next frame; `None` at the end of the sequence.
     ///
     /// # Errors
-    /// As [`Renderer::image`].
+    /// As for [`Renderer::image`].
     pub fn next_view(&mut self) -> Result<Option<TableView>> {
         let secs = self.number as f64 / self.config.fps;
         if self.config.duration_secs.is_some_and(|duration| secs >= duration) {
@@ -215,7 +215,7 @@ impl TableCamera {
         if self.config.noise == 0.0 {
             return;
         }
-        // Every row starts at another offset, so that no pattern repeats between rows or frames.
+        // Every row starts at another offset, so that the pattern does not repeat between rows or frames.
         let row_len = 3 * picture.width() as usize;
         for row in picture.chunks_exact_mut(row_len) {
             let from = self.rng.random_range(0..NUM_NOISE);
@@ -246,7 +246,7 @@ impl Moving {
     }
 }
 
-/// A normally distributed number, by the method of Box and Muller.
+/// A sample of the standard normal distribution, by the method of Box and Muller.
 fn normal(rng: &mut Pcg64Mcg) -> f64 {
     let radius = (-2.0 * (1.0 - rng.random::<f64>()).ln()).sqrt();
     radius * (std::f64::consts::TAU * rng.random::<f64>()).cos()
@@ -284,7 +284,7 @@ mod tests {
                 let turned = (truth.direction_rad - last.direction_rad + 9.0).rem_euclid(std::f64::consts::TAU) - 9.0;
                 let turned = sdg_geometry::Angle::from_radians(turned).radians().abs();
                 assert!((turned - 1.5f64.to_radians()).abs() < 1e-6, "{turned}");
-                // The marks are beside the part's centre, so that turning moves them, too.
+                // The marks are beside the part's centre, so that rotation also moves them.
                 assert!((truth.tcp - last.tcp).norm() < 0.0025 + 0.06 * turned, "{number}");
             }
             last = Some(truth);

@@ -1,4 +1,4 @@
-//! The motion of an object over the table: straight for a while, then in another direction, always within its bounds.
+//! The motion of an object on the table: straight for a while, then in another direction, always within its bounds.
 
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -7,7 +7,7 @@ use nalgebra::{Point2, Vector2};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
-/// Duration of one direction, in seconds.
+/// Range of the duration of one direction, in seconds.
 const STRAIGHT_SECS: Range<f64> = 0.6..1.6;
 
 /// The allowed range of an object, in the robot's base frame, in metres.
@@ -18,7 +18,7 @@ pub(super) struct Bounds {
 }
 
 impl Bounds {
-    /// Smaller by this distance on every side; at least its centre.
+    /// The bounds reduced by a distance on every side, at most to their centre.
     pub(super) fn shrunk(&self, by_m: f64) -> Self {
         let shrunk = |[low, high]: [f64; 2]| {
             let middle = 0.5 * (low + high);
@@ -74,7 +74,7 @@ impl Mover {
         self.straight_secs = self.rng.random_range(STRAIGHT_SECS);
     }
 
-    /// Advances the time.
+    /// Moves the object for `secs`.
     pub(super) fn advance(&mut self, secs: f64) {
         self.straight_secs -= secs;
         if self.straight_secs <= 0.0 {
@@ -90,7 +90,7 @@ impl Mover {
         }
     }
 
-    /// Puts it at another place.
+    /// Moves the object to a random place within its bounds.
     pub(super) fn put_elsewhere(&mut self) {
         self.place = self.bounds.any_place(&mut self.rng);
         self.yaw_rad = self.rng.random_range(-PI..PI);
@@ -118,7 +118,7 @@ mod tests {
             assert!(BOUNDS.y_m[0] <= mover.place.y && mover.place.y <= BOUNDS.y_m[1]);
             changes += usize::from(mover.direction != direction);
         }
-        // 20 seconds, 0.6 to 1.6 s each, and the borders.
+        // In 20 seconds, the direction changes every 0.6 to 1.6 s, and at the borders.
         assert!((12..=40).contains(&changes), "{changes}");
     }
 

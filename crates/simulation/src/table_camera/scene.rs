@@ -19,7 +19,7 @@ use crate::views::base_from_look_camera;
 const SHOWN: Bounds = Bounds { x_m: [0.26, 0.70], y_m: [-0.31, 0.31] };
 /// Width of the strip along y with the distractors.
 const STRIP_M: f64 = 0.10;
-/// Position of hidden objects: below the floor.
+/// z of hidden objects, below the floor, in metres.
 const AWAY_M: f64 = -3.0;
 /// Half of the card's side, in metres.
 const CARD_HALF_M: f64 = 0.06;
@@ -39,7 +39,7 @@ pub(super) fn middle_of(spec: &ObjectSpec) -> (Point2<f64>, f64) {
     (middle, spec.footprint.iter().map(|point| (point - middle).norm()).fold(0.0, f64::max))
 }
 
-/// Strips of the table along y, one for each part; the distractors have the last strip.
+/// Strips of the table along y, one for each part; the last strip contains the distractors.
 pub(super) fn lanes(count: usize, with_things: bool) -> Vec<Bounds> {
     let [low, high] = SHOWN.y_m;
     let high = if with_things { high - STRIP_M } else { high };
@@ -47,7 +47,7 @@ pub(super) fn lanes(count: usize, with_things: bool) -> Vec<Bounds> {
     (0..count).map(|idx| Bounds { y_m: [low + width * idx as f64, low + width * (idx + 1) as f64], ..SHOWN }).collect()
 }
 
-/// Light and table of the seed, all instances of the part, and the distractors in their strip.
+/// The scene of the seed: light and table, all instances of the part, and the distractors in their strip.
 pub(super) fn scene(config: &TableCameraConfig, spec: &ObjectSpec) -> SceneVariation {
     let mut scene = SceneVariation::sample(
         None,
@@ -67,7 +67,7 @@ pub(super) fn mjcf(config: &TableCameraConfig, fragment: &MjcfFragment) -> Strin
     let fovy = vertical_field_of_view_rad(WRIST_FOCAL_LENGTH_PX, RenderConfig::default().height).to_degrees();
     let look = base_from_look_camera();
     let at = Translation3::new(look.translation.x, look.translation.y, config.height_m);
-    // Tilted about the centre of its view, which therefore stays in the picture's centre.
+    // The camera is tilted about the point at the centre of its view, which stays there.
     let tilt = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), config.tilt_rad);
     let foot = Translation3::new(at.x, at.y, 0.0);
     let optical = foot * tilt * foot.inverse() * Isometry3::from_parts(at, look.rotation);
@@ -86,7 +86,7 @@ pub(super) fn mjcf(config: &TableCameraConfig, fragment: &MjcfFragment) -> Strin
     text
 }
 
-/// The same body under separate names, so that it can be placed beside another part.
+/// Renames the body of a part, so that another part can be in the same scene.
 pub(super) fn renamed(fragment: MjcfFragment) -> MjcfFragment {
     let sections = fragment.sections.replace("=\"object", "=\"beside").replace(" file=\"", " file=\"beside_");
     let files = fragment

@@ -1,6 +1,6 @@
-//! Pictures of scenes with the truth: demonstrations, random places, axes that make them harder, other cameras.
+//! Pictures of scenes with ground truth: demonstrations, random scenes, harder scenes along axes, other cameras.
 //!
-//! A scene contains no camera and no robot; a view draws it through a workcell.
+//! A scene contains no camera and no robot; a view renders it in a workcell.
 
 mod axis;
 mod nominal;

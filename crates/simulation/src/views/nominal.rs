@@ -1,6 +1,6 @@
-//! Pictures of the wrist camera with their truth: test images and demonstrations.
+//! Pictures of the wrist camera with ground truth: test images and demonstrations.
 //!
-//! Both are taken by the same code, from the same look pose, as a grasp attempt's own pictures.
+//! Both are taken by the same code and from the same pose as the pictures of a grasp attempt.
 
 use nalgebra::{Isometry3, Point2, Point3};
 use sdg_geometry::{GraspLine, Mask, PlanarGrasp, Polygon, PosedCamera, outer_outline};
@@ -15,10 +15,10 @@ use crate::workcell::{Workcell, WorkcellConfig};
 
 /// Pose of the parts in demonstrations: x, y in metres and yaw in radians, in the base frame.
 ///
-/// Attempts draw their poses from continuous ranges and do not repeat it.
+/// Attempts sample poses from continuous ranges and do not repeat this one.
 pub const DEMONSTRATION_PLACE: (f64, f64, f64) = (0.5, 0.0, 0.9);
 
-/// The wrist camera's pose in an attempt: looking vertically down at the centre of the reachable table area.
+/// The wrist camera's first pose in an attempt: it points vertically down at the centre of the reachable table area.
 pub fn base_from_look_camera() -> Isometry3<f64> {
     let [x, y] = LOOK_AT_M;
     camera_looking_down(x, y, LOOK_HEIGHT_M, 0.0)
@@ -35,12 +35,12 @@ pub struct GraspTruth {
     pub direction_rad: f64,
     /// The marked line in pixels.
     pub line: GraspLine,
-    /// The same as a planar grasp in pixels; its width is the part's width between the jaws.
+    /// The grasp as a planar grasp in pixels; its width is the part's width between the jaws.
     pub planar: PlanarGrasp,
 }
 
 impl GraspTruth {
-    /// Projects a part's marks; `None` when the camera looks away from them.
+    /// Projects a part's marks; `None` if they are behind the camera.
     pub fn new(object: &PlacedObject, camera: &PosedCamera) -> Option<Self> {
         let [start, end] = object.spec.marks_in_base(&object.base_from_object);
         let line = GraspLine::new(camera.project(&start)?, camera.project(&end)?);
@@ -57,21 +57,21 @@ impl GraspTruth {
     }
 }
 
-/// A picture with its scene and, if the part is on the table, the truth.
+/// A picture with its scene and, if the part is on the table, its ground truth.
 #[derive(Debug, Clone)]
 pub struct TestView {
-    /// The drawn scene.
+    /// The rendered scene.
     pub scene: SceneVariation,
     /// The picture and its camera.
     pub view: CameraView,
-    /// `None` for a scene without the part.
+    /// Ground truth of the part; `None` for a scene without it.
     pub truth: Option<GraspTruth>,
 }
 
-/// The picture of one scene from the look pose.
+/// The picture of one scene from the first pose of an attempt.
 ///
 /// # Errors
-/// As [`Workcell::new`] and [`Workcell::view_from`].
+/// As for [`Workcell::new`] and [`Workcell::view_from`].
 pub fn test_view(scene: SceneVariation) -> Result<TestView> {
     test_view_drawn(WorkcellConfig::new(scene))
 }
@@ -84,9 +84,9 @@ fn test_view_drawn(config: WorkcellConfig) -> Result<TestView> {
     Ok(TestView { scene, view, truth })
 }
 
-/// Pictures at unseen poses with changed light, other tables and distractors, one per seed from `seed` on.
+/// Pictures at new poses with changed light, other tables and distractors, one for each seed from `seed` on.
 ///
-/// With `present` false the part is left out and at least one distractor is present.
+/// If `present` is false, the scene has no part and at least one distractor.
 pub fn test_views(
     spec: &ObjectSpec,
     present: bool,
@@ -102,7 +102,7 @@ pub fn test_views(
     })
 }
 
-/// A demonstration of a part: one picture in even light, and a careful person's marks on it.
+/// A demonstration of a part: one picture in even light, with marks as a careful person makes them.
 #[derive(Debug, Clone)]
 pub struct DemonstrationView {
     /// The picture and its camera.
@@ -111,14 +111,14 @@ pub struct DemonstrationView {
     pub truth: GraspTruth,
     /// The pixels that show the part.
     pub mask: Mask,
-    /// The outer outline as a person clicks it.
+    /// The outer outline as marked by a person.
     pub outline: Polygon,
 }
 
 /// Takes the demonstration picture of a part.
 ///
 /// # Errors
-/// As [`Workcell::new`]; [`SimulationError::Configuration`] when the camera does not see the part.
+/// As for [`Workcell::new`]; [`SimulationError::Configuration`] if the part is not in the camera's view.
 pub fn demonstration_view(spec: &ObjectSpec) -> Result<DemonstrationView> {
     demonstration_view_drawn(&WorkcellConfig::new(demonstration_scene(spec)))
 }
@@ -148,7 +148,7 @@ fn demonstration_view_drawn(config: &WorkcellConfig) -> Result<DemonstrationView
     Ok(DemonstrationView { view, truth, mask, outline })
 }
 
-/// Whether a point lies in the picture, at least `margin_px` from its rim.
+/// Whether a point is in the picture, at least `margin_px` from its border.
 pub fn in_picture(camera: &PosedCamera, point: &Point2<f64>, margin_px: f64) -> bool {
     let (width, height) = (f64::from(camera.intrinsics.width), f64::from(camera.intrinsics.height));
     (margin_px..=width - margin_px).contains(&point.x) && (margin_px..=height - margin_px).contains(&point.y)
@@ -157,7 +157,7 @@ pub fn in_picture(camera: &PosedCamera, point: &Point2<f64>, margin_px: f64) -> 
 /// Minimum distance of a completely visible part from the picture's border, in pixels.
 const RIM_PX: f64 = 8.0;
 
-/// Whether a part's outline, on the table and at the height of its marks, lies in the picture.
+/// Whether a part's outline, on the table and at the height of its marks, is in the picture.
 pub(crate) fn shows_whole(camera: &PosedCamera, part: &PlacedObject) -> bool {
     part.footprint().iter().all(|corner| {
         [0.0, part.spec.mark_height_m].into_iter().all(|z| {
@@ -171,13 +171,13 @@ mod tests {
     use super::*;
     use crate::render::RenderConfig;
 
-    /// Pixels between a mark's projection and the part's drawn centre: marks lie on the axis of the drawn part.
+    /// Largest distance in pixels between a mark's projection and the axis of the rendered part.
     const MARK_TOLERANCE_PX: f64 = 1.5;
 
-    /// Average distance in pixels of a careful person's outline from the true one.
+    /// Largest mean distance between a careful person's outline and the true one, in pixels.
     const MEAN_OUTLINE_OFFSET_PX: f64 = 0.4;
 
-    /// Without shadows and antialiasing, because only positions are checked here.
+    /// A configuration without shadows and antialiasing, because these tests check only positions.
     fn drawn_fast(scene: SceneVariation) -> WorkcellConfig {
         let wrist_render = RenderConfig { shadow_size: 0, samples: 0, ..RenderConfig::default() };
         WorkcellConfig { wrist_render, ..WorkcellConfig::new(scene) }
@@ -190,8 +190,8 @@ mod tests {
             let shown = demonstration_view_drawn(&drawn_fast(demonstration_scene(&spec))).unwrap();
             let line = shown.truth.line;
             let across = nalgebra::Vector2::new(-(line.end - line.start).y, (line.end - line.start).x).normalize();
-            // From the grasp's centre to the part's outer edge on both sides, in tenths of a pixel; the centre itself
-            // may be open, as in a bearing.
+            // The distance from the grasp's centre to the part's outer edge on each side is searched in steps of 0.1
+            // px; the centre itself may be open, as in a bearing.
             let reach = |side: f64| {
                 (0..400)
                     .rev()
@@ -209,7 +209,7 @@ mod tests {
             let bounds = shown.outline.bounds();
             let length = (bounds.x2 - bounds.x1).hypot(bounds.y2 - bounds.y1);
             assert!((60.0..230.0).contains(&length), "{name}: {length} px");
-            // Area between the clicked and the true outline over the outline's length: its average error.
+            // The area between the clicked and the true outline, divided by the outline's length, is its mean error.
             let (clicked, shown_filled) = (shown.outline.rasterize(640, 480), filled(&shown.mask));
             let differing = (0..480u32)
                 .flat_map(|y| (0..640u32).map(move |x| (x, y)))
@@ -222,7 +222,7 @@ mod tests {
         }
     }
 
-    /// The mask with its holes: the pixels that are not reached from the picture's corner.
+    /// The mask with its holes filled: all pixels that are not connected to the picture's corner.
     fn filled(mask: &Mask) -> Mask {
         let mut outside = Mask::empty(mask.width(), mask.height());
         let mut open = vec![(0u32, 0u32)];

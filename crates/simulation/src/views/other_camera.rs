@@ -1,9 +1,9 @@
-//! Cameras other than the robot's own, each with its own lens, resolution and pose over the table.
+//! Cameras other than the robot's wrist camera, each with its own lens, resolution and pose above the table.
 //!
 //! ```text
-//! (part, camera, number, seed) ─ ordinary scene, the arm turned away ─ camera at a height and tilt ─ picture with distortion
+//! (part, camera, number, seed) ─ ordinary scene, the arm pointing away ─ camera at a height and tilt ─ picture with distortion
 //! ```
-//! Their relation to the wrist camera is that of a user's second camera to the one that took the photo.
+//! They represent a user's second camera, which differs from the camera that took the demonstration's photo.
 
 use std::f64::consts::PI;
 
@@ -31,11 +31,12 @@ pub struct OtherCamera {
     pub name: &'static str,
     /// Resolution, focal length, axis and lens.
     pub intrinsics: PinholeCamera,
-    /// Distances to the point on the table at which it looks, in metres.
+    /// Smallest and largest distance to the point on the table at which the camera is aimed, in metres.
     pub distances_m: [f64; 2],
 }
 
-/// Three cameras of other focal lengths, lenses and heights than the wrist camera (640 × 480, 550 px, 0.58 m).
+/// Three cameras whose focal lengths, lenses and heights differ from those of the wrist camera (640 × 480, 550 px, 0.58
+/// m).
 pub const OTHER_CAMERAS: [OtherCamera; 3] = [
     OtherCamera {
         name: "webcam",
@@ -78,13 +79,13 @@ pub const OTHER_CAMERAS: [OtherCamera; 3] = [
     },
 ];
 
-/// Tilts from straight down, in degrees.
+/// Smallest and largest tilt from straight down, in degrees.
 const TILTS_DEG: [f64; 2] = [0.0, 25.0];
-/// Distance of the camera's view from the part, in metres.
+/// Largest distance between the part and the point at which the camera is aimed, in metres.
 const MAX_LOOK_OFFSET_M: f64 = 0.05;
 /// Number of poses tried until the whole part is in the picture.
 const MAX_TRIES: usize = 40;
-/// The first joint's angle at which the arm points away from the table, in radians.
+/// Angle of the first joint at which the arm points away from the table, in radians.
 const TURNED_AWAY_RAD: f64 = 2.7;
 
 /// The object on the table.
@@ -92,24 +93,24 @@ const TURNED_AWAY_RAD: f64 = 2.7;
 pub enum OnTable {
     /// The part.
     Part,
-    /// The part in another size, in percent of its own.
+    /// The part in another size, in percent of its true size.
     Scaled(u32),
 }
 
-/// A picture with the truth about it.
+/// A picture with its ground truth.
 #[derive(Debug, Clone)]
 pub struct OtherView {
     /// The picture and its camera.
     pub view: CameraView,
-    /// `None` if something else lies in the part's place.
+    /// Ground truth of the part; `None` if another object is in its place.
     pub truth: Option<GraspTruth>,
-    /// Height of the camera over the table, in metres.
+    /// Height of the camera above the table, in metres.
     pub height_m: f64,
     /// Tilt from straight down, in degrees.
     pub tilt_deg: f64,
 }
 
-/// Draws picture `number` of a part by a camera: distance and tilt run through their ranges with the number, `of` numbers in all.
+/// Renders picture `number` (of `of`) of a part by a camera: distance and tilt vary over their ranges with the number.
 ///
 /// # Errors
 /// As for [`crate::Workcell::new`]; [`SimulationError::Configuration`] if no pose shows the whole part.
@@ -129,7 +130,7 @@ pub fn other_view(
     let scene = SceneVariation::sample(Some(&shown), &VariationConfig::default(), scene_seed);
     let part = scene.object.clone().ok_or_else(|| no_place(camera, &spec.name))?;
     let within = |[low, high]: [f64; 2], share: f64| low + share.clamp(0.0, 1.0) * (high - low);
-    // Distance and tilt run through their ranges in different orders, so that they vary independently.
+    // Distance and tilt vary over their ranges in different orders, so that they are independent.
     let share = |k: u64| (k % of) as f64 / of.max(1) as f64;
     let tilt_deg = within(TILTS_DEG, share(number) + rng.random_range(0.0..1.0 / of.max(1) as f64));
     let distance_m = within(camera.distances_m, share(7 * number + 3) + rng.random_range(0.0..1.0 / of.max(1) as f64));
@@ -149,11 +150,11 @@ pub fn other_view(
     Ok(OtherView { view: CameraView { image, camera: posed }, truth, height_m, tilt_deg })
 }
 
-/// A picture of a scene by a fixed camera beside the robot, whose arm is turned away.
+/// A picture of a scene by a fixed camera beside the robot, whose arm points away.
 ///
 /// # Errors
-/// As for [`crate::Workcell::new`]; [`SimulationError::Configuration`] for a lens that does not reach its picture's
-/// corners.
+/// As for [`crate::Workcell::new`]; [`SimulationError::Configuration`] for a lens whose model does not cover its
+/// picture's corners.
 fn draw(scene: SceneVariation, camera: &PosedCamera) -> Result<image::RgbImage> {
     let frustum = Frustum::around(&camera.intrinsics)?;
     // MuJoCo's cameras look along -z with y up.
@@ -216,7 +217,7 @@ mod tests {
             assert!((0.35..0.95).contains(&first.height_m), "{}", first.height_m);
             let empty = SceneVariation { object: None, ..scene_of(&spec, camera) };
             let without = draw(empty, &first.view.camera).unwrap();
-            // The centre of the pixels that the part changed lies within the part's size of its marks.
+            // The centre of the pixels that the part changed is closer to its marks than the part's size.
             let changed: Vec<Vector3<f64>> = first
                 .view
                 .image

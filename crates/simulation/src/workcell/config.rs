@@ -13,15 +13,15 @@ use crate::scene::{SceneVariation, SeenPart};
 pub struct WorkcellConfig {
     /// Part, light, table and distractors.
     pub scene: SceneVariation,
-    /// How the wrist camera's pictures are drawn.
+    /// Rendering settings of the wrist camera's pictures.
     pub wrist_render: RenderConfig,
     /// Errors of the workcell during attempts.
     pub errors: AttemptErrors,
-    /// The camera's size, focal length and lens, if they differ from [`PinholeCamera::WRIST`].
+    /// Picture size, focal length and lens of the camera, if they differ from [`PinholeCamera::WRIST`].
     pub wrist_camera: Option<PinholeCamera>,
-    /// A part that a camera has seen, which is drawn but has no collisions.
+    /// A part that a camera detected; it is rendered but has no collisions.
     pub seen_part: Option<SeenPart>,
-    /// The camera's pose, if it differs from the MJCF's on the hand.
+    /// The camera's pose, if it differs from the pose on the hand in the MJCF.
     pub camera_pose: Option<CameraPose>,
     /// Obstacles in the cell besides the table.
     pub obstacles: Vec<Obstacle>,

@@ -1,4 +1,4 @@
-//! The robot at its table: one scene, its state, and motion through time.
+//! The robot at its table: one scene, its state, and its motion over time.
 
 mod config;
 mod model;
@@ -52,8 +52,9 @@ pub struct Workcell {
     pub(crate) is_in_reflex: bool,
     /// The load that was given to the controller.
     pub(crate) load: Load,
-    /// The vertical force on the hand, and its maximum since the last call, N.
+    /// The filtered vertical force on the hand, N.
     pub(crate) felt_n: f64,
+    /// Largest absolute value of that force since the last call of [`Workcell::take_peak_felt_n`], N.
     pub(crate) peak_felt_n: f64,
 }
 
@@ -61,8 +62,7 @@ impl Workcell {
     /// Builds the scene, its physics and the wrist camera's renderer.
     ///
     /// # Errors
-    /// `Model` if MuJoCo refuses the scene, `Rendering` without OpenGL, `Library` for the wrong
-    /// libmujoco.
+    /// `Model` if MuJoCo rejects the scene, `Rendering` without OpenGL, `Library` for the wrong libmujoco.
     pub fn new(config: &WorkcellConfig) -> Result<Self> {
         let model = build_model(config, "")?;
 
@@ -111,7 +111,7 @@ impl Workcell {
         Ok(workcell)
     }
 
-    /// Its configuration.
+    /// The workcell's configuration.
     pub fn config(&self) -> &WorkcellConfig {
         &self.config
     }
@@ -133,7 +133,7 @@ impl Workcell {
         self.data.forward()
     }
 
-    /// Puts everything at its position in another simulation of the same configuration ([`Data::qpos`]), at rest.
+    /// Moves all objects to their positions in another simulation of the same configuration ([`Data::qpos`]), at rest.
     ///
     /// # Errors
     /// [`SimulationError::Configuration`] for positions of another scene.
@@ -171,7 +171,7 @@ impl Workcell {
         self.part.map(|part| lowest_point_m(&self.data, part.body))
     }
 
-    /// The fingers (left, right) that touch the part.
+    /// Whether the left and the right finger touch the part.
     pub fn fingers_on_object(&self) -> [bool; 2] {
         let mut touching = [false; 2];
         let Some(part) = self.part else { return touching };
@@ -197,7 +197,7 @@ impl Workcell {
         self.tcp_from_camera
     }
 
-    /// The tool centre point's pose that puts the wrist camera at a pose (optical frame).
+    /// The pose of the tool centre point at which the wrist camera has a given pose (optical frame).
     pub fn base_from_tcp_for_camera(&self, base_from_camera: &Isometry3<f64>) -> Isometry3<f64> {
         base_from_camera * self.tcp_from_camera.inverse()
     }
@@ -211,7 +211,7 @@ impl Workcell {
         self.look_on()
     }
 
-    /// Recorded in every period: the force on the hand, and pictures.
+    /// Records the force on the hand and, if due, a picture; called in every period.
     pub(crate) fn look_on(&mut self) -> Result<()> {
         self.feel();
         match &mut self.recorder {
@@ -230,7 +230,7 @@ impl Workcell {
         self.reference.position
     }
 
-    /// The object that touches the arm, in words.
+    /// Describes which bodies of the arm touch which objects.
     pub(crate) fn describe_arm_contacts(&self) -> String {
         let model = self.data.model();
         let name_of = |body: Id<Body>| model.name(body).unwrap_or_else(|| "the table".into());

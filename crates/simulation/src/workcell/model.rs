@@ -18,7 +18,7 @@ use super::config::WorkcellConfig;
 /// Name of a camera beside the robot.
 pub(crate) const CAMERA_IN_BASE: &str = "beside";
 
-/// The robot, the table and the objects on it as MuJoCo's model, with further MJCF sections.
+/// Builds MuJoCo's model of the robot, the table and the objects on it, with further MJCF sections.
 pub(crate) fn build_model(config: &WorkcellConfig, sections: &str) -> Result<Arc<Model>> {
     let mut fragment = config.scene.fragment();
     if let Some(seen) = &config.seen_part {

@@ -1,4 +1,4 @@
-//! The workcell's pictures: through its camera and from outside, at one instant or over time.
+//! The workcell's pictures by its own camera and by an outside camera, at one instant or over time.
 
 use image::RgbImage;
 use nalgebra::Isometry3;
@@ -17,7 +17,7 @@ impl Workcell {
     /// The wrist camera's present picture.
     ///
     /// # Errors
-    /// As [`Renderer::image`].
+    /// As for [`Renderer::image`].
     pub fn wrist_view(&mut self) -> Result<CameraView> {
         // After a step, body positions are one period behind the joints.
         self.data.forward()?;
@@ -34,13 +34,13 @@ impl Workcell {
     /// The geom that each pixel of the wrist camera's present picture shows.
     ///
     /// # Errors
-    /// As [`Renderer::segmentation`].
+    /// As for [`Renderer::segmentation`].
     pub fn wrist_segmentation(&mut self) -> Result<Segmentation> {
         self.wrist_renderer.segmentation(&mut self.data, self.camera)
     }
 
-    /// Moves the arm, without advancing time, so that its wrist camera is at a pose, and takes a
-    /// picture: for demonstrations and test images.
+    /// Moves the arm, without advancing time, until its wrist camera is at a pose, and takes a picture, for
+    /// demonstrations and test images.
     ///
     /// # Errors
     /// [`SimulationError::Configuration`] for a pose that the arm cannot reach.
@@ -64,20 +64,20 @@ impl Workcell {
         self.data.forward()
     }
 
-    /// A picture of the whole workcell from outside, in its present state.
+    /// A picture of the whole workcell by the outside camera, in its present state.
     ///
     /// # Errors
-    /// As [`Renderer::new`].
+    /// As for [`Renderer::new`].
     pub fn scene_image(&mut self, render: RenderConfig) -> Result<RgbImage> {
         let mut renderer = Renderer::new(self.data.model(), render)?;
         renderer.image(&mut self.data, self.scene_camera)
     }
 
-    /// A picture of the whole workcell from outside with the arm in another configuration, fingers at an opening (m):
-    /// for plans.
+    /// A picture of the whole workcell by the outside camera with the arm in another configuration and the fingers at
+    /// an opening (m), for showing plans.
     ///
     /// # Errors
-    /// As [`Workcell::scene_image`].
+    /// As for [`Workcell::scene_image`].
     pub fn scene_image_at(
         &mut self,
         renderer: &mut Renderer,
@@ -90,10 +90,10 @@ impl Workcell {
         renderer.image(&mut self.data, self.scene_camera)
     }
 
-    /// Starts a recording from outside over time.
+    /// Starts to record pictures of the outside camera over time.
     ///
     /// # Errors
-    /// As [`Renderer::new`].
+    /// As for [`Renderer::new`].
     pub fn start_recording(&mut self, config: &RecordConfig) -> Result<()> {
         self.recorder = Some(Recorder::new(self.data.model(), self.scene_camera, config)?);
         Ok(())

@@ -49,7 +49,7 @@ impl BareClient {
         (RobotState::decode(&buffer[..length], Version::V5).unwrap(), from)
     }
 
-    /// Starts a joint velocity motion and answers this many states of it.
+    /// Starts a joint velocity motion and answers `num_states` of its states.
     pub fn turn(&mut self, num_states: u64) {
         let any = Deviation { translation: 1.0, rotation: 1.0, elbow: 1.0 };
         let response = self.execute(&Request::Move(MoveRequest {

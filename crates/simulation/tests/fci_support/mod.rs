@@ -8,14 +8,14 @@ use sdg_fci::server::{Pace, Server, ServerConfig};
 use sdg_simulation::scene::SceneVariation;
 use sdg_simulation::{PandaPlant, WorkcellConfig};
 
-/// An empty table.
+/// Serves a Panda at an empty table.
 pub fn serve(pace: Pace, limits: Limits) -> Server {
     let plant = PandaPlant::new(&WorkcellConfig::new(SceneVariation::nominal(None))).unwrap();
     let config = ServerConfig { robot_port: 0, hand_port: 0, pace, limits, ..ServerConfig::default() };
     Server::start(plant, &config).unwrap()
 }
 
-/// The same with the Panda's limits, and a client.
+/// Serves a Panda with a Panda's limits in lockstep, and connects a client.
 pub fn serve_panda() -> (Server, Robot) {
     let server = serve(Pace::LOCKSTEP, Limits::PANDA);
     let robot = connect(&server);

@@ -1,4 +1,4 @@
-//! A simulated Panda on the network, and a copy of its workcell that gives the truth about it.
+//! A simulated Panda on the network, and a copy of its workcell for its true state.
 
 #![allow(clippy::unwrap_used)]
 #![allow(dead_code, reason = "each test file and the example use some of it")]
@@ -32,7 +32,7 @@ pub fn connect(server: &Server) -> sdg_robot::Result<FrankaArm> {
     FrankaArm::connect(&address, Scheduling::Ordinary)
 }
 
-/// The same workcell in this process, set to the state of the served one before each query.
+/// A copy of the served workcell in this process, set to its state before each query.
 pub struct Twin {
     pub cell: Workcell,
     pub positions: SharedPositions,
@@ -43,7 +43,7 @@ impl Twin {
         self.cell.set_positions(&self.positions.get()).unwrap();
     }
 
-    /// Whether the part hangs in the air: a part at rest up there is held, regardless of contacts.
+    /// Whether the part is in the air: then it is held, and contacts need not be checked.
     pub fn is_lifted(&mut self) -> bool {
         self.sync();
         self.cell.object_height_m().is_some_and(|height_m| height_m >= AttemptConfig::default().success_height_m)

@@ -10,9 +10,9 @@ use sdg_fci::server::Server;
 use sdg_fci::wire::{HEADER_SIZE, Header, HeaderKind, Request, RobotMode, RobotState, STATE_SIZE_V5, Version};
 use sdg_robot::{FrankaArm, RobotAddress, Scheduling};
 
-/// The relay's output for a state of a moving arm: the datagrams that arrive instead. The number counts those states.
+/// Function from a state of a moving arm, and its index, to the datagrams that the relay sends instead.
 pub type ChangeState = Box<dyn FnMut(u64, &RobotState) -> Vec<Vec<u8>> + Send>;
-/// Whether a command of a moving arm is forwarded; the number counts them.
+/// Function that decides by its index whether a command of a moving arm is forwarded.
 pub type PassCommand = Box<dyn FnMut(u64) -> bool + Send>;
 
 /// The unchanged datagram of a state.
@@ -30,7 +30,8 @@ pub fn connect(server: &Server, change: ChangeState, pass: PassCommand) -> sdg_r
     FrankaArm::connect(&RobotAddress { host, port, hand_port }, Scheduling::Ordinary)
 }
 
-/// Serves one client; its threads end with the connections, those of the datagrams with the test's process.
+/// Serves one client. The threads of its connections end with the connections, those of the datagrams with the test's
+/// process.
 fn relay(listener: &TcpListener, robot: SocketAddr, change: ChangeState, pass: PassCommand) {
     let (mut client, _) = listener.accept().unwrap();
     let mut server = TcpStream::connect(robot).unwrap();
@@ -87,7 +88,7 @@ fn pass_states(
         };
         let client = SocketAddr::from((Ipv4Addr::LOCALHOST, *client_port.lock().unwrap()));
         for datagram in datagrams {
-            // A disconnected client gets nothing.
+            // An error means that the client is disconnected.
             let _ = sends.send_to(&datagram, client);
         }
     }

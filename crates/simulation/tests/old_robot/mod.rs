@@ -1,4 +1,4 @@
-//! A robot that speaks version 4 of the protocol, as old Pandas do: it answers one client's greeting.
+//! A robot with version 4 of the protocol, like old Pandas, which answers the Connect of one client.
 
 use std::io::Write;
 use std::net::{SocketAddr, TcpListener};
@@ -7,7 +7,7 @@ use std::thread::{self, JoinHandle};
 use sdg_fci::read_message;
 use sdg_fci::wire::{Header, HeaderKind};
 
-/// Its address, and the thread that ends with its answer.
+/// Starts the robot; returns its address, and the thread that ends after the answer.
 pub fn serve() -> (SocketAddr, JoinHandle<()>) {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap();

@@ -18,15 +18,15 @@ use sdg_simulation::{
     AttemptErrors, PandaPlant, RenderConfig, SharedPositions, Workcell, WorkcellConfig, marked_grasp, part_shape,
 };
 
-/// Torque friction of each joint's gears.
+/// Friction torque of each joint's gears.
 pub const FRICTION_NM: f64 = 1.0;
 
-/// The location of the arm.
+/// The place where the arm runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Where {
     /// In this process.
     Process,
-    /// Behind the protocol's server, in lockstep.
+    /// On the network, behind the protocol's server in lockstep.
     Lockstep,
 }
 
@@ -35,7 +35,7 @@ pub fn tray() -> Place {
     tray_of([0.10, 0.055])
 }
 
-/// The same with another pitch, m.
+/// A tray with another pitch, m.
 pub fn tray_of(pitch_m: [f64; 2]) -> Place {
     Place {
         name: "tray".to_owned(),
@@ -65,7 +65,7 @@ pub fn cell(spec: &ObjectSpec, seed: u64, lying: &[Isometry3<f64>]) -> Workcell 
     cell
 }
 
-/// Perception that knows the truth, except the table's height.
+/// Perception that knows the true poses, but not the table's height.
 struct Told<F> {
     finder: F,
     lower_m: f64,
@@ -112,7 +112,7 @@ pub fn place(cell: Workcell, at: Where, goal: &PlaceGoal, config: &GraspConfig, 
     let limits = Workcell::safety_limits();
     let lying: Vec<Isometry3<f64>> =
         cell.config().scene.instances.iter().map(|instance| instance.base_from_object).collect();
-    // The parts in the scene are known, too.
+    // The parts in the scene are also known.
     let known = |instance: &PlacedObject| LyingPart {
         base_from_part: marked_grasp(&instance.spec, &instance.base_from_object).base_from_tcp,
         shape: part_shape(&instance.spec).unwrap(),
@@ -130,8 +130,8 @@ pub fn place(cell: Workcell, at: Where, goal: &PlaceGoal, config: &GraspConfig, 
     }
 }
 
-/// Grasps the part of a cell from a table whose given height is too low; compliantly or in joint positions. Also
-/// returns the largest vertical force on the hand until it closed, N, if it is known.
+/// Grasps the part of a cell on a table whose given height is too low, compliantly or in joint positions. Returns also
+/// whether the part is lifted, and the largest vertical force on the hand until it closed, N.
 pub fn grasp_on_other_table(
     cell: Workcell,
     at: Where,
@@ -163,7 +163,7 @@ struct With<'a, A: CompliantArm> {
     peak_n: fn(&mut A) -> f64,
 }
 
-/// The largest force until the hand has closed.
+/// Measures the largest force until the hand has closed.
 struct Peak<A>(fn(&mut A) -> f64, Option<f64>);
 
 impl<A: Arm> sdg_robot::StepObserver<A> for Peak<A> {
@@ -198,7 +198,7 @@ impl<A: CompliantArm> Sequence for With<'_, A> {
     }
 }
 
-/// Runs a function with a cell's arm, here or over the network; returns the final state of the cell.
+/// Runs a function with a cell's arm, in this process or over the network; returns also the final state of the cell.
 fn run<T>(
     mut cell: Workcell,
     at: Where,

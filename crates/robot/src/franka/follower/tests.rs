@@ -1,5 +1,5 @@
-//! A robot that loses commands, as a Panda does: constant acceleration without them, and it ends the motion beyond a
-//! limit.
+//! A robot that loses commands. Like a Panda, it continues at constant acceleration without them, and ends the motion
+//! beyond a limit.
 
 use super::*;
 use crate::safety::{CheckedMotion, SafetyLimits};
@@ -7,14 +7,14 @@ use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use sdg_kinematics::{JointLimits, NUM_JOINTS, Trajectory, ready_pose};
 
-/// The pace of rehearsals, the fastest available.
+/// A motion at the pace of rehearsals, the fastest one.
 fn motion() -> CheckedMotion {
     let end = ready_pose() + JointVector::from([0.8, 0.2, -0.3, 0.3, 0.4, -0.2, 0.9]);
     let limits = JointLimits::panda().scaled(0.6, 0.4, 0.2).unwrap();
     SafetyLimits::default().check(Trajectory::point_to_point(&ready_pose(), &end, &limits).unwrap()).unwrap()
 }
 
-/// The robot's reference, and its largest derivatives as shares of the limits.
+/// The robot's reference, and its largest derivatives as fractions of the limits.
 struct SimulatedRobot {
     state: RobotState,
     max_shares: [f64; 3],
@@ -26,7 +26,7 @@ impl SimulatedRobot {
         Self { state, max_shares: [0.0; 3] }
     }
 
-    /// A cycle with a command that arrived in time, or without one.
+    /// Runs one cycle, with a command that arrived in time or without one.
     fn cycle(&mut self, command: Option<&JointVector>) {
         let state = &mut self.state;
         for idx in 0..NUM_JOINTS {
@@ -51,7 +51,7 @@ impl SimulatedRobot {
     }
 }
 
-/// Plays a motion; `is_lost` selects the commands that do not arrive, `is_unseen` the states.
+/// Plays a motion; `is_lost` selects the commands that do not arrive, `is_unseen` the states that do not arrive.
 fn play(
     follower: &mut Follower<'_>,
     robot: &mut SimulatedRobot,
@@ -96,7 +96,7 @@ fn without_losses_the_commands_are_the_trajectory_itself() {
     }
     assert_eq!(follower.num_corrections(), 0);
     assert_ends_at(&robot, &motion);
-    // It finishes a few cycles after its end, when the robot's reference is at rest.
+    // The motion finishes a few cycles after its end, when the robot's reference is at rest.
     let num_cycles = (motion.duration_secs() / PERIOD_SECS).ceil() as u64;
     assert!((num_cycles..num_cycles + 5).contains(&robot.state.message_id), "{}", robot.state.message_id);
 }
@@ -111,7 +111,7 @@ fn nineteen_lost_commands_anywhere_are_made_up_for_within_every_limit() {
                 let mut follower = Follower::new(Playback::new(&motion), Version::V5);
                 let mut robot = SimulatedRobot::at(*motion.start());
                 let is_in = |id: u64| (begin..begin + num_lost).contains(&id);
-                // Either the commands are lost, or the states that they would answer.
+                // Either the commands are lost, or the states before them.
                 play(&mut follower, &mut robot, |id| !by_state && is_in(id), |id| by_state && is_in(id));
                 assert!(robot.is_within_limits(), "{num_lost} lost from {begin} on: {:?}", robot.max_shares);
                 assert_ends_at(&robot, &motion);
@@ -147,7 +147,7 @@ fn a_line_that_loses_a_third_of_the_commands_keeps_to_the_limits() {
 
 #[test]
 fn a_start_beside_the_trajectorys_is_led_onto_it() {
-    // The largest distance of a motion's start from the controller's reference.
+    // The largest allowed distance of a motion's start from the controller's reference.
     let motion = motion();
     let mut follower = Follower::new(Playback::new(&motion), Version::V5);
     let mut robot = SimulatedRobot::at(motion.start() + JointVector::from_element(1e-3));

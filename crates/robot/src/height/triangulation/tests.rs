@@ -6,7 +6,8 @@ use proptest::prelude::*;
 use super::*;
 use crate::grasp_target::GraspTarget;
 
-/// A camera at `[x, z]` over y = 0 shows a part that lies at (x, 0.02) and `height_m` in a plane, exactly.
+/// The exact sighting, in a plane at `plane_m`, of a part at (`part_x_m`, 0.02, `height_m`) by a camera at
+/// (`camera_x_m`, 0, `camera_z_m`).
 fn shown([camera_x_m, camera_z_m]: [f64; 2], part_x_m: f64, height_m: f64, plane_m: f64) -> Sighting {
     let share = (camera_z_m - plane_m) / (camera_z_m - height_m);
     let middle_m = Point3::new(camera_x_m + (part_x_m - camera_x_m) * share, 0.02 * share, plane_m);
@@ -40,11 +41,11 @@ fn lines_of_sight_cross_where_the_part_is() {
 
 #[test]
 fn sigma_is_that_of_the_places_over_the_baseline() {
-    // 0.2 mm in both pictures, seen from 0.3 m and 0.12 m apart: √2 · 0.2 · 0.3 / 0.12 mm.
+    // 0.2 mm in each of two pictures from 0.3 m, 0.12 m apart: √2 · 0.2 · 0.3 / 0.12 mm.
     let [one, other] = pair(0.0, 0.0);
     let found = triangulate(&one, &other, 0.0).unwrap();
     assert!((found.sigma_m - 0.707_107e-3).abs() < 1e-8, "{found:?}");
-    // Edges that may be 1 mm deeper or higher than the marks add their share.
+    // A relief of 1 mm adds its variance.
     let found = triangulate(&one, &other, 0.001).unwrap();
     assert!((found.sigma_m - 0.707_107e-3_f64.hypot(1e-3)).abs() < 1e-8, "{found:?}");
     // A longer baseline is more exact.
@@ -56,22 +57,23 @@ fn sigma_is_that_of_the_places_over_the_baseline() {
 fn pictures_that_tell_no_height_are_refused() {
     let at = |x_m: f64, z_m: f64| shown([x_m, z_m], 0.5, 0.0, 0.0);
     let refused = |one: &Sighting, other: &Sighting| triangulate(one, other, 0.0).unwrap_err().to_string();
-    // Twice from one place, and from two places that are too close.
+    // Two pictures from one place, and from two places that are too close together.
     let why = refused(&at(0.5, 0.3), &at(0.5, 0.3));
     assert_eq!(why, "expected two pictures from places at least 80 mm apart sideways, found 0.0 mm");
     assert!(refused(&at(0.5, 0.3), &at(0.579, 0.3)).ends_with("found 79.0 mm"));
     assert!(triangulate(&at(0.46, 0.3), &at(0.541, 0.3), 0.0).is_ok());
     // A vertical distance of one metre is not a sideways distance.
     assert!(refused(&at(0.5, 0.3), &at(0.5, 0.9)).contains("at least 80 mm apart"));
-    // From afar lines of sight are parallel.
+    // Seen from far away, lines of sight are nearly parallel.
     assert!(refused(&at(0.45, 1.2), &at(0.55, 1.2)).starts_with("expected lines of sight whose slopes differ"));
-    // They cross at a height of one metre, above the cameras: the camera moved less than the part appears to.
+    // Lines of sight that cross one metre above the table, above the cameras: the part appears to move farther than the
+    // camera.
     let (mut one, mut other) = (at(0.44, 0.3), at(0.56, 0.3));
     (one.middle_m.x, other.middle_m.x) = (0.40, 0.60);
     assert!(refused(&one, &other).contains("found lines of sight that cross at"));
-    // And a plane above the camera.
+    // A plane too close below the camera.
     assert!(refused(&shown([0.44, 0.3], 0.5, 0.0, 0.29), &at(0.56, 0.3)).contains("below the camera"));
-    // Two parts: the distance of the lines is 12 mm.
+    // Two parts: the lines of sight pass each other 12 mm apart.
     let mut beside = at(0.56, 0.3);
     beside.middle_m.y += 0.012;
     assert!(refused(&at(0.44, 0.3), &beside).contains("within 4.0 mm, found 11.9 mm: two parts"));

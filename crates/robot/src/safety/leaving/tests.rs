@@ -44,7 +44,7 @@ fn the_hand_goes_straight_up_from_where_it_felt_something() {
     for lowest_m in [LOWEST_ALLOWED_M - 0.001, LOWEST_ALLOWED_M - 0.009] {
         let felt = felt(lowest_m);
         check(Some(&felt), [x, y, lowest_m], [x, y, 0.10]).unwrap();
-        // Once it is as high as allowed it may move anywhere.
+        // Once the hand is as high as allowed, it may move anywhere.
         check(Some(&felt), [x, y, LOWEST_ALLOWED_M + 0.001], [x + 0.1, y, 0.10]).unwrap();
         let error = check(None, [x, y, lowest_m], [x, y, 0.10]).unwrap_err();
         assert!(matches!(error, Violation::Table { .. } | Violation::Workspace { .. }), "{error}");
@@ -64,7 +64,7 @@ fn neither_sideways_nor_down_nor_from_elsewhere_nor_deeper_than_was_felt() {
         let error = check(Some(&felt), from, [from[0], from[1], 0.10]).unwrap_err();
         assert!(matches!(error, Violation::Table { .. } | Violation::Workspace { .. }), "{from:?}: {error}");
     }
-    // More than was allowed for the descent.
+    // A contact deeper than was allowed for the descent.
     let deep = FeltBelow::new(&Vector3::new(x, y, 0.03), LOWEST_ALLOWED_M - 0.020, 0.010);
     assert!(check(Some(&deep), [x, y, LOWEST_ALLOWED_M - 0.015], [x, y, 0.10]).is_err());
 }
@@ -76,7 +76,7 @@ fn a_motion_down_to_where_something_was_felt_is_refused() {
     let panda = ArmGeometry::panda();
     let up = panda.inverse(&tcp(x, y, 0.05), &start, &IkOptions::default()).unwrap().q;
     let slow = JointLimits::panda().scaled(0.1, 0.1, 0.1).unwrap();
-    // A motion down from above: its start is not below the limits, so that nothing is lowered for it.
+    // A motion down from above starts within the limits, so that nothing is lowered for it.
     let down = Trajectory::point_to_point(&up, &end, &slow).unwrap();
     let error = limits().starting_at(&up, Some(&felt(lowest_m))).check(down).unwrap_err();
     assert!(matches!(error, Violation::Table { .. } | Violation::Workspace { .. }), "{error}");

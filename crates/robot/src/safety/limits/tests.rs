@@ -24,7 +24,7 @@ fn a_motion_within_every_limit_is_handed_on_as_it_is() {
     assert_eq!(checked.sample(0.3), trajectory.sample(0.3));
 }
 
-/// Planned for exactly the limits that it satisfies; with any of them one percent lower it violates them.
+/// A motion planned for exact limits satisfies them, and violates each limit that is lowered by one percent.
 #[test]
 fn just_inside_passes_and_just_outside_is_refused() {
     let trajectory = point_to_point([0.4, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], [0.3, 0.2, 0.05]);
@@ -53,7 +53,7 @@ fn the_tcp_has_limits_of_its_own() {
     let trajectory = straight_down(0.20);
     let planned = CartesianLimits::panda().scaled(0.2, 0.1, 0.05).unwrap();
     let limits = |cartesian| SafetyLimits { cartesian, ..SafetyLimits::default() };
-    // The path is a straight line only between waypoints: at differences of 1 ms its third derivative jumps.
+    // The path is straight only between waypoints: sampled at 1 ms, its third derivative jumps at them.
     let mut roomy = planned;
     roomy.jerk_m_s3 = 6500.0;
     limits(roomy).check(trajectory.clone()).unwrap();
@@ -124,25 +124,25 @@ fn an_fr3_may_not_do_all_that_a_panda_may() {
         let end = ready_pose() + JointVector::from(change);
         Trajectory::point_to_point(&ready_pose(), &end, &JointLimits::panda().scaled(scale, scale, 0.1).unwrap())
     };
-    // Joint 6 from 1.571 to 0.5 rad: an FR3's range ends at 0.541, and it must be slow before; a Panda's ends at
-    // -0.018.
+    // Joint 6 from 1.571 to 0.5 rad: the range of an FR3 ends at 0.541, before which its velocity limit decreases; that
+    // of a Panda ends at -0.018.
     let bent = to([0.0, 0.0, 0.0, 0.0, 0.0, -1.07, 0.0], 0.2).unwrap();
     SafetyLimits::default().check(bent.clone()).unwrap();
     let refused = SafetyLimits::fr3().check(bent).unwrap_err();
     assert!(matches!(refused, Violation::Joint { joint: 6, .. }), "{refused}");
-    // 18 rad/s² in joint 7, where a Panda may have 20 and an FR3 10.
+    // 18 rad/s² in joint 7, where the limit is 20 for a Panda and 10 for an FR3.
     let hard = to([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.5], 0.9).unwrap();
     SafetyLimits::default().check(hard.clone()).unwrap();
     let refused = SafetyLimits::fr3().check(hard).unwrap_err();
     assert!(matches!(refused, Violation::Joint { quantity: "acceleration", joint: 7, .. }), "{refused}");
-    // At the very end of joint 1's range, slowly and fast.
+    // To the end of joint 1's range, slowly and fast.
     let near_the_end = |scale| to([2.74, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], scale).unwrap();
     SafetyLimits::fr3().check(near_the_end(0.1)).unwrap();
     let refused = SafetyLimits::fr3().check(near_the_end(0.6)).unwrap_err();
     assert!(matches!(refused, Violation::Joint { quantity: "velocity", joint: 1, max, .. } if max < 2.0), "{refused}");
 }
 
-/// The geometry of an arm has the limits that its robot applies to its client.
+/// The limits of an arm's geometry are those that the robot applies to its client.
 #[test]
 fn geometry_and_protocol_have_the_same_limits() {
     for (limits, velocity_m_s) in [(SafetyLimits::default(), 2.0), (SafetyLimits::fr3(), 3.0)] {

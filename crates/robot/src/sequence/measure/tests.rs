@@ -14,11 +14,11 @@ use crate::safety::SafetyLimits;
 use crate::sequence::{GraspConfig, GraspOutcome, GraspReport, grasp};
 use crate::watch::Watch;
 
-/// A part whose looks give another height than its own: by its lines of sight it lies at `known`.
+/// A part whose detections assume a wrong height; by its lines of sight it lies at `known`.
 struct Shown {
     known: KnownTarget,
     seen: GraspTarget,
-    /// The pictures for the height that show it; the last entry applies to all further ones.
+    /// Whether each picture for the height shows the part; the last entry applies to all further ones.
     shows: Vec<bool>,
     num_sights: usize,
     sees_surface: bool,
@@ -45,7 +45,7 @@ impl PartFinder<PlannedArm> for Shown {
     }
 }
 
-/// Marks 16 mm and grasp 9 mm over the surface under the part.
+/// Heights of marks and grasp above the surface under the part, m.
 const HEIGHTS_M: [f64; 2] = [0.016, 0.009];
 
 fn tcp_from_camera() -> Isometry3<f64> {
@@ -61,15 +61,15 @@ fn config(told: Option<GivenHeight>) -> GraspConfig {
     GraspConfig { height: Some(height), ..GraspConfig::default() }
 }
 
-/// A part on an object `higher_m` over the table.
+/// A part on an object `higher_m` above the table.
 fn part(higher_m: f64) -> GraspTarget {
     let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
     let base_from_tcp = Isometry3::from_parts(Vector3::new(0.5, 0.05, higher_m + HEIGHTS_M[1]).into(), down);
     GraspTarget { base_from_tcp, jaw_width_m: 0.02, score: 0.9 }
 }
 
-/// Grasps a part that lies 20 mm higher than the table and is seen 5 mm higher than that; returns the camera's
-/// positions for the height.
+/// Grasps a part that lies 20 mm higher than the table and is detected 5 mm too high; returns also the camera's
+/// positions for the height, and their number.
 fn grasped(config: &GraspConfig, shows: &[bool], sees_surface: bool) -> (GraspReport, Vec<Vector3<f64>>, usize) {
     let mut arm = PlannedArm::new(ArmGeometry::panda(), ready_pose(), 0.08);
     let mut robot = Robot::new(&mut arm, SafetyLimits::default(), Watch::default());
@@ -83,7 +83,7 @@ fn grasped(config: &GraspConfig, shows: &[bool], sees_surface: bool) -> (GraspRe
         }
         _ => None,
     });
-    // The look-out and the look from above come first.
+    // The pictures from the look-out pose and from above come first.
     let places: Vec<Vector3<f64>> = places.skip(2).take(num_sights).collect();
     (report, places, num_sights)
 }
@@ -106,7 +106,7 @@ fn where_nothing_is_seen_of_the_surface_the_other_direction_is_tried() {
     let (report, places, num_sights) = grasped(&config(None), &[], false);
     assert_eq!((&report.outcome, num_sights, places.len()), (&GraspOutcome::Held, 4, 4));
     let measured = report.height.unwrap().measured.unwrap();
-    // From the part itself, whose relief is not known.
+    // The height is that of the part itself, with the uncertainty of its relief.
     assert!((measured.height_m - 0.036).abs() < 1e-6 && measured.sigma_m > 2e-3, "{measured:?}");
 }
 
@@ -119,7 +119,7 @@ fn a_picture_that_does_not_show_the_part_is_the_reason() {
     let (report, ..) = grasped(&config(None), &[false], true);
     let GraspOutcome::Failed { why, .. } = report.outcome else { panic!("{report:?}") };
     assert!(why.ends_with("the first picture does not show the part"), "{why}");
-    // A third picture, closer to the part, is as good as the second; so is one along the marked line.
+    // A third picture, closer to the part, can replace the second; so can one along the marked line.
     for shows in [&[true, false, true][..], &[false, true, true], &[true, false, false, true]] {
         let (report, places, num_sights) = grasped(&config(None), shows, true);
         assert_eq!((report.outcome, num_sights), (GraspOutcome::Held, shows.len()));

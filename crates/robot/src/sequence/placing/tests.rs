@@ -10,8 +10,8 @@ use crate::watch::Watch;
 use sdg_kinematics::collision::{Obstacle, Shape};
 use sdg_kinematics::{ArmGeometry, ready_pose};
 
-/// A planned arm whose part slides by this distance in its own frame when the hand closes on it, and stays where it is
-/// released.
+/// A planned arm with a part that slides by `slide`, in the part's frame, when the hand closes on it, and stays where
+/// it is released.
 struct Cell {
     arm: PlannedArm,
     base_from_part: Isometry3<f64>,
@@ -143,7 +143,7 @@ fn a_part_lies_where_it_was_to_lie() {
         let error = beside(&goal.base_from_part(0.02, 0.0), &cell.base_from_part, RotationalSymmetry::None);
         assert!(error.distance_m() < 1e-4 && error.angle_rad.abs() < 1e-4, "{error:?}");
         assert!((cell.base_from_part.translation.z - 0.02).abs() < 1e-4, "{}", cell.base_from_part);
-        // The load is reported while the part is held, and reset.
+        // The load is set while the part is held, and reset afterwards.
         assert_eq!(cell.loads_kg, [0.3, 0.0]);
     }
 }
@@ -157,7 +157,7 @@ fn a_part_that_slides_in_the_hand_is_taken_again_and_lies_right() {
     assert_eq!(report.outcome, PlacingOutcome::Placed, "{report:?}");
     assert_eq!(report.errors.len(), 2);
     assert!(report.errors[0].distance_m() > 0.004 && report.errors[1].distance_m() < 2e-4, "{report:?}");
-    // Without another grasp it lies beside its place, which is reported.
+    // Without a second grasp the part lies beside its place, which is reported.
     let mut once = super::tests::cell(slide);
     let never = PlacingConfig { max_corrections: 0, ..PlacingConfig::default() };
     let PlacingOutcome::Failed { step: GraspStep::Check, why } = run(&mut once, &config(), &goal, &never).outcome
@@ -185,7 +185,7 @@ fn where_nothing_is_felt_the_part_stays_in_the_hand() {
     cell.touches = false;
     let report = run(&mut cell, &config(), &tray().goal(1).unwrap(), &PlacingConfig::default());
     let PlacingOutcome::Failed { step: GraspStep::PutDown, why } = &report.outcome else { panic!("{report:?}") };
-    assert!(why.contains("nothing was felt") && why.contains("still held"), "{why}");
+    assert!(why.contains("no contact was measured") && why.contains("still held"), "{why}");
     assert_eq!(cell.loads_kg, [0.3]);
     assert!(matches!(cell.arm.actions().last(), Some(PlannedAction::Down { .. })), "{:?}", cell.arm.actions().last());
 }
@@ -233,7 +233,7 @@ fn the_whole_sequence_goes_around_what_stands_in_the_cell() {
             assert!(checker.is_free(&q), "{}", model.nearest(&q));
         }
     }
-    // A place inside an obstacle is refused with its name.
+    // A place inside an obstacle fails with the obstacle's name.
     let inside = Place { at_m: [0.5, -0.1], ..tray() };
     let report =
         run(&mut super::tests::cell(Isometry3::identity()), &surrounded, &inside.goal(1).unwrap(), &Default::default());
@@ -266,7 +266,7 @@ fn a_tray_without_room_is_refused_before_anything_moves() {
     let error = ended.unwrap_err();
     assert!(!error.latches() && error.to_string().contains("expected a pitch of 80 x 47 mm"), "{error}");
     assert!(cell.arm.actions().is_empty());
-    // Without its outline: after it was found, and before it is taken.
+    // Without the part's outline: after the part was found, and before it is grasped.
     let report = run(&mut cell, &config(), &narrow, &placing);
     let PlacingOutcome::Failed { step: GraspStep::Detect, why } = &report.outcome else { panic!("{report:?}") };
     assert!(why.contains("the part is 20 mm wide between the fingers"), "{why}");

@@ -1,26 +1,27 @@
-//! A polygon extruded to a height: its spans, and its triangles as OBJ.
+//! A polygon extruded to a height: its strips, and its triangles as OBJ.
 
 use std::fmt::Write as _;
 
 use nalgebra::{Point2, Point3, Vector2};
 
-/// A stretch of the part along x and one of its spans along y, in the object frame, in metres.
+/// A piece of the part between two values of x, with one interval along y at each of them; in metres in the object
+/// frame.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Strip {
     pub(super) x: [f64; 2],
-    /// Low and high end at both x.
+    /// Low end of the interval along y, at both x.
     pub(super) low: [f64; 2],
     pub(super) high: [f64; 2],
 }
 
-/// The spans of a polygon between neighbouring `cuts`, which are sorted values of x.
+/// The strips of a polygon between neighbouring `cuts`, which are sorted values of x.
 pub(super) fn strips(corners: &[Point2<f64>], cuts: &[f64]) -> Vec<Strip> {
     let edges: Vec<_> = (0..corners.len()).map(|i| (corners[i], corners[(i + 1) % corners.len()])).collect();
-    // The ends of all spans at x, from the lowest, by the edges that cross there.
+    // The ends of all intervals along y, in ascending order, from the edges that cross x.
     let crossing = |x: f64, at: [f64; 2]| {
         let over = |(a, b): &&(Point2<f64>, Point2<f64>)| (a.x < x) != (b.x < x);
         let y = |a: &Point2<f64>, b: &Point2<f64>, at: f64| {
-            // Beyond the edge's own ends it continues level, because strips may be wider than an edge.
+            // Beyond its ends an edge continues at constant y, because strips may be wider than the edge.
             a.y + (b.y - a.y) * ((at - a.x) / (b.x - a.x)).clamp(0.0, 1.0)
         };
         let mut ends: Vec<_> = edges.iter().filter(over).map(|(a, b)| (y(a, b, x), at.map(|at| y(a, b, at)))).collect();
@@ -37,9 +38,9 @@ pub(super) fn strips(corners: &[Point2<f64>], cuts: &[f64]) -> Vec<Strip> {
     found
 }
 
-/// The visible body, as OBJ: two triangles above and below each slab between neighbouring corners, two for each wall,
-/// up to `top`, in metres. `texcoord` gives the texture position of a point, from the lower left corner; walls show the
-/// texture `inset_m` inside the outline.
+/// The visible body up to the height `top` in metres, as OBJ: two triangles each for the top and the bottom of every
+/// strip between neighbouring corners, and two for every wall. `texcoord` returns the texture position of a point, from
+/// the lower left corner; walls show the texture `inset_m` inside the outline.
 pub(super) fn mesh(
     corners: &[Point2<f64>],
     top: f64,
@@ -56,7 +57,7 @@ pub(super) fn mesh(
         let [a, b, c, d] = quad;
         obj.quad([a, d, c, b].map(|p| (Point3::new(p.x, p.y, 0.0), texcoord(p))), [0.0, 0.0, -1.0]);
     }
-    // Counter-clockwise from above, so that walls face outwards.
+    // Walls face outwards if the corners are counter-clockwise from above.
     let doubled_area: f64 =
         (0..corners.len()).map(|i| corners[i].coords.perp(&corners[(i + 1) % corners.len()].coords)).sum();
     for i in 0..corners.len() {
@@ -82,7 +83,7 @@ struct Obj {
 }
 
 impl Obj {
-    /// Two triangles; corners counter-clockwise seen from outside, each with its texture position.
+    /// Writes two triangles. The corners, each with its texture position, are counter-clockwise seen from outside.
     fn quad(&mut self, corners: [(Point3<f64>, [f64; 2]); 4], normal: [f64; 3]) {
         for (p, [u, v]) in corners {
             let _ = write!(self.text, "v {:.6} {:.6} {:.6}\nvt {u:.6} {v:.6}\n", p.x, p.y, p.z);
@@ -104,7 +105,7 @@ mod tests {
 
     #[test]
     fn a_concave_part_is_cut_into_spans() {
-        // A U: at x = 1.5 there are two spans.
+        // A U-shaped outline: at x = 1.5 there are two intervals.
         let u = [(0.0, 0.0), (3.0, 0.0), (3.0, 3.0), (2.0, 3.0), (2.0, 1.0), (1.0, 1.0), (1.0, 3.0), (0.0, 3.0)]
             .map(|(y, x)| Point2::new(x, y));
         let found = strips(&u, &[0.0, 1.0, 3.0]);

@@ -1,11 +1,11 @@
 //! A user's own part: its outline in a photo, extruded to its height, with the photo on top.
 //!
 //! ```text
-//! outline ─┬─ slabs between neighbouring corners ─ triangles, textured by the photo ── appearance
+//! outline ─┬─ strips between neighbouring corners ─ triangles, textured by the photo ── appearance
 //!          └─ strips across the marked line ─ boxes ── contacts and mass
 //! ```
-//! Boxes instead of a convex hull, so that the jaws can also close on a waist between two wide ends. Properties that
-//! the photo does not show are assumed: walls are vertical, and the density is uniform.
+//! Boxes are used instead of a convex hull, so that the jaws can also close on a waist between two wide ends.
+//! Properties that the photo does not show are assumed: walls are vertical, and the density is uniform.
 
 mod mesh;
 
@@ -23,22 +23,22 @@ use crate::error::{Result, SimulationError};
 use crate::model::Asset;
 use crate::panda::FINGERTIP_BEYOND_TCP_M;
 
-/// The lowest tool centre point: the finger tips then keep 2 mm from the table. Equal to the lowest of the shipped
-/// parts.
+/// Smallest height of the tool centre point: the finger tips are then 2 mm above the table. It is also the smallest
+/// height among the shipped parts.
 const MIN_GRASP_HEIGHT_M: f64 = FINGERTIP_BEYOND_TCP_M + 0.002;
-/// Largest height of a part above the tool centre point: more would touch the palm.
+/// Largest height of a part above the tool centre point; a higher part would touch the palm.
 const MAX_ABOVE_TCP_M: f64 = 0.03;
-/// Number of boxes along the part's length. Chosen by hand: the jaws' pads, 2 cm wide, meet several of them.
+/// Number of boxes along the part's length. Chosen by hand, so that the jaws' pads, 2 cm wide, touch several boxes.
 const NUM_STRIPS: usize = 40;
-/// Minimum width of a box; narrower ones give no contact. Chosen by hand.
+/// Minimum width of a box, because narrower boxes give no contact. Chosen by hand.
 const MIN_BOX_M: f64 = 1e-4;
 /// Maximum size of the texture: the camera would not resolve a larger one.
 const MAX_TEXTURE_PX: u32 = 1024;
-/// Distance inside the outline from which the walls take the photo's colour, in pixels: on the line itself half of the
-/// colour is the table's.
+/// Distance inside the outline from which the walls take the photo's colour, in pixels: on the outline itself half of
+/// the colour is that of the table.
 const WALL_INSET_PX: f64 = 2.0;
 
-/// The data of an extruded part; positions in pixels of `photo`, which looks vertically down.
+/// The data of an extruded part; positions in pixels of `photo`, which is taken vertically from above.
 #[derive(Debug, Clone)]
 pub struct Extrusion<'a> {
     /// Name at the command line.
@@ -53,9 +53,9 @@ pub struct Extrusion<'a> {
     pub jaw_width_px: f64,
     /// Size of a pixel, in metres.
     pub metres_per_pixel: f64,
-    /// Height over the table, in metres: from 0.003 to 0.12.
+    /// Height above the table, in metres: from 0.003 to 0.12.
     pub height_m: f64,
-    /// In kilograms.
+    /// Mass in kilograms.
     pub mass_kg: f64,
     /// Coefficient of sliding friction.
     pub friction: f64,
@@ -69,8 +69,8 @@ impl Extrusion<'_> {
         self.outline.area() * self.metres_per_pixel.powi(2) * self.height_m
     }
 
-    /// Checks whether a simulated hand and table can handle it; the error names the value, the expected and the found
-    /// value.
+    /// Checks that a simulated hand and table can handle the part; the error states the name of the value, the expected
+    /// range and the found value.
     fn check(&self) -> std::result::Result<(), String> {
         let ranges = [
             ("height in m", self.height_m, 0.003, 0.12),
@@ -93,12 +93,12 @@ impl Extrusion<'_> {
         bounds.width().max(bounds.height()) * self.metres_per_pixel
     }
 
-    /// From pixels to the object frame: x along the marked line, y to the left of it seen from above, origin in the
-    /// area's centre.
+    /// Conversion from pixels to the object frame: x along the marked line, y to its left seen from above, origin at
+    /// the centroid of the outline.
     fn to_object(&self) -> impl Fn(&Point2<f64>) -> Point2<f64> {
         let center = self.outline.centroid();
         let along = (self.grasp.end - self.grasp.start).normalize();
-        // Pixels count y downwards.
+        // y of pixels points downwards.
         let left = Vector2::new(along.y, -along.x);
         let scale = self.metres_per_pixel;
         move |p| Point2::new(scale * along.dot(&(p - center)), scale * left.dot(&(p - center)))
@@ -121,7 +121,7 @@ impl Extrusion<'_> {
 }
 
 impl ObjectSpec {
-    /// The body over an outline, with the photo on it; see [`Extrusion`] for its data.
+    /// A part extruded from its outline, with the photo on top.
     ///
     /// # Errors
     /// [`SimulationError::Asset`] for values that the hand or table cannot handle.
@@ -178,7 +178,7 @@ fn mjcf(extrusion: &Extrusion<'_>, corners: &[Point2<f64>]) -> String {
     let ends = corners.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], c| [low.min(c.x), high.max(c.x)]);
     let cuts: Vec<f64> =
         (0..=NUM_STRIPS).map(|k| ends[0] + (ends[1] - ends[0]) * k as f64 / NUM_STRIPS as f64).collect();
-    // Centre and size of each box, in the table's plane.
+    // Centre and size of each box as seen from above.
     let boxes: Vec<(Vector2<f64>, Vector2<f64>)> = strips(corners, &cuts)
         .into_iter()
         .map(|Strip { x, low, high }| {
@@ -279,7 +279,7 @@ mod tests {
         let mut data = Data::new(model.clone()).unwrap();
         let mut renderer = Renderer::new(&model, RenderConfig::default()).unwrap();
         let view = CameraView::capture(&mut renderer, &mut data, model.id("above").unwrap()).unwrap();
-        // The object's x is the photo's x, and the camera's too; its centre is that of the outline's area.
+        // The object's x is the x of the photo and of the camera; the origin is the centroid of the outline.
         let center = outline.centroid();
         let shown = |x: f64, y: f64| {
             let at = Point3::new(0.001 * (x - center.x), 0.001 * (center.y - y), 0.01);

@@ -5,26 +5,26 @@ use std::str::FromStr;
 
 use crate::error::{Result, SimulationError};
 
-/// The property that is harder than in an ordinary picture.
+/// A property that makes a picture harder than an ordinary one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Axis {
     /// The camera is at 0.75 to 1.3 times its usual height.
     Height,
-    /// The camera is tilted by 5 to 20 degrees about a random axis in the table and looks at the part.
+    /// The camera is tilted by 5 to 20 degrees about a random horizontal axis and points at the part.
     Tilt,
-    /// Another object lies over 10 to 40 percent of the part's visible area.
+    /// Another object covers 10 to 40 percent of the part's visible area.
     Covered,
     /// Little light: a dark picture with photon and read noise.
     Dark,
-    /// Motion blur in the even pictures, defocus in the odd ones.
+    /// Motion blur in pictures with an even number, defocus in the others.
     Blur,
-    /// Light of another colour than the camera's white balance.
+    /// The colour of the light differs from the camera's white balance.
     Tint,
     /// Ten to fifteen distractors, pushed against the part and each other.
     Clutter,
     /// Three instances of the part.
     Instances,
-    /// A part that resembles the part but is another one.
+    /// A look-alike instead of the part.
     LookAlikes,
 }
 
@@ -67,7 +67,7 @@ impl fmt::Display for Axis {
 impl FromStr for Axis {
     type Err = SimulationError;
 
-    /// Reads a name as [`Axis::name`] gives it.
+    /// Reads a name in the form of [`Axis::name`].
     ///
     /// # Errors
     /// [`SimulationError::UnknownName`] with the names that exist.

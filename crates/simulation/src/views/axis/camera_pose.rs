@@ -1,4 +1,4 @@
-//! The camera higher, lower or tilted, with the part always completely in the picture.
+//! Pictures from a higher, lower or tilted camera, with the part always completely in the picture.
 
 use std::f64::consts::PI;
 
@@ -16,16 +16,18 @@ use crate::workcell::{Workcell, WorkcellConfig};
 /// Heights of the camera relative to the usual one.
 const HEIGHT_FACTORS: std::ops::Range<f64> = 0.75..1.3;
 
-/// Tilts of the camera in degrees; below this range it is an ordinary picture.
+/// Range of the camera's tilt in degrees; a smaller tilt is an ordinary picture.
 const TILTS_DEG: std::ops::Range<f64> = 5.0..20.0;
 
-/// Distance of a tilted camera's view from the part, in metres.
+/// Largest distance between the part and the point at which a tilted camera is aimed, in metres.
 const MAX_LOOK_OFFSET_M: f64 = 0.06;
 
-/// Directions of tilt that are tried until the arm reaches the camera's pose and the part is in the picture.
+/// Maximum number of directions of tilt that are tried until the arm reaches the camera's pose and the part is in the
+/// picture.
 const MAX_TRIES: usize = 40;
 
-/// The picture from another height, looking vertically down, as close to the usual place as shows the whole part.
+/// The picture of a camera at another height that points vertically down. It is at the usual place, or moved towards
+/// the part until the whole part is in the picture.
 pub(super) fn draw_from_another_height(request: &mut Request<'_>) -> Result<Drawn> {
     let scene = request.ordinary_scene();
     let mut cell = Workcell::new(&WorkcellConfig::new(scene.clone()))?;
@@ -34,7 +36,7 @@ pub(super) fn draw_from_another_height(request: &mut Request<'_>) -> Result<Draw
     let height_m = LOOK_HEIGHT_M * factor;
     let part = part_in(&cell)?;
     let above = part.base_from_object.translation.vector;
-    // From the usual place to vertically above the part.
+    // Places from the usual one to vertically above the part.
     let places = (0..=10).map(|step| {
         let share = f64::from(step) / 10.0;
         camera_looking_down(x + share * (above.x - x), y + share * (above.y - y), height_m, 0.0)
@@ -49,7 +51,7 @@ pub(super) fn draw_from_another_height(request: &mut Request<'_>) -> Result<Draw
     })
 }
 
-/// The picture of a tilted camera at the usual distance that looks at the part or slightly beside it.
+/// The picture of a tilted camera at the usual distance, aimed at the part or slightly beside it.
 pub(super) fn draw_tilted(request: &mut Request<'_>) -> Result<Drawn> {
     let scene = request.ordinary_scene();
     let mut cell = Workcell::new(&WorkcellConfig::new(scene.clone()))?;

@@ -15,20 +15,21 @@ use crate::workcell::{Workcell, WorkcellConfig};
 /// Number of distractors.
 const NUM_THINGS: std::ops::RangeInclusive<usize> = 10..=15;
 
-/// Number of them that touch the part, if there is room; the others touch these.
+/// Number of distractors that touch the part, if there is room; the others touch these distractors.
 const NUM_TOUCHING: usize = 7;
 
-/// Directions tried for a distractor to touch the part.
+/// Number of directions tried for a distractor to touch the part.
 const MAX_TRIES: usize = 8;
 
 /// Side of a cell of the views from above, in metres: two objects touch if their cells are neighbours.
 const CELL_M: f64 = 0.001;
 
-/// Start distance of a distractor from the part, in metres.
+/// Distance of a distractor from the part at its start, in metres.
 const START_M: f64 = 0.32;
 
-/// The monitored area of the table: its corner in metres and its cells.
+/// Corner of the monitored area of the table, in metres.
 const CORNER: Point2<f64> = Point2::new(-0.1, -0.7);
+/// Width and height of the monitored area, in cells.
 const WIDTH: usize = 1200;
 const HEIGHT: usize = 1400;
 
@@ -52,7 +53,7 @@ impl Ground {
         inside.then(|| cell.y as usize * WIDTH + cell.x as usize)
     }
 
-    /// The object under a distractor at a place: the part has priority over distractors, and these over nothing.
+    /// The object that a distractor at a place would overlap; if there are several, the part has priority.
     fn under(&self, points: &[Point2<f64>], table_from_thing: &Isometry2<f64>) -> Cell {
         let mut found = Cell::Free;
         for point in points {
@@ -66,7 +67,7 @@ impl Ground {
     }
 
     fn mark(&mut self, points: &[Point2<f64>], table_from_thing: &Isometry2<f64>, as_cell: Cell) {
-        // A turned raster leaves gaps between its points: each also marks its neighbours.
+        // A rotated raster has gaps between its points, so that each point also marks its neighbours.
         for point in points {
             for (dx, dy) in [(0.0, 0.0), (0.5, 0.0), (0.0, 0.5), (0.5, 0.5)] {
                 let at = table_from_thing * (point + Vector2::new(dx - 0.25, dy - 0.25) * CELL_M);
@@ -78,7 +79,7 @@ impl Ground {
     }
 }
 
-/// A scene with the part in the middle of many distractors.
+/// A scene with the part between many distractors.
 pub(super) fn draw_cluttered(request: &mut Request<'_>) -> Result<Drawn> {
     let config = VariationConfig { distractors: 0..=0, ..VariationConfig::default() };
     let mut scene = SceneVariation::sample(Some(request.spec), &config, request.scene_seed);
@@ -132,8 +133,8 @@ pub(super) fn draw_cluttered(request: &mut Request<'_>) -> Result<Drawn> {
     Ok(Drawn { cell, scene, view, parameter })
 }
 
-/// Pushes a distractor from a distance towards a place until it touches something; returns its position then, and the
-/// touched object.
+/// Pushes a distractor from a distance towards a place until it touches an object; returns its position and the touched
+/// object.
 fn pushed(
     ground: &Ground,
     points: &[Point2<f64>],

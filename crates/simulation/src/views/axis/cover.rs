@@ -1,4 +1,4 @@
-//! Another object laid over the part until the wanted share of the part's visible area is covered.
+//! Pictures with another object on the part that covers a given fraction of its visible area.
 
 use std::f64::consts::PI;
 
@@ -15,12 +15,12 @@ use crate::shapes::footprint;
 use crate::views::base_from_look_camera;
 use crate::workcell::{Workcell, WorkcellConfig};
 
-/// Covered share of the part's pixels.
+/// Range of the covered fraction of the part's pixels.
 const COVERED_SHARES: std::ops::Range<f64> = 0.10..0.40;
-/// Tolerance of the measured share: half of a stratum and the raster's own steps.
+/// Tolerance of the measured fraction: half of a stratum, plus the steps of the raster.
 const SHARE_TOLERANCE: f64 = 0.02;
 
-/// Distractors that can lie over another part: flat or long ones.
+/// Distractors that can lie on another part: flat or long ones.
 const KINDS: [DistractorKind; 10] = [
     DistractorKind::Plate,
     DistractorKind::Flange,
@@ -34,11 +34,11 @@ const KINDS: [DistractorKind; 10] = [
     DistractorKind::Bearing,
 ];
 
-/// Number of covers tried until one covers enough.
+/// Maximum number of covers that are tried until one covers enough.
 const MAX_COVERS: u32 = 60;
 /// First step from the estimated position, in metres.
 const FIRST_STEP_M: f64 = 0.003;
-/// Number of pictures used to find a cover's position.
+/// Maximum number of pictures for finding a cover's position.
 const MAX_MEASUREMENTS: usize = 8;
 /// Side of a cell of the views from above, in metres.
 const CELL_M: f64 = 0.001;
@@ -47,7 +47,7 @@ const AIR_M: f64 = 0.0003;
 /// Minimum distance of the distractors from the cover as seen from above, in metres.
 const CLEARANCE_M: f64 = 0.01;
 
-/// A cover on its path over the part.
+/// A cover that moves over the part.
 struct Slide {
     cover: Distractor,
     part: PlacedObject,
@@ -67,7 +67,7 @@ impl Slide {
         let cover = Distractor::scaled(kind, &Isometry2::identity(), rng.random(), scale);
         let triangles: Vec<([Point3<f64>; 3], u32)> = cover.triangles().map(|corners| (corners, 0)).collect();
         let (yaw_rad, from_rad): (f64, f64) = (rng.random_range(-PI..PI), rng.random_range(-PI..PI));
-        // Any place of the part may be covered, its ends as well as its middle.
+        // Any place of the part may be covered, at its ends or at its centre.
         let filled: Vec<Point2<f64>> = part_map.filled().map(|(at, ..)| at).collect();
         let end = part.table_from_object() * filled[rng.random_range(0..filled.len())];
         let heights = triangles.iter().flat_map(|(corners, _)| corners.map(|corner| corner.z));
@@ -89,7 +89,7 @@ impl Slide {
         Isometry2::new(self.end.coords + self.direction * distance_m, self.yaw_rad)
     }
 
-    /// Height of the part's top under the cover; `None` beside the part.
+    /// Height of the part's top under the cover; `None` if the cover is beside the part.
     fn top_m(&self, table_from_cover: &Isometry2<f64>) -> Option<f64> {
         let cover_from_part = table_from_cover.inverse() * self.part.table_from_object();
         self.part_map
@@ -99,7 +99,8 @@ impl Slide {
             .reduce(f64::max)
     }
 
-    /// Share of the part that the cover hides from the camera; the cover is approximated as flat at half of its height.
+    /// Fraction of the part that the cover hides from the camera, with the cover approximated as flat at half of its
+    /// height.
     fn estimated_share(&self, distance_m: f64) -> f64 {
         let table_from_cover = self.table_from_cover(distance_m);
         let bottom_m = self.top_m(&table_from_cover).unwrap_or(0.0) + AIR_M;
@@ -108,7 +109,7 @@ impl Slide {
         for (at, z, _) in self.part_map.filled() {
             total += 1;
             let at = (table_from_part * at).coords.push(z + self.part.spec.rest_height_m);
-            // The point where the ray from the part to the camera passes the cover's height.
+            // The point at which the ray from the part to the camera crosses the cover's height.
             let rise = (bottom_m + self.cover_middle_m - at.z).max(0.0) / (self.camera.z - at.z);
             let passed = at + (self.camera - at) * rise;
             covered += i32::from(self.cover_map.at(&(cover_from_table * Point2::from(passed.xy()))).is_some());
@@ -126,7 +127,7 @@ impl Slide {
         placed.base_from_distractor
     }
 
-    /// The distance at which the cover first hides the wanted share on its path; `None` if it never does.
+    /// The distance at which the cover first hides the wanted fraction on its path; `None` if it never does.
     fn distance_for(&self, wanted: f64) -> Option<f64> {
         let on_the_way = |step: f64, from: f64, num_steps: u32| {
             (0..=num_steps)
@@ -138,7 +139,7 @@ impl Slide {
     }
 }
 
-/// An ordinary scene with an object over the part.
+/// An ordinary scene with an object on the part.
 pub(super) fn draw_covered(request: &mut Request<'_>) -> Result<Drawn> {
     let wanted = request.between(COVERED_SHARES);
     let part_map = request.spec.height_map(CELL_M)?;
@@ -161,7 +162,7 @@ pub(super) fn draw_covered(request: &mut Request<'_>) -> Result<Drawn> {
         scene.distractors.push(cover);
         let index = scene.distractors.len() - 1;
         let mut cell = Workcell::new(&WorkcellConfig::new(scene.clone()))?;
-        // The arm's pose; the picture itself is drawn once the cover is in place.
+        // The arm moves first; the picture is rendered when the cover is in place.
         cell.reach_camera_pose(&base_from_look_camera())?;
         let Some((distance_m, share)) = lay_over(&mut cell, &slide, index, estimate, wanted)? else { continue };
         let mut cover = slide.cover.moved_to(&slide.table_from_cover(distance_m));
@@ -176,8 +177,8 @@ pub(super) fn draw_covered(request: &mut Request<'_>) -> Result<Drawn> {
     Err(none())
 }
 
-/// Moves the cover until it hides the wanted share in the camera's own picture; returns the position and the share, if
-/// found.
+/// Moves the cover until it hides the wanted fraction in the camera's picture; returns the position and the fraction,
+/// if found.
 fn lay_over(
     cell: &mut Workcell,
     slide: &Slide,
@@ -200,7 +201,7 @@ fn lay_over(
         }
         if share > wanted {
             near_m = distance_m;
-            // The first steps stay near the estimate, which is usually close.
+            // The first steps are small, because the estimate is usually close.
             distance_m = (distance_m + FIRST_STEP_M).min(0.5 * (distance_m + far_m));
         } else {
             far_m = distance_m;

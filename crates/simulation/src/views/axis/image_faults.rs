@@ -1,7 +1,7 @@
-//! Effects of light, lens and sensor on a drawn picture: darkness with noise, blur, a colour cast.
+//! Effects of light, lens and sensor on a rendered picture: darkness with noise, blur, a colour cast.
 //!
-//! All of them apply to light, not to pixel values: a picture is converted to linear light, changed there, and
-//! converted back with sRGB's curve.
+//! All effects apply to light, not to pixel values: a picture is converted to linear light, changed, and converted back
+//! with sRGB's curve.
 
 use std::f64::consts::{PI, TAU};
 
@@ -11,25 +11,27 @@ use rand_pcg::Pcg64Mcg;
 
 use super::request::{AxisParameter, Request};
 
-/// Light at the sensor, as a share of the usual: the ends of the range, uniform in ratio.
+/// Largest and smallest exposure as a fraction of the usual one; between them, the logarithm is uniformly distributed.
 const EXPOSURES: [f64; 2] = [0.25, 0.02];
-/// Electrons of white at the usual exposure, as in a small camera's pixel.
+/// Number of electrons of white at the usual exposure, as in a pixel of a small camera.
 const ELECTRONS_AT_WHITE: f64 = 6000.0;
 /// Standard deviation of the read noise of a pixel, in electrons.
 const READ_NOISE_ELECTRONS: f64 = 5.0;
-/// The camera's own amplification: it restores white to this share, up to the largest gain.
+/// Level to which the camera's gain amplifies white, up to [`MAX_GAIN`].
 const WHITE_AIMED_AT: f64 = 1.0 / 3.0;
+/// Largest gain of the camera.
 const MAX_GAIN: f64 = 4.0;
 
-/// Length of motion blur, and diameter of the disc of defocus, in pixels.
+/// Range of the length of motion blur, in pixels.
 const MOTION_PX: std::ops::Range<f64> = 3.0..12.0;
+/// Range of the diameter of the disc of defocus, in pixels.
 const DEFOCUS_PX: std::ops::Range<f64> = 2.5..8.0;
-/// Number of points of a blur's kernel: enough that single points are invisible at the longest blur.
+/// Number of points of a blur's kernel, so large that single points are invisible at the longest blur.
 const BLUR_POINTS: usize = 64;
 
-/// Logarithm of the largest ratio by which a colour cast changes red relative to blue.
+/// Range of the logarithm of the ratio by which a colour cast changes red relative to blue.
 const CAST_LOG_RATIOS: std::ops::Range<f64> = 0.15..0.9;
-/// Share of that by which green changes relative to both.
+/// Fraction of this logarithm by which green changes relative to red and blue.
 const GREEN_SHARE: f64 = 0.35;
 
 /// Linear light of a picture, row by row, three channels per pixel.
@@ -60,7 +62,7 @@ impl Light {
     }
 }
 
-/// Little light: fewer electrons, with their shot noise, read noise, and the camera's available gain.
+/// Reduces the light: fewer electrons with shot noise, read noise, and the camera's limited gain.
 pub(super) fn darken(image: &mut RgbImage, request: &mut Request<'_>) -> AxisParameter {
     let [most, least] = EXPOSURES.map(f64::ln);
     let exposure = (most + request.level * (least - most)).exp();
@@ -81,7 +83,7 @@ pub(super) fn darken(image: &mut RgbImage, request: &mut Request<'_>) -> AxisPar
     }
 }
 
-/// Motion along a random direction in pictures of an even number, a lens out of focus in the others.
+/// Blurs the picture: motion in a random direction in pictures with an even number, defocus in the others.
 pub(super) fn blur(image: &mut RgbImage, request: &mut Request<'_>) -> AxisParameter {
     let (points, value, description): (Vec<(f64, f64)>, f64, String) = if request.number.is_multiple_of(2) {
         let length = request.between(MOTION_PX);
@@ -93,7 +95,7 @@ pub(super) fn blur(image: &mut RgbImage, request: &mut Request<'_>) -> AxisParam
         (points.collect(), length, format!("motion blur over {length:.1} px at {:.0} degrees", direction.to_degrees()))
     } else {
         let diameter = request.between(DEFOCUS_PX);
-        // Points of a sunflower fill the disc evenly.
+        // Points in a sunflower pattern fill the disc evenly.
         let points = (0..BLUR_POINTS).map(|step| {
             let radius = 0.5 * diameter * ((step as f64 + 0.5) / BLUR_POINTS as f64).sqrt();
             let angle = step as f64 * PI * (3.0 - 5f64.sqrt());
@@ -107,7 +109,7 @@ pub(super) fn blur(image: &mut RgbImage, request: &mut Request<'_>) -> AxisParam
     AxisParameter { value, unit: "px", description }
 }
 
-/// Weights of whole pixels around the middle: each point is distributed over the four pixels around it.
+/// Weights of whole pixels around the centre: each point is distributed over the four pixels around it.
 fn kernel(points: &[(f64, f64)]) -> Vec<(i64, i64, f32)> {
     let mut weights = std::collections::BTreeMap::new();
     for &(x, y) in points {
@@ -122,7 +124,7 @@ fn kernel(points: &[(f64, f64)]) -> Vec<(i64, i64, f32)> {
     weights.into_iter().filter(|(_, weight)| *weight > 0.0).map(|((x, y), weight)| (x, y, weight as f32)).collect()
 }
 
-/// The light spread by a kernel; beyond the rim the last row or column is repeated.
+/// The light, convolved with a kernel; beyond the border the last row or column is repeated.
 fn convolved(light: &Light, kernel: &[(i64, i64, f32)]) -> Vec<f32> {
     let Light { width, height, values } = light;
     let row_len = 3 * width;
@@ -131,7 +133,7 @@ fn convolved(light: &Light, kernel: &[(i64, i64, f32)]) -> Vec<f32> {
         for &(dx, dy, weight) in kernel {
             let from = (y as i64 + dy).clamp(0, *height as i64 - 1) as usize;
             let row = &values[from * row_len..(from + 1) * row_len];
-            // The inner part of the row in one run, the rim pixel by pixel.
+            // The inner part of the row is computed in one loop, the border pixel by pixel.
             let start = (-dx).clamp(0, *width as i64) as usize;
             let end = (*width as i64 - dx).clamp(start as i64, *width as i64) as usize;
             let shifted = &row[3 * (start as i64 + dx) as usize..3 * (end as i64 + dx) as usize];
@@ -149,7 +151,7 @@ fn convolved(light: &Light, kernel: &[(i64, i64, f32)]) -> Vec<f32> {
     spread
 }
 
-/// Lamps of another colour than the camera's white balance: the three channels are amplified differently.
+/// Changes the colour of the light, which then differs from the camera's white balance: each channel has its own gain.
 pub(super) fn tint(image: &mut RgbImage, request: &mut Request<'_>) -> AxisParameter {
     let strength = request.between(CAST_LOG_RATIOS);
     let rng = &mut request.rng;
@@ -174,7 +176,7 @@ pub(super) fn tint(image: &mut RgbImage, request: &mut Request<'_>) -> AxisParam
     }
 }
 
-/// Standard normal numbers, two at a time (Box and Muller, 1958).
+/// Samples of the standard normal distribution, two at a time (Box and Muller, 1958).
 #[derive(Default)]
 struct Normal {
     spare: Option<f64>,
@@ -192,8 +194,8 @@ impl Normal {
     }
 }
 
-/// A Poisson count with a mean: Knuth's product of uniform numbers for small means, the normal distribution for large
-/// ones.
+/// A sample of the Poisson distribution with a mean: by Knuth's product of uniform numbers for small means, by the
+/// normal distribution for large ones.
 fn poisson(mean: f64, rng: &mut Pcg64Mcg, normal: &mut Normal) -> f64 {
     if mean > 12.0 {
         return (mean + mean.sqrt() * normal.sample(rng)).round().max(0.0);
@@ -220,7 +222,8 @@ mod tests {
             let counts: Vec<f64> = (0..40_000).map(|_| poisson(mean, &mut rng, &mut normal)).collect();
             let found = counts.iter().sum::<f64>() / counts.len() as f64;
             let variance = counts.iter().map(|count| (count - found).powi(2)).sum::<f64>() / counts.len() as f64;
-            // Four standard errors: sqrt(mean / n) of the mean, about mean * sqrt(2 / n) of the variance.
+            // The tolerances are four standard errors: sqrt(mean / n) for the mean, about mean * sqrt(2 / n) for the
+            // variance.
             assert!((found - mean).abs() < 4.0 * (mean / 4e4).sqrt(), "{mean}: {found}");
             assert!((variance - mean).abs() < 4.0 * (mean * (1.0 + 2.0 * mean) / 4e4).sqrt(), "{mean}: {variance}");
         }

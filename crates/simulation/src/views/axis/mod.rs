@@ -1,14 +1,14 @@
-//! Pictures with one harder property than an ordinary scene: the axes along which models are measured.
+//! Pictures that are harder than an ordinary scene in one property: the axes along which models are evaluated.
 //!
 //! ```text
-//! (part, axis, number, seed) ─> ordinary random scene ─> changed along the axis ─> picture, truths, how much it was changed
+//! (part, axis, number, seed) ─> ordinary random scene ─> changed along the axis ─> picture, ground truth, amount of change
 //!                               SceneVariation::sample    camera, things, image
 //! ```
 //!
-//! An axis has [`PICTURES_PER_AXIS`] pictures. The number of a picture is its **stratum**: the axis's parameter runs
-//! from its mildest value in picture 0 to its hardest in the last one, at random within each stratum, so that 20
-//! pictures cover the whole range evenly. The same part, axis, number and seed give the same picture, bit for bit. All
-//! pictures are the wrist camera's with the arm holding it, as in an attempt.
+//! An axis has [`PICTURES_PER_AXIS`] pictures. The number of a picture is its **stratum**: the axis's parameter
+//! increases from its mildest value in picture 0 to its hardest in the last one, at random within each stratum, so that
+//! 20 pictures cover the whole range evenly. The same part, axis, number and seed give the same picture, bit for bit.
+//! All pictures are taken by the wrist camera on the arm, as in an attempt.
 
 mod axis_name;
 mod camera_pose;
@@ -33,30 +33,30 @@ use crate::objects::{LookAlikeKind, ObjectSpec};
 use crate::scene::{SceneVariation, VariationConfig};
 use crate::workcell::{Workcell, WorkcellConfig};
 
-/// A picture of an axis with the truth about it.
+/// A picture of an axis with its ground truth.
 #[derive(Debug, Clone)]
 pub struct AxisView {
     /// The axis along which the picture is harder.
     pub axis: Axis,
-    /// The index among the axis' pictures.
+    /// Index among the pictures of the axis.
     pub number: u64,
-    /// The drawn scene.
+    /// The rendered scene.
     pub scene: SceneVariation,
     /// The picture and its camera.
     pub view: CameraView,
-    /// All instances of the part; none for look-alikes.
+    /// Ground truth of all instances of the part; none for look-alikes.
     pub truths: Vec<InstanceTruth>,
     /// The amount of change along the axis.
     pub parameter: AxisParameter,
-    /// The difference of the part on the table from the requested part; only for look-alikes.
+    /// The kind of look-alike on the table; `None` on other axes.
     pub look_alike: Option<LookAlikeKind>,
 }
 
-/// Draws picture `number` of an axis.
+/// Renders picture `number` of an axis.
 ///
 /// # Errors
-/// As [`Workcell::new`]; [`SimulationError::Configuration`] if no pose of camera or cover gives the picture that the
-/// axis requires.
+/// As for [`Workcell::new`]; [`SimulationError::Configuration`] if no pose of camera or cover gives the picture that
+/// the axis requires.
 pub fn axis_view(spec: &ObjectSpec, axis: Axis, number: u64, seed: u64) -> Result<AxisView> {
     let mut request = Request::new(spec, axis, number, seed);
     if axis == Axis::LookAlikes {
@@ -84,7 +84,7 @@ pub fn axis_view(spec: &ObjectSpec, axis: Axis, number: u64, seed: u64) -> Resul
     Ok(AxisView { axis, number, scene, view, truths, parameter, look_alike: None })
 }
 
-/// An ordinary picture with a look-alike in the part's place; the kinds alternate.
+/// An ordinary picture with a look-alike instead of the part; the kinds alternate.
 fn look_alike_view(request: &mut Request<'_>) -> Result<AxisView> {
     let kinds = request.spec.look_alike_kinds()?;
     let kind = kinds[(request.number % kinds.len() as u64) as usize];
@@ -112,9 +112,9 @@ mod tests {
     use crate::scene::PlacedObject;
     use crate::shapes::footprint;
 
-    /// Pixels between the middle of the drawn part and of its projected top: a wall of 12 mm seen from 20 degrees off
-    /// the vertical covers 4 px on one side and moves the centre by half of that; the rest is the raster of a
-    /// millimetre.
+    /// Largest distance in pixels between the centres of the rendered part and of its projected top: a wall of 12 mm
+    /// seen from 20 degrees off the vertical covers 4 px on one side and moves the centre by half of that; the rest
+    /// allows for the raster of a millimetre.
     const MIDDLE_TOLERANCE_PX: f64 = 3.0;
 
     #[test]
@@ -186,7 +186,7 @@ mod tests {
             let shown = axis_view(&spec, Axis::Covered, number, 8).unwrap();
             let stratum = |number: u64| 0.10 + 0.30 * number as f64 / PICTURES_PER_AXIS as f64;
             let covered = 1.0 - shown.truths[0].visible_share;
-            // The cover stops within two percent of the wanted share.
+            // The cover stops within two percent of the wanted fraction.
             assert!(
                 (stratum(number) - 0.02..stratum(number + 1) + 0.02).contains(&covered),
                 "{name} {number}: {covered}"
@@ -210,7 +210,7 @@ mod tests {
         }
         let cluttered = axis_view(&spec, Axis::Clutter, 12, 8).unwrap();
         assert!((10..=15).contains(&cluttered.scene.distractors.len()));
-        // Tall objects beside the part hide a small share of it from a camera that is not vertically above.
+        // Tall objects beside the part hide a small fraction of it from a camera that is not vertically above.
         assert!(cluttered.truths[0].visible_share > 0.85, "{}", cluttered.truths[0].visible_share);
     }
 

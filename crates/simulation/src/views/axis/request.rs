@@ -21,11 +21,11 @@ pub struct AxisParameter {
     pub value: f64,
     /// Unit of the number: `of the usual height`, `degrees`, `px`.
     pub unit: &'static str,
-    /// A description in words.
+    /// A description for people.
     pub description: String,
 }
 
-/// A part, axis, number and seed, in the form that the axes' modules need.
+/// The request of a picture: part, axis, number and seed, in the form that the axes' modules need.
 pub(super) struct Request<'a> {
     pub(super) spec: &'a ObjectSpec,
     pub(super) number: u64,
@@ -33,13 +33,13 @@ pub(super) struct Request<'a> {
     pub(super) scene_seed: u64,
     /// Position of the picture in the axis' range, 0 to 1.
     pub(super) level: f64,
-    /// Further random numbers of the axis.
+    /// Random numbers for the axis.
     pub(super) rng: Pcg64Mcg,
 }
 
 impl<'a> Request<'a> {
     pub(super) fn new(spec: &'a ObjectSpec, axis: Axis, number: u64, seed: u64) -> Self {
-        // FNV-1a, so that parts do not share one seed and with it each unfavourable lamp.
+        // FNV-1a gives each part its own seed, so that one unfavourable lamp does not affect all parts.
         let part = spec
             .name
             .bytes()
@@ -65,7 +65,7 @@ impl<'a> Request<'a> {
     }
 }
 
-/// The result of an axis: the picture before truths are measured.
+/// The result of an axis: the picture before its ground truth is measured.
 pub(super) struct Drawn {
     pub(super) cell: Workcell,
     pub(super) scene: SceneVariation,

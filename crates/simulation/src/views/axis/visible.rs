@@ -1,4 +1,4 @@
-//! The visible share of each instance of the part in a picture.
+//! The visible fraction of each instance of the part in a picture.
 
 use nalgebra::{Isometry3, Translation3};
 use sdg_geometry::PosedCamera;
@@ -13,16 +13,16 @@ use crate::workcell::Workcell;
 /// One of the part's instances in a picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InstanceTruth {
-    /// Its pose, and its grasp.
+    /// Pose and grasp of the instance.
     pub grasp: GraspTruth,
-    /// Share of its pixels in the picture, relative to those that it would have with nothing else on the table.
+    /// Number of the instance's pixels in the picture, as a fraction of their number with nothing else on the table.
     pub visible_share: f64,
 }
 
-/// Position of hidden objects: below the floor.
+/// z of hidden objects, below the floor, in metres.
 const OUT_OF_SIGHT_M: f64 = -10.0;
 
-/// The truth about each instance, with its visible share.
+/// The ground truth of each instance, with its visible fraction.
 pub(super) fn instance_truths(
     cell: &mut Workcell,
     scene: &SceneVariation,
@@ -63,7 +63,7 @@ pub(super) fn num_pixels(cell: &Workcell, segmentation: &Segmentation, body: Id<
     segmentation.pixels_where(|geom| model.body_of(geom) == body).count()
 }
 
-/// Removes a distractor from the picture, for the truths about the rest.
+/// Removes a distractor from the picture, for measuring the rest.
 pub(super) fn hide_distractor(cell: &mut Workcell, index: usize) -> Result<()> {
     let below = Isometry3::from_parts(Translation3::new(index as f64, 0.0, OUT_OF_SIGHT_M), Default::default());
     place_distractor(cell, index, &below)
