@@ -144,7 +144,7 @@ fn marks_made_on_unturned_pixels_are_told() {
         let heeded = teach(with_orientation(&stored_for(&photo(), orientation), orientation));
         let told = String::from_utf8_lossy(&heeded.stderr).into_owned();
         assert!(
-            heeded.status.success() && told.contains("turned as its Exif orientation says"),
+            heeded.status.success() && told.contains("rotated as its Exif orientation says"),
             "{orientation}: {told}"
         );
     }

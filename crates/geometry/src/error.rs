@@ -1,6 +1,6 @@
-//! Errors of a shape.
+//! The error type of this crate.
 
-/// Why a shape could not be made or read.
+/// The reason why a shape or a camera cannot be made or read.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
