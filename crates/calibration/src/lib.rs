@@ -1,4 +1,4 @@
-//! Calibrated cameras: their calibration and their files.
+//! Calibration of cameras and their files.
 //!
 //! ```text
 //! Board ─ Sheet (SVG, PDF) ─ printed, photographed ─ find_board: corners to 0.03 px, each with its place on the board
@@ -8,9 +8,9 @@
 //!   └─ calibrate_hand_eye  many, with robot poses   ─ where the camera is on the robot, or beside it
 //! CalibratedCamera: ROS's camera_info YAML, `table:` and `hand_eye:` beside it ─ PosedCamera, workspace ─ plan view
 //! ```
-//! **Frames.** ROS and OpenCV put the first pixel's centre at (0, 0), this project at (0.5, 0.5): half a pixel is added
-//! when such a file is read and subtracted when it is written. The board's origin is the outer corner of its lower left
-//! dark square, x right, y up, z out of the sheet. Lengths in metres, `z` up from the table.
+//! **Frames.** ROS and OpenCV place the first pixel's centre at (0, 0), this project at (0.5, 0.5): half a pixel is
+//! added when such a file is read and subtracted when it is written. The board's origin is the outer corner of its
+//! lower left dark square, x right, y up, z out of the sheet. Lengths are in metres; `z` points up from the table.
 //!
 //! **Not supported**: fisheye lenses, several cameras at once, rolling shutters. Files and clocks are in `cli`.
 //!

@@ -92,7 +92,7 @@ fn camera_files_that_are_none_and_pictures_of_other_cameras_are_refused() {
     assert_refused(&teach("text.yaml", "image_width: 640", "no camera"), 1, &["text.yaml", "camera_calibration"]);
     let table = WRIST_CAMERA.find("table:").unwrap();
     let alone = teach("alone.yaml", &WRIST_CAMERA[table..], "");
-    assert_refused(&alone, 1, &["alone.yaml", "pose over the table"]);
+    assert_refused(&alone, 1, &["alone.yaml", "pose above the table"]);
 
     let camera = files.text("wrist.yaml", WRIST_CAMERA);
     assert_refused(&files.teach("part.sdg", &["--camera", &camera]), 2, &["--mark-height-mm"]);
