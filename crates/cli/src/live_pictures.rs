@@ -83,7 +83,7 @@ impl LiveArgs {
 }
 
 impl RequestArgs {
-    /// Rejects camera settings given without a camera; `own` lists the verb's further options of this kind, with
+    /// Rejects camera settings that are given without a camera. `own` has the verb's further options for a camera, and
     /// whether each is given.
     ///
     /// # Errors

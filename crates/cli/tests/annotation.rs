@@ -97,7 +97,7 @@ fn wrong_calls_are_refused_in_one_line() {
     };
     refused(&annotation, "a.xml", &[], 2, &["a.xml", ".json (COCO) or .txt (YOLO-pose)"]);
     refused(&annotation, "a.json", &["--format", "opendr"], 2, &["--format", "coco, labelme, yolo-pose", "opendr"]);
-    refused(&foreign("yolo-pose.txt"), "a.json", &[], 2, &["--image", "does not say how large its image is"]);
+    refused(&foreign("yolo-pose.txt"), "a.json", &[], 2, &["--image", "does not state the size of its image"]);
     refused(Path::new("/nowhere.json"), "a.json", &[], 1, &["/nowhere.json", "cannot read"]);
 
     fs::copy(&annotation, at("same.json")).unwrap();

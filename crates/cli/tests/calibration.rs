@@ -248,7 +248,7 @@ fn a_camera_s_frames_are_taken_where_they_show_something_new() {
     assert_refused(
         &["camera", "calibrate", "--from", &from, "--taken", &taken, "--no-browser", "--out", &out],
         1,
-        &["the board was never seen at rest"],
+        &["the board was never at rest in a frame"],
     );
 }
 

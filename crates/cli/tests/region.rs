@@ -168,7 +168,7 @@ fn wrong_regions_are_one_clear_error_each() {
         ("10,10,0,50", 2, "a width and a height of at least 1 pixel, found 0 and 50"),
         ("10,10,50", 2, "X,Y,W,H in whole pixels"),
         ("1.5,2,30,40", 2, "X,Y,W,H in whole pixels"),
-        ("everything", 2, "or all, for all of the picture"),
+        ("everything", 2, "or `all` for the whole picture"),
         ("600,10,100,100", 1, "within the picture of 640 × 480 pixels, found 100 × 100 pixels from (600, 10)"),
         ("300,200,60,40", 1, "a region that the part fits in"),
     ] {

@@ -234,7 +234,7 @@ fn damaged_results_are_refused(shared: &str) {
     // Two collectors at once, and a collector beside an ordinary run.
     let lock = File::create(at(".collect.lock")).unwrap();
     lock.lock().unwrap();
-    is_refused(&["another --collect is at work in this folder"]);
+    is_refused(&["another --collect is running in this folder"]);
     drop(lock);
     let lock = File::open(at(".lock")).unwrap();
     lock.lock().unwrap();
