@@ -1,4 +1,4 @@
-//! Evaluation of models: on labelled pictures, in the simulator, on held-back samples; results as tables, pages and
+//! Evaluation of models: on labelled pictures, in the simulator, and on held-out samples; results as tables, pages and
 //! JSON.
 //!
 //! ```text
@@ -11,8 +11,8 @@
 //! Evaluation, AxesEvaluation, CamerasEvaluation ─ units ─ Store ─ Summary ─ tables, page       simulated
 //! ```
 //!
-//! Deliberately absent: arguments, terminals and exit codes. Progress is reported to a [`Progress`]; errors that an
-//! option helps with are an [`EvaluationError`], whose caller knows the option.
+//! Not in this crate: arguments, terminals and exit codes. Progress is reported to a [`Progress`]. An error that an
+//! option corrects is an [`EvaluationError`], to which the caller adds the option.
 //!
 //! ```
 //! use sdg_evaluation::{Share, wilson_interval};

@@ -1,4 +1,4 @@
-//! The page of a run: teaching, training progress, detections and grasps.
+//! The page of a run: teaching, progress of training, detections and grasps.
 
 use anyhow::Result;
 use sdg_demonstration::Demonstration;
@@ -26,11 +26,11 @@ pub struct RunPage<'a> {
     pub command: &'a str,
 }
 
-/// Additional inputs of a run that also taught.
+/// Additional inputs for a run that also taught the model.
 pub struct TaughtHere<'a> {
     /// The photo and its marks.
     pub demonstration: &'a Demonstration,
-    /// Losses and validations of the detector; `None` for a model without one.
+    /// Losses and validations of the detector; `None` for a model without a network.
     pub history: Option<&'a History>,
     /// Pictures with and without the part.
     pub trials: &'a [Trial],

@@ -17,30 +17,30 @@ use crate::footer::FOOTER;
 use crate::held_back::HeldBackFigures;
 use crate::machine::machine;
 
-/// Number of augmented samples shown.
+/// Number of augmented samples on the page.
 const SHEET: u64 = 24;
-/// Number of samples on which the finished model is shown.
+/// Number of samples in which the detections of the finished model are shown.
 const TRIED: u64 = 6;
-/// Index of the first of them, far beyond the samples of any training.
+/// Index of the first of these samples, far beyond the samples of any training.
 const FIRST_TRIED: u64 = 1 << 40;
 
 /// The page of `sdg teach`.
 pub struct TeachingPage<'a> {
-    /// The model, and how its network was trained.
+    /// The model and the history of its training.
     pub taught: &'a Taught,
-    /// Results of the finished model on held-back samples.
+    /// Results of the finished model on held-out samples.
     pub figures: &'a HeldBackFigures,
     /// The photos and their marks.
     pub demonstrations: &'a [Demonstration],
     pub seed: u64,
-    /// The user's waiting time: from the start of the program to the finished model and its figures.
+    /// The user's waiting time, in seconds: from the start of the program to the tested model.
     pub seconds: f64,
     /// The command that makes the same model again.
     pub command: &'a str,
 }
 
 impl TeachingPage<'_> {
-    /// Photo and marks, samples, curves, and detections in held-back samples.
+    /// The page: photos and marks, samples, curves, and detections in held-out samples.
     ///
     /// # Errors
     /// Samples cannot be made, or detection fails.
@@ -99,9 +99,9 @@ impl TeachingPage<'_> {
     }
 
     fn tried(&self) -> Result<Section> {
-        // The samples show the part anywhere.
+        // The part may be anywhere in a sample.
         let model = self.taught.model.clone().with_region(None)?;
-        // Frames of the photo's size: the part's size is then in the searched range.
+        // Samples have the photo's size, so that the part's size is in the searched range.
         let augmenter = Augmenter::new(self.demonstrations, AugmentationConfig::default(), self.seed)?;
         let mut figures = Vec::new();
         for i in 0..TRIED {
@@ -134,7 +134,7 @@ impl TeachingPage<'_> {
     }
 }
 
-/// The original and the marked photos, and samples made from them.
+/// The photos, the marked photos, and samples made from them.
 pub fn demonstration(model: &GraspModel, demonstrations: &[Demonstration], seed: u64) -> Result<Section> {
     let as_seen = match model.facts().lengths {
         None => "As the camera saw it.",
@@ -176,7 +176,7 @@ fn jaw_width_px(model: &GraspModel, at: usize) -> f64 {
     model.demonstrations().get(at).map_or(0.0, |TaughtDemonstration { marks, .. }| marks.width_px)
 }
 
-/// The first training samples with their marks.
+/// The first training samples and their marks.
 fn sheet(demonstrations: &[Demonstration], seed: u64) -> Result<Vec<RgbImage>> {
     let config = AugmentationConfig::default().with_output_size(320, 240);
     let augmenter = Augmenter::new(demonstrations, config, seed)?;
@@ -195,7 +195,7 @@ fn sheet(demonstrations: &[Demonstration], seed: u64) -> Result<Vec<RgbImage>> {
         .collect())
 }
 
-/// Losses and validation by step.
+/// The losses and the validation by step.
 pub fn teaching(history: &History) -> Section {
     let loss = |pick: fn(&sdg_grasp::LossValues) -> f64| -> Vec<(f64, f64)> {
         history.steps.iter().map(|record| (record.step as f64, pick(&record.losses))).collect()

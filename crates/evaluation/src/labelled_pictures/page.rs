@@ -1,4 +1,4 @@
-//! The page of the evaluation: totals, the choice of the minimum score, and every picture with its marks and
+//! The page of the evaluation: totals, the effect of the minimum score, and every picture with its marks and
 //! detections, worst first.
 
 use anyhow::Result;
@@ -18,15 +18,15 @@ use crate::footer::FOOTER;
 use crate::machine::machine;
 use crate::statistics::{Share, wilson_interval};
 
-/// Maximum number of pictures drawn on the page; of more, the worst.
+/// Maximum number of pictures drawn on the page, the worst ones.
 const MAX_DRAWN: usize = 200;
-/// Height of a tag's capitals, in line widths: small, since a picture may have many tags.
+/// Height of a tag's capitals in line widths; small, because a picture may have many tags.
 const TAG_WIDTHS: f64 = 3.4;
 
-/// The page. Pictures are read again from their files.
+/// Makes the page. Pictures are read again from their files.
 ///
 /// # Errors
-/// A picture no longer exists.
+/// A picture is no longer there.
 pub fn page(evaluated: &Evaluated, command: &str) -> Result<Report> {
     let judged = evaluated.judged();
     let totals = Totals::of(&judged);
@@ -81,7 +81,7 @@ pub fn page(evaluated: &Evaluated, command: &str) -> Result<Report> {
     Ok(report.section(this_run(evaluated, command)).footer(FOOTER))
 }
 
-/// The number of errors of any kind, and of those that would cause a wrong grasp: the worst picture has most.
+/// The number of all errors, and of those that would cause a wrong grasp; the worst picture has the most.
 fn num_errors(judged: &Judged) -> (usize, usize) {
     let all = judged.wrong() + judged.missed() + if judged.is_false_alarm() { judged.hits.len() } else { 0 };
     (all, judged.wrong())
@@ -257,7 +257,7 @@ pub fn in_words(tested: &Tested, judged: &Judged) -> String {
 
 /// Draws the marks, and the detections on top.
 fn draw(image: &mut RgbImage, tested: &Tested, judged: &Judged) {
-    // Three pixels at a width of 640: marks are distinguishable when two pictures share a row of the page.
+    // Three pixels at a width of 640, so that marks are visible when a row of the page has two pictures.
     let width = (f64::from(image.width().max(image.height())) / 213.0).clamp(1.0, 8.0);
     for (instance_idx, instance) in tested.picture.instances.iter().enumerate() {
         let missed = !judged.is_found(instance_idx) && !instance.optional;

@@ -8,14 +8,15 @@ use super::part_store::PartOutcome;
 use crate::footer::FOOTER;
 use crate::machine::machine;
 
-/// Maximum number of pairs of photos shown; the table has all.
+/// Maximum number of pairs with photos on the page; the table has all pairs.
 const MAX_SHOWN: usize = 24;
-/// Maximum number of parts with a photo on the page; more would make the page too large for browsers.
+/// Maximum number of parts with a photo on the page; more photos would make the page too large for browsers.
 const MAX_PHOTOS: usize = 200;
-/// Width of each of two adjacent photos, px.
+/// Width of each of two photos side by side, in pixels.
 const PHOTO_WIDTH: u32 = 360;
 
-/// Look-alikes, parts that need another photo, and how well each part is found. `photos` are those of the taught parts.
+/// The page: look-alikes, parts that need another photo, and the results of each part. `photos` are those of the taught
+/// parts.
 pub fn page(findings: &Findings, photos: &[RgbImage], command: &str) -> Report {
     let taught = findings.taught.len();
     let mut report = Report::new(format!("{taught} parts taught"))

@@ -1,4 +1,4 @@
-//! Quantities that the simulated robot gets from the simulator and that must be measured for a real one.
+//! Quantities that the simulated robot gets from the simulator, and that would have to be measured for a real one.
 
 /// A quantity given to the simulated robot.
 pub(super) struct Given {
@@ -6,7 +6,7 @@ pub(super) struct Given {
     pub what: &'static str,
     /// Its source.
     pub source: &'static str,
-    /// The error under which grasps are tested, if any.
+    /// The error under which grasps are tested.
     pub error: &'static str,
 }
 

@@ -8,7 +8,7 @@
 //! ```
 //!
 //! A **case** is an instance of the part in a picture, or a look-alike: the unit for comparing two models. A
-//! **condition** is the error in an attempt. Pictures depend only on part, axis, number and seed; attempts use the
+//! **condition** is the error in an attempt. Pictures depend only on part, axis, number and seed; attempts have the
 //! scenes of the paper's protocol.
 
 mod against;

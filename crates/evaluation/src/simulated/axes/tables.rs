@@ -1,4 +1,4 @@
-//! The results of each axis and each error as tables: the paper's parts, and separately the others.
+//! Tables of the results of each axis and each error, for the paper's parts and separately for the held-out ones.
 
 use sdg_grasp::ModelKind;
 use sdg_report::{Cell, Column, Table, Tone};
@@ -11,7 +11,7 @@ use crate::simulated::tables::{Titled, document, incomplete, number, share};
 use crate::statistics::Share;
 use crate::trial::{RIGHT_DEGREES, RIGHT_MM};
 
-/// All tables, group by group, followed by the quantities given to the robot.
+/// All tables, group by group, followed by the quantities that the robot gets from the simulator.
 pub fn tables(summary: &AxesSummary) -> Vec<Titled> {
     let mut tables = Vec::new();
     for group in &summary.groups {
@@ -46,12 +46,12 @@ pub fn tables(summary: &AxesSummary) -> Vec<Titled> {
     tables
 }
 
-/// A notice to precede the numbers.
+/// A notice that precedes the tables, if results are missing.
 pub fn notice(summary: &AxesSummary) -> Option<String> {
     incomplete(summary.remaining)
 }
 
-/// The tables as a separate document; `more` are additional tables, `facts` the settings for reproducing the numbers.
+/// The tables as a document; `more` are additional tables, `facts` the settings for reproducing the results.
 pub fn markdown(summary: &AxesSummary, more: Vec<Titled>, facts: &[(&str, String)], command: &str) -> String {
     let tables = tables(summary).into_iter().chain(more);
     document("Axes and grasps under errors", notice(summary), tables, facts, command)
@@ -81,7 +81,7 @@ fn figures_of<'g>(group: &'g GroupSummary, axis: &str, model: ModelKind, way: Wa
     group.axes.iter().find(|f| f.axis == axis && f.model == model && f.way == way)
 }
 
-/// The share in percent with its interval: `97.5 (93.8 to 99.0)`.
+/// The fraction in percent with its interval, such as `97.5 (93.8 to 99.0)`.
 pub(super) fn with_interval(share: Share, [low, high]: [f64; 2]) -> String {
     let Some(percent) = share.percent() else { return "–".to_owned() };
     format!("{percent:.1} ({:.1} to {:.1})", 100.0 * low, 100.0 * high)
@@ -91,7 +91,7 @@ fn part_name(object: &str) -> String {
     object.replace('_', " ")
 }
 
-/// The smallest share and its part.
+/// The smallest fraction, and its part.
 fn lowest_shares(parts: &[PartShare]) -> String {
     lowest(parts).map_or("–".to_owned(), |part| format!("{}, {}", part.share, part_name(&part.object)))
 }
@@ -126,7 +126,7 @@ fn thirds(group: &GroupSummary) -> (String, String, Table) {
     for axis in axes_of(group) {
         let of = |model: ModelKind, third: usize| Some(figures_of(group, axis, model, Way::WithCheck)?.thirds[third]);
         let range = |third: usize| models.iter().find_map(|model| of(*model, third)?.range);
-        // Three instances are three instances in every third.
+        // If there are always three instances, the parameter has the same range in every third.
         if range(0) == range(2) && range(0).is_some_and(|[low, high]| low == high) {
             continue;
         }
@@ -213,7 +213,7 @@ fn look_alikes(group: &GroupSummary) -> (String, String, Table) {
     columns.extend(shown.iter().map(|(way, model)| Column::text(model.letter()).group(way.name())));
     let mut table = Table::new(columns);
     let mut kinds = distinct(group.look_alikes.iter().map(|figures| figures.kind.as_str()));
-    // The two sums last: their order of appearance depends on the first model's look-alikes.
+    // The two sums come last, because their order of appearance depends on the first model's look-alikes.
     let sums = [LookAlikeFigures::SAME_SIZE, LookAlikeFigures::SIZE_ALONE];
     kinds.retain(|kind| !sums.contains(kind));
     for kind in kinds.into_iter().chain(sums) {

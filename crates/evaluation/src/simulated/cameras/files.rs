@@ -1,4 +1,4 @@
-//! Writes the results of the cameras to files in the evaluation's folder, and a few lines.
+//! Writes the results of the cameras to files in the evaluation's folder, and prints them in a few lines.
 
 use std::path::{Path, PathBuf};
 
@@ -11,8 +11,8 @@ use crate::machine::machine;
 use crate::simulated::store::Store;
 
 impl CamerasSummary {
-    /// Writes tables and a page, and returns their files. `jobs` is the number of parallel units, and `command`
-    /// reproduces the results.
+    /// Writes tables and a page, and returns their files. `jobs` is the number of parallel units; `command` reproduces
+    /// the results.
     ///
     /// # Errors
     /// Files cannot be written.

@@ -1,4 +1,4 @@
-//! The results with calibrated cameras as tables and as a page.
+//! The results for calibrated cameras, as tables and as a page.
 
 use sdg_report::{Cell, Column, KeyFigure, Report, Section, Table, Tone};
 
@@ -32,7 +32,7 @@ pub fn tables(summary: &CamerasSummary) -> Vec<Titled> {
     ]
 }
 
-/// `of` is the heading of a column that names the parts of a row, if rows are not of all parts.
+/// Makes a table. `of` is the heading of a column that names the parts of a row; `None` if every row is of all parts.
 fn table(rows: &[SetFigures], of: Option<&str>) -> Table {
     let mut columns = vec![Column::text("model"), Column::text("pictures")];
     columns.extend(of.map(Column::text));
@@ -48,7 +48,7 @@ fn table(rows: &[SetFigures], of: Option<&str>) -> Table {
     ]);
     let mut table = Table::new(columns);
     for row in rows {
-        // Without a line break in the share.
+        // A line break inside the fraction is prevented.
         let whole = |share: crate::statistics::Share| share.to_string().replace(' ', "\u{a0}");
         let found = match row.found.of {
             0 => Cell::text(format!("accepted: {}", whole(row.accepted))),
@@ -76,7 +76,7 @@ fn table(rows: &[SetFigures], of: Option<&str>) -> Table {
     table
 }
 
-/// The tables as a document; `facts` are the settings for reproducing the numbers.
+/// The tables as a document; `facts` are the settings for reproducing the results.
 pub fn markdown(summary: &CamerasSummary, facts: &[(&str, String)], command: &str) -> String {
     document("Calibrated cameras", incomplete(summary.remaining), tables(summary), facts, command)
 }

@@ -1,4 +1,4 @@
-//! Runs one unit in a folder that is shared with other processes.
+//! Runs one unit in a folder that several processes use.
 
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
@@ -20,23 +20,23 @@ use super::unit_list::{ListedUnit, Work};
 use super::worker::Worker;
 use crate::error::EvaluationError;
 
-/// Outcome of a unit.
+/// The outcome of a unit.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Ended {
-    /// Done, with its result in words.
+    /// The unit is done; contains the result in words.
     Done(String),
-    /// It was done before.
+    /// The unit was done before.
     Already(Box<Receipt>),
-    /// By Ctrl-C.
+    /// The unit was interrupted by Ctrl-C.
     Interrupted,
 }
 
 impl Evaluation<'_> {
     /// Runs a unit with this number of threads, unless it is done already, and writes a receipt or the reason of its
-    /// failure. If another process is running it, this is reported, and its end is waited for.
+    /// failure. If another process is running the unit, this is reported, and the function waits for its end.
     ///
     /// # Errors
-    /// The unit's own errors; a dependency is missing; the unit was done with other settings.
+    /// The errors of the unit; a dependency is missing; or the unit was done with other settings.
     pub fn do_listed(
         &self,
         unit: &ListedUnit,
@@ -97,7 +97,7 @@ impl Evaluation<'_> {
         }
     }
 
-    /// The settings on which a unit's files depend.
+    /// The settings that determine a unit's files.
     pub(super) fn settings_of(&self, unit: &ListedUnit) -> Result<Value> {
         let settings = self.store.settings();
         Ok(match unit.work {
@@ -106,7 +106,7 @@ impl Evaluation<'_> {
         })
     }
 
-    /// A unit without its dependencies cannot run.
+    /// Checks that the units on which a unit depends are done.
     fn check_after(&self, unit: &ListedUnit) -> Result<()> {
         let folder = self.store.folder();
         for before in &unit.after {
@@ -143,7 +143,7 @@ impl Evaluation<'_> {
         Ok(summary.into_inner().unwrap_or_else(PoisonError::into_inner))
     }
 
-    /// The files written by a unit, with their hashes.
+    /// The files written by a unit and their hashes.
     fn written_by(&self, unit: &ListedUnit) -> Result<BTreeMap<String, String>> {
         let mut written = BTreeMap::new();
         for file in &unit.files {

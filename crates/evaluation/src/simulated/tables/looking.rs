@@ -1,4 +1,4 @@
-//! Pictures: errors of detections, and false alarms.
+//! Tables of pictures: errors of detections, and false alarms.
 
 use sdg_report::{Cell, Column, Table, Tone};
 

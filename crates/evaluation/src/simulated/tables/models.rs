@@ -1,4 +1,4 @@
-//! The models: their structure, the cost of teaching them, and failed teachings.
+//! Tables of the models: their structure, the cost of teaching them, and failed teachings.
 
 use sdg_grasp::ModelKind;
 use sdg_report::{Cell, Column, Table};
@@ -8,7 +8,7 @@ use crate::simulated::paper;
 use crate::simulated::records::TeachingRecord;
 use crate::simulated::summary::{ModelSummary, Summary};
 
-/// The paper's Table II: costs of a model.
+/// The costs of a model, as in the paper's Table II.
 pub(super) fn costs(summary: &Summary) -> Titled {
     let mut table = Table::new(vec![
         Column::text("model"),
@@ -55,7 +55,7 @@ pub(super) fn costs(summary: &Summary) -> Titled {
     Titled { title: "Teaching, size and speed".to_owned(), lead, table }
 }
 
-/// A sentence on models that share one network.
+/// A sentence on models that use the same network.
 fn shared_networks(summary: &Summary) -> Option<String> {
     let sharing: Vec<String> = summary
         .models
@@ -66,7 +66,7 @@ fn shared_networks(summary: &Summary) -> Option<String> {
     (!sharing.is_empty()).then(|| format!("{}.", sharing.join("; ")))
 }
 
-/// The paper's Table I.
+/// The models, as in the paper's Table I.
 pub(super) fn models(summary: &Summary) -> Titled {
     let mut table = Table::new(vec![
         Column::text("model"),
@@ -91,7 +91,7 @@ pub(super) fn models(summary: &Summary) -> Titled {
     }
 }
 
-/// Network and output for the position, network and method for the angle, human input.
+/// Network and output for the position, network and method for the angle, and the human input.
 fn description(model: ModelKind) -> [&'static str; 5] {
     match model {
         ModelKind::A => ["Faster R-CNN", "box", "CNN on the box's crop", "classes of the angle", "box, grasp line"],
@@ -106,7 +106,7 @@ fn description(model: ModelKind) -> [&'static str; 5] {
     }
 }
 
-/// Teachings without a model.
+/// Teachings that gave no model.
 pub(super) fn not_taught(summary: &Summary) -> Titled {
     let mut table = Table::new(vec![Column::text("part"), Column::text("model"), Column::text("why")]);
     for cell in &summary.cells {
@@ -122,7 +122,7 @@ pub(super) fn not_taught(summary: &Summary) -> Titled {
     }
 }
 
-/// Samples of the detector, and crops of the orientation CNN if there is one.
+/// Number of samples for the detector, and of crops for the orientation CNN if there is one.
 fn samples(model: &ModelSummary) -> String {
     match (model.samples, model.crops) {
         (Some(samples), Some(crops)) => format!("{samples:.0} + {crops:.0}"),
@@ -131,7 +131,7 @@ fn samples(model: &ModelSummary) -> String {
     }
 }
 
-/// Minutes and seconds, in the paper's notation.
+/// Minutes and seconds in the paper's notation.
 fn minutes(secs: f64) -> String {
     let secs = secs.round() as u64;
     if secs == 0 { "under 0:01".to_owned() } else { format!("{}:{:02}", secs / 60, secs % 60) }
