@@ -279,7 +279,7 @@ fn a_model_that_fails_its_own_samples_is_written_and_ends_with_4() {
     let taught = sdg(&["teach", "--model", "S", "--demo", &photo, "--out", &model, "--json"]);
     let said = String::from_utf8(taught.stderr).unwrap();
     assert_eq!(taught.status.code(), Some(4), "{said}");
-    assert!(said.contains("fails its own held-back samples"), "{said}");
+    assert!(said.contains("fails on its own held-out samples"), "{said}");
     let line: serde_json::Value = serde_json::from_slice(&taught.stdout).unwrap();
     assert!(line["failure"].is_string() && fs::metadata(&model).is_ok(), "{line}");
 }

@@ -47,7 +47,7 @@ fn parts_that_look_alike_are_told() {
         assert!(Path::new(&out).join(format!("models/{part}.sdg")).exists());
     }
     let page = fs::read_to_string(found["report"].as_str().unwrap()).unwrap();
-    assert!(page.contains("3 parts taught") && page.contains("Which look alike"));
+    assert!(page.contains("3 parts taught") && page.contains("Look-alikes"));
     // The page shows each part's photo with the detections of its model.
     for part in ["lever", "rod_end", "twin"] {
         assert!(page.contains(&format!("{part}: ")), "{part}");

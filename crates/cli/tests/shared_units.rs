@@ -248,7 +248,11 @@ fn failures_are_recorded_and_told() {
     let folder = Folder::new();
     let out = folder.path("run");
     // A unit without its teaching cannot run.
-    refused(&evaluate(&out, &["--unit", GRASP]), 1, &["expected teach-S-rod_end to be done before", "is it shared"]);
+    refused(
+        &evaluate(&out, &["--unit", GRASP]),
+        1,
+        &["expected teach-S-rod_end to be done before", "all machines use the same one"],
+    );
     // A folder in place of a file: even root cannot write it.
     let obstacle = Path::new(&out).join("cells/S-rod_end.teaching.json");
     fs::create_dir(&obstacle).unwrap();

@@ -144,11 +144,11 @@ impl HeldBackFigures {
         let reason = if 2 * found.count < found.of {
             format!("it finds {} of {} parts", found.count, found.of)
         } else if 2 * false_alarms.count > false_alarms.of {
-            format!("it accepts something in {} of {} without the part", false_alarms.count, false_alarms.of)
+            format!("it accepts a detection in {} of {} without the part", false_alarms.count, false_alarms.of)
         } else {
             return None;
         };
-        Some(format!("the model fails its own held-back samples: {reason}; are the marks where the part is?"))
+        Some(format!("the model fails on its own held-out samples: {reason}; check that the marks are on the part"))
     }
 
     /// Fraction of the parts that were found.
@@ -195,7 +195,8 @@ impl HeldBackFigures {
         let others = (others > 0)
             .then(|| format!("; {others} further instances found in the photo were removed from the samples"));
         format!(
-            "on {} held-back samples it finds {found} parts ({}), {} wrong; false alarms in {false_alarms} without the part ({}){}{}",
+            "on {} held-out samples, it finds {found} parts ({}), {} wrong; false alarms in {false_alarms} without \
+             the part ({}){}{}",
             self.samples,
             interval(found),
             self.wrong(),

@@ -58,10 +58,10 @@ pub enum OwnPartError {
     #[error("expected the longer side of the part's box, which a model taught without a camera does not know")]
     NeedsLength,
     /// The height is neither given nor known.
-    #[error("expected the part's height over the table, which a model taught without a camera does not know")]
+    #[error("expected the part's height above the table, which a model taught without a camera does not know")]
     NeedsHeight,
     /// The length is both given and known.
-    #[error("expected a model taught without a camera, found one that knows that its part is {known_mm:.1} mm long")]
+    #[error("expected a model taught without a camera, found one whose part is {known_mm:.1} mm long")]
     LengthIsKnown { known_mm: f64 },
 }
 

@@ -10,7 +10,8 @@ pub fn too_wide(model: &GraspModel) -> Option<String> {
     let widest = model.demonstrations().iter().map(|taught| taught.marks.width_px / pixels_per_m).fold(0.0, f64::max);
     (widest > HAND_OPENING_MAX_M).then(|| {
         format!(
-            "the marked jaws open {:.0} mm, and the hand {:.0} mm at most: mark the grasp where the part is narrower, or turn it",
+            "the marked jaws open {:.0} mm, and the hand {:.0} mm at most: mark the grasp where the part is narrower, \
+             or rotate it",
             1e3 * widest,
             1e3 * HAND_OPENING_MAX_M
         )

@@ -141,7 +141,7 @@ fn teaching() -> Section {
         .series(Series::new("median", every(&degrees)).with_markers())
         .limit(10.0, "limit 10°")
         .moment(275.0, "kept")
-        .caption("On 64 held-back augmentations.");
+        .caption("On 64 held-out augmentations.");
     let found = Chart::new("Validation: found", Axis::new("step"), Axis::new("share").unit("%").from_zero())
         .series(
             Series::new(

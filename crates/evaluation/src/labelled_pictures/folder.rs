@@ -144,7 +144,7 @@ fn assign(folder: &Path, left_out: &mut Vec<LeftOut>) -> Result<Assigned> {
         );
     }
     for picture in pictures.iter().filter(|picture| !assigned.pictures.contains_key(picture.as_path())) {
-        left_out.push(LeftOut { file: file_name(picture), why: "no label file speaks of it".to_owned() });
+        left_out.push(LeftOut { file: file_name(picture), why: "no label file names it".to_owned() });
     }
     Ok(assigned)
 }

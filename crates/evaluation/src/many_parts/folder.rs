@@ -54,8 +54,8 @@ impl DemonstrationFolder {
             };
             match found.get_mut(&name) {
                 Some(known) if is_own_part => bail!(
-                    "{}: expected one part of each name, found \"{name}\" in {}, too; several photos of a part go into a folder of \
-                     its name",
+                    "{}: expected one part of each name, found \"{name}\" also in {}; put several photos of a part \
+                     into a folder of its name",
                     photo.display(),
                     known.files[0].0.display()
                 ),

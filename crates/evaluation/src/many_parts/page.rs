@@ -38,7 +38,10 @@ pub fn page(findings: &Findings, photos: &[RgbImage], command: &str) -> Report {
             table = table.row(vec![Cell::text(name.clone()), Cell::text(why.clone())]);
         }
         section
-            .lead("Take the part in another light or place, on a plain background, and mark it as before.")
+            .lead(
+                "Photograph the part in other light or in another place, on a plain background, and mark it as \
+                   before.",
+            )
             .table(table)
     });
     report
@@ -52,7 +55,7 @@ fn count(count: usize, what: &str) -> KeyFigure {
 }
 
 fn look_alikes(findings: &Findings, photos: &[RgbImage]) -> Section {
-    let section = Section::new("Which look alike");
+    let section = Section::new("Look-alikes");
     if findings.look_alikes.is_empty() {
         return section.paragraph("No model accepts another part's photo.");
     }
@@ -78,8 +81,10 @@ fn look_alikes(findings: &Findings, photos: &[RgbImage]) -> Section {
         _ => "The most alike first.".to_owned(),
     };
     section
-        .lead("Scores from 0.5 on are accepted. Two names for one part, or parts that only a mark tells apart: put the mark into the photo, \
-               or give each its own place.")
+        .lead(
+            "Scores from 0.5 on are accepted. Two parts may be the same part with two names, or may differ only in \
+               a mark: include the mark in the photo, or keep each part in its own place.",
+        )
         .captioned_gallery(GallerySize::Large, figures, caption)
         .table(table)
 }
@@ -88,11 +93,11 @@ fn all_parts(findings: &Findings, photos: &[RgbImage]) -> Section {
     let mut table = Table::new(vec![
         Column::text("part"),
         Column::number("teaching").unit("s"),
-        Column::text("found").group("held-back samples"),
-        Column::number("wrong").group("held-back samples"),
-        Column::text("false alarms").group("held-back samples"),
-        Column::number("median").unit("px").group("held-back samples"),
-        Column::number("median").unit("°").group("held-back samples"),
+        Column::text("found").group("held-out samples"),
+        Column::number("wrong").group("held-out samples"),
+        Column::text("false alarms").group("held-out samples"),
+        Column::number("median").unit("px").group("held-out samples"),
+        Column::number("median").unit("°").group("held-out samples"),
         Column::number("own photo").group("score"),
         Column::number("most alike").group("score"),
         Column::text("which"),
@@ -120,7 +125,10 @@ fn all_parts(findings: &Findings, photos: &[RgbImage]) -> Section {
         table = table.row(row);
     }
     Section::new("Every part")
-        .lead("On samples made of its photos that nothing was taught with. The most alike is the other photo on which its model has its best score.")
+        .lead(
+            "On held-out samples of the part's photos. The most similar photo is the other part's photo on which \
+               the model has its best score.",
+        )
         .table(table)
         .gallery(GallerySize::Small, photos_of_parts(findings, photos))
 }

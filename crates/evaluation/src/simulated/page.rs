@@ -17,8 +17,8 @@ pub fn page(summaries: &[Summary], store: &Store, facts: &[(&str, String)], comm
     let parts: usize = summaries.iter().map(|summary| summary.cells.len() / summary.models.len().max(1)).sum();
     let letters = summaries.first().into_iter().flat_map(|summary| &summary.models).map(|model| model.model.letter());
     let mut report = Report::new("Every model on every part").kicker("Evaluation in simulation").lead(format!(
-        "Models: {}. Parts: {parts}. Each model was taught each part from one photo, and then looked for it and grasped it \
-         in poses that it had not seen.",
+        "Models: {}. Parts: {parts}. Each model was taught each part from one photo, and then searched for it and \
+         grasped it in unseen poses.",
         letters.collect::<Vec<_>>().join(", ")
     ));
     for summary in summaries {
@@ -85,7 +85,7 @@ fn plots(summary: &Summary, section: Section) -> Section {
         matrix.row(object.replace('_', " "), counts(cells.map(|cell| &cell.verified)))
     });
     section
-        .lead("With the check against the demonstration; the tables below give the numbers, and those without it.")
+        .lead("With the check against the demonstration; the tables below also have the numbers without it.")
         .shares(shares)
         .matrix(by_model)
         .matrix(by_part)

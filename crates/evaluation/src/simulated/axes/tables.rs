@@ -111,9 +111,8 @@ fn found(group: &GroupSummary, way: Way) -> (String, String, Table) {
         table = table.row(row);
     }
     let lead = format!(
-        "Share of the part's instances that were found within {RIGHT_MM:.0} mm and {RIGHT_DEGREES:.0}°, in percent, with \
-         Wilson's 95 % interval. Where there is one instance, the best detection alone counts; three instances are found one \
-         to one. Each axis has pictures of its own, the same for every model; nothing tells a model how high the camera is."
+        "Instances of the part that were found within {RIGHT_MM:.0} mm and {RIGHT_DEGREES:.0}°, in percent, with \
+         Wilson's 95 % interval. With one instance, only the best detection counts; three instances are matched one to one. Each axis has its own pictures, the same for every model. The models do not know the camera's height."
     );
     (format!("found, {}", way.name()), lead, table)
 }
@@ -137,9 +136,10 @@ fn thirds(group: &GroupSummary) -> (String, String, Table) {
             table = table.row(row);
         }
     }
-    let lead = "With the check, in the first, the middle and the last third of each axis' pictures, in which the axis changes \
-                more and more: height in shares of the usual one, tilt in degrees, covered in shares of the part, dark in shares \
-                of the usual light, blur in pixels; the parameters of the others are counts or ratios.";
+    let lead = "With the check, in the first, the middle and the last third of each axis' pictures, along which the \
+                difficulty increases: height relative to the usual one, tilt in degrees, covered as a fraction of the \
+                part, dark as a fraction of the usual light, blur in pixels; the parameters of the other axes are \
+                counts or ratios.";
     ("found, by how much the axis changes".to_owned(), lead.to_owned(), table)
 }
 
@@ -158,7 +158,7 @@ fn lowest_parts(group: &GroupSummary) -> (String, String, Table) {
         }
         table = table.row(row);
     }
-    ("the part found least often".to_owned(), "Instances found of the part with the lowest share.".to_owned(), table)
+    ("the part found least often".to_owned(), "Instances found of the part with the lowest fraction.".to_owned(), table)
 }
 
 fn wrong(group: &GroupSummary) -> (String, String, Table) {
@@ -177,8 +177,8 @@ fn wrong(group: &GroupSummary) -> (String, String, Table) {
         }
         table = table.row(row);
     }
-    let lead = "Detections that were accepted (score 0.5 and above) and not right: beside the part, turned against it, or \
-                elsewhere. Where there is one instance at most one a picture.";
+    let lead = "Accepted detections (score 0.5 and above) that are not correct: beside the part, rotated relative to \
+                it, or elsewhere. With one instance, there is at most one per picture.";
     ("wrong detections".to_owned(), lead.to_owned(), table)
 }
 
@@ -201,8 +201,8 @@ fn errors(group: &GroupSummary) -> (String, String, Table) {
             table = table.row(row);
         }
     }
-    let lead = "Median and nine tenths of all accepted detections' distances to the truth on the table and of their turns, \
-                right or not; turns that a part's symmetry hides do not count.";
+    let lead = "Median and 90th percentile of the position errors on the table and of the angle errors of all \
+                accepted detections, correct or not, modulo the part's symmetry.";
     ("errors of detections".to_owned(), lead.to_owned(), table)
 }
 
@@ -230,10 +230,10 @@ fn look_alikes(group: &GroupSummary) -> (String, String, Table) {
         }));
         table = table.row(row);
     }
-    let lead = "Pictures in which another part that resembles the taught one lies in its place, and how often it was \
-                accepted: lower is better. Sums in percent, with Wilson's 95 % interval. What differs in size alone cannot be \
-                told in a picture without a camera, so the two sums stand apart.";
-    ("look-alikes taken for the part".to_owned(), lead.to_owned(), table)
+    let lead = "Pictures in which a similar part replaces the taught one, and how often it was accepted: lower is \
+                better. Sums in percent, with Wilson's 95 % interval. A difference in size alone \
+                is not visible without a calibrated camera, so there are two sums.";
+    ("look-alikes accepted as the part".to_owned(), lead.to_owned(), table)
 }
 
 fn grasps(group: &GroupSummary) -> (String, String, Table) {
@@ -260,9 +260,9 @@ fn grasps(group: &GroupSummary) -> (String, String, Table) {
         ]);
     }
     let lead = "Grasp attempts with the check, the same scenes and robot starts under every error. Held at the first look: the \
-                part was found in the first picture from the look-out pose and in the first from above it. After further \
-                looks: the camera was moved and looked again at least once. The last column is the median and nine tenths of \
-                the last detection's distance to the truth, as the robot computes it.";
+                part was found in the first picture from the look-out pose and in the first from above it. After \
+                further looks: the camera was moved for at least one further picture. The last column is the median \
+                and the 90th percentile of the last detection's position error, as the robot computes it.";
     ("grasps under errors".to_owned(), lead.to_owned(), table)
 }
 
@@ -336,17 +336,16 @@ fn share_of(parts: &[PartShare], object: &str) -> Option<Share> {
 }
 
 fn quantities_from_simulator() -> Titled {
-    let mut table = Table::new(vec![
-        Column::text("what"),
-        Column::text("where it comes from"),
-        Column::text("measured with an error"),
-    ]);
+    let mut table =
+        Table::new(vec![Column::text("quantity"), Column::text("source"), Column::text("measured with an error")]);
     for row in known_from_simulator() {
         table = table.row([row.what, row.source, row.error].map(Cell::text).into());
     }
     Titled {
         title: "Quantities that the robot gets from the simulator".to_owned(),
-        lead: "Everything that the simulated robot knows exactly and a real one would have to measure.".to_owned(),
+        lead: "Quantities that the simulated robot knows exactly and that would have to be measured for a real \
+               one."
+            .to_owned(),
         table,
     }
 }
@@ -467,7 +466,7 @@ mod tests {
         let text = markdown(&summary(2), Vec::new(), &[], "");
         let row = "| hand-eye wrong by 2 mm and 0.5° | C | 18 of 20 | 90.0 (69.9 to 97.2) | 15 of 20 | 3 of 20 |";
         assert!(text.contains(row), "{text}");
-        assert!(text.contains("camera intrinsics") && text.contains("height of the marks over the table"), "{text}");
+        assert!(text.contains("camera intrinsics") && text.contains("height of the marks above the table"), "{text}");
         assert!(text.contains("**Not complete: 2 units"), "{text}");
     }
 }

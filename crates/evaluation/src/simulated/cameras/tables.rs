@@ -11,17 +11,17 @@ pub fn tables(summary: &CamerasSummary) -> Vec<Titled> {
     vec![
         Titled {
             title: "By set of pictures".into(),
-            lead: "Taught from the wrist camera's photo in its plan view. Webcam, phone and overhead are other cameras with \
-                   lenses, heights and tilts to 25 degrees of their own; the other sets are the wrist camera's, harder along \
-                   an axis; in other-sizes a part of 0.8, 0.9, 1.1 or 1.25 times the size lies there, which is to be refused. \
-                   Errors are of what was found, in the marks' plane; within sigma: how many lie within what the detection \
-                   itself gave for 68 %."
+            lead: "Taught from the wrist camera's photo in its plan view. Webcam, phone and overhead are other \
+                   cameras with their own lenses and heights, and tilts up to 25 degrees. The other sets are pictures \
+                   of the wrist camera along an axis of difficulty; in other-sizes, the part is replaced by one of \
+                   0.8, 0.9, 1.1 or 1.25 times its size, which must be refused. Errors are those of found instances, \
+                   in the marks' plane; within sigma: errors below the value that the detection itself gives for 68 %."
                 .into(),
             table: table(&summary.sets, None),
         },
         Titled {
             title: "By the part's height".into(),
-            lead: format!("Low parts have their marks at most {:.0} mm over the table.", 1e3 * HIGH_M),
+            lead: format!("The marks of low parts are at most {:.0} mm above the table.", 1e3 * HIGH_M),
             table: table(&summary.by_height, Some("parts")),
         },
         Titled {

@@ -50,7 +50,7 @@ pub fn faults(evaluation: &Evaluation, units: &[ListedUnit]) -> Result<Vec<Strin
 
 fn why_missing(state: &UnitState) -> String {
     match (&state.running, state.failures.last()) {
-        (Some(running), _) if !state.is_abandoned => format!("still at work on {}", running.by),
+        (Some(running), _) if !state.is_abandoned => format!("still running on {}", running.by),
         (Some(running), _) => format!("missing: {} ended without a result", running.by),
         (None, Some(failure)) => format!(
             "missing: failed {} on {}: {}",

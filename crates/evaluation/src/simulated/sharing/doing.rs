@@ -50,7 +50,7 @@ impl Evaluation<'_> {
         let mut wait = || {
             if !is_told {
                 is_told = true;
-                told(&format!("{name}: at work elsewhere{}; waiting for its end", holder_text(&folder)));
+                told(&format!("{name}: running in another process{}; waiting for its end", holder_text(&folder)));
             }
             !is_interrupted()
         };
@@ -91,7 +91,7 @@ impl Evaluation<'_> {
                 let failure = Failure { unit: name.clone(), by, started_secs, seconds, why: one_line(&error) };
                 Err(match folder.fail(&failure) {
                     Ok(()) => error.context(name.clone()),
-                    Err(also) => anyhow!("{name}: {}; nor can that be recorded: {}", failure.why, one_line(&also)),
+                    Err(also) => anyhow!("{name}: {}; and this cannot be recorded: {}", failure.why, one_line(&also)),
                 })
             }
         }
@@ -112,8 +112,8 @@ impl Evaluation<'_> {
         for before in &unit.after {
             if UnitFolder::of(folder, before).read()?.receipts.is_empty() {
                 bail!(
-                    "expected {before} to be done before, found no receipt of it in {}; if it is done, this folder is not the one \
-                     where it was done: is it shared between the machines?",
+                    "expected {before} to be done before, found no receipt of it in {}; if it was done, it was done \
+                     in another folder: check that all machines use the same one",
                     folder.display()
                 );
             }

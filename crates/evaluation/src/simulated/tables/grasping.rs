@@ -37,10 +37,10 @@ pub(super) fn success(summary: &Summary) -> Titled {
         ]);
     }
     let lead = format!(
-        "Table II of the paper: {} grasp attempts on each part from random poses, robot starts, lights and things lying \
-         about, the same for every model. Held means hanging between both fingers one second after lifting. The interval \
+        "Table II of the paper: {} grasp attempts on each part from random poses, robot starts, lights and other \
+         objects, the same for every model. Held means: between both fingers one second after lifting. The interval \
          is Wilson's. At the first look: found in the first picture from the look-out pose and in the first from above it; \
-         otherwise the camera was moved and looked again.",
+         otherwise the camera was moved for a further picture.",
         summary.settings.attempts
     );
     Titled { title: "Success".to_owned(), lead, table }

@@ -33,11 +33,10 @@ pub(super) fn accuracy(summary: &Summary) -> Titled {
         }
     }
     Titled {
-        title: "Detection against the truth".to_owned(),
+        title: "Detection errors".to_owned(),
         lead: format!(
             "{} unseen pictures of each part from the look-out pose. Right: found within {RIGHT_MM:.0} mm and \
-             {RIGHT_DEGREES:.0}°. Errors are of all that was found, right or not; turns that a part's symmetry hides do \
-             not count. \"alone\": without the check against the demonstration.",
+             {RIGHT_DEGREES:.0}°. Errors are those of all accepted detections, right or not, modulo the part's symmetry. \"alone\": without the check against the demonstration.",
             summary.settings.views
         ),
         table,
@@ -59,8 +58,8 @@ pub(super) fn false_alarms(summary: &Summary) -> Titled {
     Titled {
         title: "Pictures without the part".to_owned(),
         lead: format!(
-            "{} pictures for each part with unseen things and others made to resemble parts; in every second one lies \
-             another shipped part, too.",
+            "{} pictures for each part with unseen objects, some of which resemble parts; every second picture also \
+             has another shipped part.",
             summary.settings.scenes
         ),
         table,

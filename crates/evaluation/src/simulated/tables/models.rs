@@ -42,11 +42,11 @@ pub(super) fn costs(summary: &Summary) -> Titled {
     });
     let mut lead = "Table II of the paper. Samples and teaching are medians over the parts".to_owned();
     if let Some(jobs) = jobs.filter(|jobs| *jobs > 1) {
-        lead += &format!(", each teaching with {jobs} units of work side by side on the same cores");
+        lead += &format!(", each teaching with {jobs} units of work in parallel on the same cores");
     }
     lead += &format!(
-        "; images a second are verified ones, with the machine to itself. The paper's times and speeds are a GTX 1080 \
-         Ti's; on a CPU its model C reaches {} images a second.",
+        "; images per second are with the check, without other load on the machine. The paper's times and speeds are \
+         for a GTX 1080 Ti; on a CPU its model C reaches {} images per second.",
         paper::CPU_FRAMES_PER_SECOND
     );
     if let Some(shared) = shared_networks(summary) {
@@ -83,8 +83,8 @@ pub(super) fn models(summary: &Summary) -> Titled {
     Titled {
         title: "Models".to_owned(),
         lead: format!(
-            "Table I of the paper. Preset {}; networks of preset edge start from weights pretrained on generated parts. A drawn \
-             outline is also what the check lays over the image.",
+            "Table I of the paper. Preset {}; networks of preset edge start from weights pretrained on generated \
+             parts. The check also uses a drawn outline.",
             summary.settings.preset
         ),
         table,
@@ -117,7 +117,7 @@ pub(super) fn not_taught(summary: &Summary) -> Titled {
     }
     Titled {
         title: "Not taught".to_owned(),
-        lead: "Teachings that led to no model. All their attempts count as failed.".to_owned(),
+        lead: "Teachings that gave no model. All their attempts count as failed.".to_owned(),
         table,
     }
 }
