@@ -6,7 +6,7 @@
 //! CollisionModel ─> Checker ────┘                                      approach ──┘
 //! ```
 //!
-//! The planner has no clock: a search ends after a number of collision checks, and gives the same plan on every
+//! The planner has no clock: a search ends after a number of collision checks, so the plan is the same on every
 //! machine.
 
 mod corners;
