@@ -115,10 +115,10 @@ pub fn outcome_matrix(steps: &[&str], attempts: &[AttemptSummary], right_mm: f64
         counts[seen(attempt)][ended] += 1;
     }
     let columns = steps.iter().copied().chain(["held"]);
-    let labels = ["detected correctly".to_owned(), "detected beside it".to_owned(), "not detected".to_owned()];
+    let labels = ["correct".to_owned(), "wrong".to_owned(), "not detected".to_owned()];
     let matrix = Matrix::new("Last detection, and step at which the attempt ended", columns).good_column(steps.len());
     labels.into_iter().zip(counts).fold(matrix, |matrix, (label, counts)| matrix.row(label, counts)).caption(format!(
-        "Detected correctly: the last detection is within {right_mm:.0} mm and {right_deg:.0}° of the ground truth. A \
+        "Correct: the last detection is within {right_mm:.0} mm and {right_deg:.0}° of the ground truth. A \
          failure in the first row is due to the robot, in the others to perception."
     ))
 }
@@ -157,13 +157,7 @@ mod tests {
         )
         .to_html();
         assert_well_formed(&html);
-        assert!(
-            html.contains(
-                "detected correctly: lift 1, held 1. detected beside it: close 1. not detected: detect \
-                               1."
-            ),
-            "{html}"
-        );
+        assert!(html.contains("correct: lift 1, held 1. wrong: close 1. not detected: detect 1."), "{html}");
     }
 
     #[test]

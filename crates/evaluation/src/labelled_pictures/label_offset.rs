@@ -2,7 +2,7 @@
 //! labels.
 //!
 //! ```text
-//! detections that hit nothing ─ the nearest label that was not found ─ offset in the label's frame, in diagonals, and turn
+//! detections without a hit ─ the nearest label that was not found ─ offset in the label's frame, in diagonals, and angle
 //!                                                                        └─ most of them alike? ─ LabelOffset
 //! ```
 

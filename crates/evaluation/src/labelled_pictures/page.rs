@@ -187,7 +187,7 @@ fn table(evaluated: &Evaluated, judged: &[Judged], order: &[usize]) -> Table {
         Column::number("best score"),
         Column::number("place").unit("px").group("largest error"),
         Column::number("place").unit("%").group("largest error"),
-        Column::number("turn").unit("°").group("largest error"),
+        Column::number("angle").unit("°").group("largest error"),
         Column::number("time").unit("s"),
     ]);
     for &at in order {

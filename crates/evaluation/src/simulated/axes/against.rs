@@ -161,7 +161,7 @@ pub fn difference_tables(comparisons: &[RunDifference], against: &str) -> Vec<Ti
             (!rows.is_empty()).then(|| Titled {
                 title: format!("{}: against {against}", group.title()),
                 lead: "Both runs on the same pictures; right is an instance found or a look-alike refused. The interval of \
-                       the difference is Newcombe's for paired shares (1998, method 10), 95 %: a difference is shown if it \
+                       the difference is Newcombe's for paired fractions (1998, method 10), 95 %: a difference is shown if it \
                        excludes zero. Cases needed: number of cases that shows a difference of this size with 80 % power at the 5 % \
                        level, two-sided, by McNemar's test (Connor, 1987). Instances of one picture are counted as if they \
                        were independent."

@@ -42,9 +42,9 @@ fn table(rows: &[SetFigures], of: Option<&str>) -> Table {
         Column::number("median").unit("mm").group("place"),
         Column::number("95 %").unit("mm").group("place"),
         Column::text("within sigma").group("place"),
-        Column::number("median").unit("°").group("turn"),
-        Column::number("95 %").unit("°").group("turn"),
-        Column::text("within sigma").group("turn"),
+        Column::number("median").unit("°").group("angle"),
+        Column::number("95 %").unit("°").group("angle"),
+        Column::text("within sigma").group("angle"),
     ]);
     let mut table = Table::new(columns);
     for row in rows {

@@ -14,8 +14,8 @@ pub(super) fn accuracy(summary: &Summary) -> Titled {
         Column::number("right").unit("%"),
         Column::number("median").unit("mm").group("place"),
         Column::number("90 %").unit("mm").group("place"),
-        Column::number("median").unit("°").group("turn"),
-        Column::number("90 %").unit("°").group("turn"),
+        Column::number("median").unit("°").group("angle"),
+        Column::number("90 %").unit("°").group("angle"),
         Column::number("images a second"),
     ]);
     for model in &summary.models {

@@ -72,8 +72,8 @@ pub(super) fn models(summary: &Summary) -> Titled {
         Column::text("model"),
         Column::text("network").group("place"),
         Column::text("output").group("place"),
-        Column::text("network").group("turn"),
-        Column::text("method").group("turn"),
+        Column::text("network").group("angle"),
+        Column::text("method").group("angle"),
         Column::text("human input"),
     ]);
     for model in &summary.models {
@@ -101,7 +101,7 @@ fn description(model: ModelKind) -> [&'static str; 5] {
         }
         ModelKind::D => ["Mask R-CNN", "mask", "the same", "mask and SIFT", "outline, grasp line"],
         ModelKind::S => {
-            ["none", "place and turn", "none", "demonstration searched for over all poses", "outline, grasp line"]
+            ["none", "position and angle", "none", "demonstration searched for over all poses", "outline, grasp line"]
         }
     }
 }
