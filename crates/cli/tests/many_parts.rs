@@ -17,7 +17,7 @@ fn demonstrations(folder: &Folder) -> String {
     };
     copy("pendulum", "lever.png");
     copy("rod_end", "rod_end.png");
-    // Several photos of one part are in a folder with its name.
+    // Several photos of one part are in a folder that has its name.
     copy("pendulum", "twin/first.png");
     fs::copy(shipped("key", "image.png"), Path::new(&demos).join("unmarked.png")).unwrap();
     demos
@@ -52,7 +52,7 @@ fn parts_that_look_alike_are_told() {
     for part in ["lever", "rod_end", "twin"] {
         assert!(page.contains(&format!("{part}: ")), "{part}");
     }
-    // Existing models are reused with their times; with another seed they would not be.
+    // Existing models are reused with their times; with another seed they are taught again.
     assert_eq!(record("twin"), twin);
     let text = stdout(&["teach", "--model", "S", "--demos", &demos, "--out", &out]);
     assert!(text.contains("look alike: lever and twin"), "{text}");

@@ -38,7 +38,7 @@ fn a_path_leads_around_the_wall_and_is_told_and_drawn() {
     assert!(gif.starts_with(b"GIF89a") && gif.len() > 20_000, "{} bytes", gif.len());
     assert!(Path::new(&out).join("plan.png").exists());
 
-    // The printed path, followed in MuJoCo, ends at the goal and touches nothing.
+    // The printed path, followed in MuJoCo, ends at the goal without any contact.
     let plan: Value = serde_json::from_slice(&output.stdout).unwrap();
     let joints = |value: &Value| {
         let degrees: Vec<f64> = serde_json::from_value(value.clone()).unwrap();
