@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! Address ── open ── Source: V4L2 node, HTTP, program, folder ── Reconnecting ── Watched ── Box<dyn Camera>
-//!                    pictures of one connection                  opens again     Frame.faults   │
+//!                    pictures of one connection                  reconnects      Frame.faults   │
 //!                                                                                  LatestFrame ─┘ a thread; newest frame only
 //! MjpegServer: pictures out, to browsers on this computer
 //! ```

@@ -1,8 +1,8 @@
 //! Perception as the sequence of an arm uses it.
 //!
 //! ```text
-//! Pictures ─ picture, when it was taken ─ Perception over the table ─ poses in the robot's base ─ GraspTarget
-//! Arm ─ state ─ place of a camera on the hand ──────┘
+//! Pictures ─ picture and its time ──────────── Perception ─ poses in the robot's base ─ GraspTarget
+//! Arm ─ state ─ pose of a camera on the hand ──────┘
 //! ```
 
 use std::ops::RangeInclusive;

@@ -2,8 +2,8 @@
 //!
 //! ```text
 //! frame ─ LiveTracker::frame ─ Tracker: follow ─────────────────────────── TrackedPart…
-//!                                │ search due ─ channel ─ search thread ─ channel ─ taken before the next frame
-//!                                └ the frame does not follow from the one before: searched here, before it is answered
+//!                                │ search due ─ channel ─ search thread ─ channel ─ result used before the next frame
+//!                                └ not continuous with the previous frame: searched at once, on the caller's thread
 //! ```
 //! So a frame waits for at most one search, while another search may run on the search thread.
 //!

@@ -1,9 +1,9 @@
 //! Measures the height of the surface beside a part from two pictures.
 //!
 //! ```text
-//! outline of the part ─ windows around it, the nearest first, except where the part hides them from a camera
-//! window ─ at each height: both pictures resampled there ─ correlation ─ the height of its one clear maximum
-//! heights of the windows ─ the highest one that many windows all around the part share ─ SurfaceHeight
+//! outline of the part ─ windows around it, the nearest first, without those that the part hides from a camera
+//! window ─ at each height: both pictures resampled there ─ correlation ─ the height of the only clear maximum
+//! heights of the windows ─ the highest that many windows on all sides have in common ─ SurfaceHeight
 //! ```
 //! The part's own edges are anywhere between its bottom and its top, and the edges that match between two pictures
 //! depend on the view. The surface beside it is a single plane, together with the grain, scratches, shadows and edges

@@ -1,9 +1,9 @@
 //! The comparison network: does a picture show the part of a demonstration at the model's pose?
 //!
 //! ```text
-//! demonstration, outline ─ upright, S×S ───────────────┐
-//!                                                      ├─ maps, cosines, differences ─ convolutions ─ log-odds
-//! picture, pose ─ turned upright by the pose, S×S ─────┘
+//! demonstration, outline ─ upright, S×S ────────────────┐
+//!                                                       ├─ maps, cosines, differences ─ convolutions ─ log-odds
+//! picture, pose ─ rotated upright by the pose, S×S ─────┘
 //! ```
 //!
 //! Both are cropped by the pose, so that the same point of the part is at the same pixel of both, and the network only

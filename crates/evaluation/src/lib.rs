@@ -3,11 +3,11 @@
 //!
 //! ```text
 //! LabelledFolder ─ Tested ─ judge ─ Totals                 the user's own pictures            labelled_pictures
-//! TaughtFile ─ HeldBackFigures                             samples that nothing was taught on  held_back
-//! SplitSet ─ ReadySet ─ Measured                           sets to tune on, sets to report     split
-//! DemonstrationFolder ─ CrossCheck ─ Findings              many parts against each other       many_parts
+//! TaughtFile ─ HeldBackFigures                             samples not used in teaching       held_back
+//! SplitSet ─ ReadySet ─ Measured                           sets to tune on, sets to report    split
+//! DemonstrationFolder ─ CrossCheck ─ Findings              many parts, for look-alikes        many_parts
 //! feature simulation:
-//! Rehearsal ─ attempts of a simulated arm, with the finder that a real arm has                 rehearsal
+//! Rehearsal ─ attempts of a simulated arm, found as with a real one       rehearsal
 //! Evaluation, AxesEvaluation, CamerasEvaluation ─ units ─ Store ─ Summary ─ tables, page       simulated
 //! ```
 //!

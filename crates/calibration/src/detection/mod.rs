@@ -2,8 +2,8 @@
 //!
 //! ```text
 //! picture ─ halved until no board is missed ─ saddle points ─ grid grown from neighbour to neighbour   saddle.rs, grid.rs
-//!         ─ dots read, place and turn on the board ─ corners refined at full resolution                dots.rs, refine.rs
-//!         ─ refused where corners are no plane's or squares not even                                   acceptance.rs
+//!         ─ dots read: position and rotation on the board ─ corners refined at full resolution         dots.rs, refine.rs
+//!         ─ rejected if the corners are not in a plane or the squares are unequal                      acceptance.rs
 //! ```
 //! A grid is extended from its last steps, so that distortion and perspective need not be known. The first pixel's
 //! centre is at (0.5, 0.5).

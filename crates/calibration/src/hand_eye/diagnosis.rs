@@ -1,10 +1,10 @@
 //! Robot poses that contradict the pictures: finds the mistake that explains the contradiction.
 //!
 //! ```text
-//! robot errors small, board's size as given ─ no question
-//!   ├─ board's size a parameter: falls the robot's error by much, and is the size another? ─ OtherBoardScale
-//!   └─ robot errors suspect ─ other readings of all poses    readings.rs, euler.rs ─ HandEyeDisagrees
-//!                           ─ a few poses wrong, exchanged   mixed_up.rs           ─ WrongPoses
+//! robot errors small, board's size as given ─ accepted
+//!   ├─ board's size estimated too: much smaller robot errors with another size ─ OtherBoardScale
+//!   └─ robot errors too large ─ all poses read in another way    readings.rs, euler.rs ─ HandEyeDisagrees
+//!                             ─ a few poses wrong or exchanged   mixed_up.rs           ─ WrongPoses
 //! ```
 //! Of several explanations, the one with the smallest residual is used; among equal ones, the simplest.
 

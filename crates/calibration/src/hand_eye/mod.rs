@@ -10,8 +10,8 @@
 //!
 //! ```text
 //! boards' poses ─ A_ij X = X B_ij in closed form ─ reprojection over all pictures minimised in X and Y   closed_form.rs, bundle.rs
-//!               ─ robot poses that are off: their errors estimated with X and Y ─ one left out at a time
-//! poses that contradict the pictures ─ readings of all, a few that are wrong, the board's size        diagnosis.rs, readings.rs, mixed_up.rs
+//!               ─ inaccurate robot poses: their errors estimated with X and Y ─ one left out at a time
+//! poses that contradict the pictures ─ another reading of all, a few wrong ones, the board's size     diagnosis.rs, readings.rs, mixed_up.rs
 //! ```
 //! A robot's pose has an error far above a pixel: 0.05 degrees at 0.5 m are 0.4 mm. If the reprojection error shows
 //! this, each robot pose gets six corrections, whose squares are weighted relative to the squared pixels.

@@ -1,8 +1,8 @@
 //! Estimates a camera's focal length, centre and lens from pictures of the board.
 //!
 //! ```text
-//! corners ─ homographies ─ focal length in closed form ─ poses ─ Levenberg–Marquardt over everything
-//!         ─ pictures that disagree with the others left out, one by one ─ errors, coverage
+//! corners ─ homographies ─ focal length in closed form ─ poses ─ Levenberg–Marquardt over all parameters
+//!         ─ pictures that contradict the others left out one by one ─ errors, coverage
 //! ```
 //! The lens has k1, k2, p1, p2, and k3 if requested: with fewer than about twenty pictures, noise determines k3.
 //!

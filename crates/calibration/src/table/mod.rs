@@ -1,8 +1,8 @@
 //! The camera's pose from one picture of the sheet on the table.
 //!
 //! ```text
-//! corners ─┬─ with intrinsics: the pose that minimises reprojection, its errors        sheet_pose.rs
-//!          └─ without: homography, focal length if the tilt determines it, else a guess  focal.rs
+//! corners ─┬─ intrinsics known: the pose with the smallest reprojection error, and its uncertainty   sheet_pose.rs
+//!          └─ unknown: homography; the focal length if the tilt determines it, else a guess          focal.rs
 //! ```
 //! A homography alone gives positions on the table. Positions above the table depend on the focal length; [`FocalCost`]
 //! states how much.

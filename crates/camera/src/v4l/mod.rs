@@ -1,7 +1,7 @@
 //! Cameras of Video4Linux 2, with the crate `linuxvideo`: Linux only.
 //!
 //! ```text
-//! /dev/video* ── nodes: what each offers ── choice: encoding and size ── stream: buffers to pictures
+//! /dev/video* ── nodes: formats of each ── choice: encoding and size ── stream: buffers to pictures
 //! ```
 //! The driver's frame counter and timestamps are not accessible: frames are numbered when they are read, and have the
 //! time at which they were read.

@@ -3,7 +3,7 @@
 //!
 //! ```text
 //! detections without a hit ─ the nearest label that was not found ─ offset in the label's frame, in diagonals, and angle
-//!                                                                        └─ most of them alike? ─ LabelOffset
+//!                                                                        └─ most of them equal? ─ LabelOffset
 //! ```
 
 use nalgebra::{Rotation2, Vector2};

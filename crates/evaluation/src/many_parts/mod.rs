@@ -2,8 +2,8 @@
 //! results are one page.
 //!
 //! ```text
-//! DemonstrationFolder ─ PartDemonstrations ─ teach ─ PartStore ─┬─ CrossCheck: each model on every other's photo
-//!                                                               └─ findings: look alike, need another photo ─ page
+//! DemonstrationFolder ─ PartDemonstrations ─ teach ─ PartStore ─┬─ CrossCheck: each model on every other part's photo
+//!                                                               └─ findings: parts that look alike or need another photo ─ page
 //! OUT/models/NAME.sdg   OUT/parts/NAME.json   OUT/index.html
 //! ```
 //!

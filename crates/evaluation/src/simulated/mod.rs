@@ -2,10 +2,10 @@
 //! tables.
 //!
 //! ```text
-//! Evaluation ─ units ─ Queue ─ workers (a share of the cores each) ─ Store: a file for every unit, as it ends
-//!                                                                      │
-//!                              Speed, alone on all cores ──────────────┤
-//!                                                                      └─ Summary ─ tables: Markdown, JSON, page
+//! Evaluation ─ units ─ Queue ─ workers (the cores divided among them) ─ Store: a file for every finished unit
+//!                                                                         │
+//!                              Speed, alone on all cores ─────────────────┤
+//!                                                                         └─ Summary ─ tables: Markdown, JSON, page
 //! ```
 //!
 //! A **network** is taught; models B and C are two readings of one network. A **unit** is a piece of work that is

@@ -3,9 +3,9 @@
 //! ```text
 //! DIR/settings.json
 //! DIR/models/C-pendulum.sdg                   the taught network
-//! DIR/cells/C-pendulum.teaching.json          how its teaching ended
+//! DIR/cells/C-pendulum.teaching.json          result of teaching
 //! DIR/cells/C-pendulum.look.json              unseen pictures, with the part and without
-//! DIR/cells/C-pendulum.attempts-verified.json attempts, rewritten as each ends
+//! DIR/cells/C-pendulum.attempts-verified.json attempts, rewritten after each
 //! DIR/pictures/C-pendulum.png                 one of those pictures, for the page
 //! DIR/axes/C-pendulum.tilt.json               pictures of an axis
 //! DIR/axes/C-pendulum.attempts-shake.json     attempts under an error

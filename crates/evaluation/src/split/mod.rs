@@ -2,9 +2,9 @@
 //! the same way.
 //!
 //! ```text
-//! split file ─ SplitSet ─ ReadySet: demonstration, truth ─ teach, detect ─ SetRun ─ Measured: of one model, all seeds
-//!                                                                                      │
-//!                                                    tables, JSON, a line a candidate ─┘
+//! split file ─ SplitSet ─ ReadySet: demonstration, ground truth ─ teach, detect ─ SetRun ─ Measured: one model, all seeds
+//!                                                                                             │
+//!                                                       tables, JSON, one line per candidate ─┘
 //! ```
 //!
 //! A **side** is one of tuned, used and reported. **Wrong** is the fraction of detections without a hit among all

@@ -2,8 +2,8 @@
 //!
 //! ```text
 //! start ────────────────────────┐
-//! goal poses ─> configurations ─┼─> RRT-Connect ─> shorter way ─> round corners ─> Plan ─> trajectories
-//! CollisionModel ─> Checker ────┘                                      approach ──┘
+//! goal poses ─> configurations ─┼─> RRT-Connect ─> shortcuts ─> round corners ─> Plan ─> trajectories
+//! CollisionModel ─> Checker ────┘                                    approach ──┘
 //! ```
 //!
 //! The planner has no clock: a search ends after a number of collision checks, so the plan is the same on every

@@ -1,9 +1,9 @@
 //! The fastest timing along a rounded path: `s(t)` from rest to rest within all limits.
 //!
 //! ```text
-//! path ──► grid of linear constraints on (s̈, ṡ²) ──► backward and forward pass ──► mean over a window ──► stretched until all holds
+//! path ──► grid of linear constraints on (s̈, ṡ²) ──► backward and forward pass ──► mean over a window ──► stretched until all limits are kept
 //!               ▲                                                                        │
-//!               └──────────────── limits lowered where the mean breaks one ◄─────────────┘
+//!               └──────────────── limits lowered where the mean violates one ◄───────────┘
 //! ```
 //!
 //! Without a jerk limit, the time optimum along a path is known up to the resolution of its grid (phase_plane.rs), but

@@ -1,7 +1,7 @@
 //! `sdg camera calibrate --from`: takes pictures of the board automatically; a page shows the view that is needed next.
 //!
 //! ```text
-//! camera ─ frame ─ find_board ─ PictureTaker: at rest, and new? ─ PNG in --taken ─ calibrate ─ what is missing
+//! camera ─ frame ─ find_board ─ PictureTaker: at rest, and a new view? ─ PNG in --taken ─ calibrate ─ missing views
 //!            └──────── corners, views, empty parts and text drawn on it ─ the page on 127.0.0.1
 //! ```
 

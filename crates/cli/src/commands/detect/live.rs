@@ -1,8 +1,8 @@
 //! `sdg detect --from`: parts in live pictures, one line per frame.
 //!
 //! ```text
-//! camera ─ frame ─┬─ LiveTracker: followed from frame to frame, searches beside ─┬─ line on standard output
-//!                 └─ --every-frame: each frame searched on its own ──────────────┴─ picture on 127.0.0.1 (--draw)
+//! camera ─ frame ─┬─ LiveTracker: tracked, and searched on a second thread ─┬─ line on standard output
+//!                 └─ --every-frame: each frame searched independently ──────┴─ picture on 127.0.0.1 (--draw)
 //! ```
 
 use std::io::Write;

@@ -112,7 +112,7 @@ pub fn run(args: &PlanArgs) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// All goal poses in all their turns.
+/// Each goal pose at all rotations about its z axis.
 fn goals(args: &PlanArgs) -> Vec<Isometry3<f64>> {
     let turn = |index: u32| {
         let angle_rad = std::f64::consts::TAU * f64::from(index) / f64::from(args.turns);

@@ -3,7 +3,7 @@
 //!
 //! ```text
 //! shipped photo and its camera ─ plan view ─ teach ┐
-//! three other cameras ┐                            ├─ PlanViewDetector ─ error in mm and degrees, and the error that it expects
+//! three other cameras ┐                            ├─ PlanViewDetector ─ error in mm and degrees, and the predicted error
 //! the axes' pictures  ├─ picture and its camera ───┘
 //! parts of other sizes┘
 //! ```
