@@ -161,9 +161,13 @@ fn page_figures(figures: &HeldBackFigures) -> Figures {
 
 fn step(event: &TeachingEvent) -> TeachingStep {
     match event {
-        TeachingEvent::OrientationStep { step, planned_steps, loss, .. } => {
-            TeachingStep::Step { of: "its turns", is_last: false, done: step + 1, planned: *planned_steps, loss: *loss }
-        }
+        TeachingEvent::OrientationStep { step, planned_steps, loss, .. } => TeachingStep::Step {
+            of: "the angles",
+            is_last: false,
+            done: step + 1,
+            planned: *planned_steps,
+            loss: *loss,
+        },
         TeachingEvent::Step { record, planned_steps, .. } => TeachingStep::Step {
             of: "the network",
             is_last: true,

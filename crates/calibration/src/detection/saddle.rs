@@ -20,16 +20,16 @@ pub(super) struct Saddle {
 /// Standard deviation of the smoothing before derivatives, in pixels: it removes noise, and corners of squares of six
 /// pixels stay separate.
 const SIGMA: f64 = 1.5;
-/// Minimum contrast between dark and light squares, of 255: a tenth of the contrast of a board in the dark.
+/// Minimum contrast between dark and light squares, in grey levels: a tenth of a board's contrast in the dark.
 const MIN_CONTRAST: f64 = 10.0;
-/// Largest ratio of the two curvatures, which excludes noisy edges. Squares seen at 70 degrees have 3.
+/// Largest ratio of the two curvatures, which excludes noisy edges. It is 3 for squares seen at 70 degrees.
 const MAX_CURVATURE_RATIO: f64 = 8.0;
 /// Distance at which brightness is compared with the opposite side, in pixels: larger than the smoothing, and within
 /// squares of six pixels.
 const RING_PX: f64 = 4.0;
 const RING_PLACES: usize = 24;
-/// Largest difference of brightness from the opposite side, relative to its variation otherwise. It is 0 where four
-/// squares meet, and 2 at the corner of a dark square on white, which is also a saddle point.
+/// Maximum of the squared differences of opposite points on the ring, relative to the squared variation that they have
+/// in common. 0 where four squares meet, and 2 at the corner of a dark square on white, which is also a saddle point.
 const MAX_ASYMMETRY: f64 = 0.5;
 /// Radius, in pixels, within which a saddle point must be the strongest.
 const RADIUS: usize = 2;

@@ -22,8 +22,8 @@ pub fn page(findings: &Findings, photos: &[RgbImage], command: &str) -> Report {
     let mut report = Report::new(format!("{taught} parts taught"))
         .kicker("Teaching")
         .lead(
-            "Each part was taught from its own photos, and each model was then run on every other part's photo. A part whose \
-             model accepts another's photo would be grasped instead of it.",
+            "Each part was taught from its own photos, and each model was then run on every other part's photo. If a model \
+             accepts the photo of another part, that part could be grasped by mistake.",
         )
         .key_figure(KeyFigure::new(taught.to_string(), "", format!("of {} parts have a model", findings.parts.len())))
         .key_figure(count(findings.look_alikes.len(), "pairs look alike"))
@@ -39,7 +39,7 @@ pub fn page(findings: &Findings, photos: &[RgbImage], command: &str) -> Report {
         }
         section
             .lead(
-                "Photograph the part in other light or in another place, on a plain background, and mark it as \
+                "Photograph the part under other light or in another place, on a plain background, and mark it as \
                    before.",
             )
             .table(table)

@@ -1,5 +1,5 @@
-//! Finds configurations that reach a goal: all branches of the arm at many angles of joint 7. Only the free ones are
-//! kept.
+//! Finds configurations that reach a goal: all branches of the arm at many angles of joint 7. Only the
+//! collision-free ones are kept.
 
 use nalgebra::Isometry3;
 
@@ -29,7 +29,7 @@ pub(super) struct GoalConfiguration {
     pub(super) pose_idx: usize,
 }
 
-/// The free configurations of all poses, the fastest to reach from `start` first.
+/// The collision-free configurations of all poses, the fastest to reach from `start` first.
 ///
 /// # Errors
 /// Poses are invalid or cannot be reached, or all their configurations are blocked.
@@ -63,7 +63,7 @@ pub(super) fn free_configurations(
     free_of(arm, checker, start, reaching)
 }
 
-/// The free ones among some configurations, the fastest to reach from `start` first.
+/// The collision-free ones of these configurations, the fastest to reach from `start` first.
 ///
 /// # Errors
 /// There are no configurations, or all are blocked.
