@@ -232,7 +232,7 @@ impl Perception {
     }
 
     /// The grasp points of the demonstrations that were taught from this picture, in its pixels. `find` receives the
-    /// picture as the model was taught it.
+    /// picture in the form used for teaching.
     ///
     /// # Errors
     /// The picture's size differs from that of the calibrated camera.

@@ -73,7 +73,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         all.extend(cases);
     }
     println!("all: {}", summary(&all, how));
-    if is_as_asked(&all, how) { Ok(()) } else { Err("not as asked for".into()) }
+    if is_as_asked(&all, how) { Ok(()) } else { Err("the criteria are not met".into()) }
 }
 
 /// The task in each case.
@@ -220,7 +220,7 @@ impl Found {
     fn why(&self) -> String {
         match &self.report.outcome {
             GraspOutcome::Held if self.is_held => "held".to_owned(),
-            GraspOutcome::Held => "held by the hand's word only".to_owned(),
+            GraspOutcome::Held => "held according to the hand alone".to_owned(),
             GraspOutcome::Failed { step, why } => format!("{step}: {why}"),
         }
     }
@@ -277,7 +277,7 @@ fn summary(cases: &[Found], how: How) -> String {
         false => String::new(),
     };
     format!(
-        "{} of {} measured, error {median_mm:.2} mm in the median, {bias_mm:+.2} mm in the mean, {num_within} within 2 mm, errors over their sigma \
+        "{} of {} measured, median error {median_mm:.2} mm, mean error {bias_mm:+.2} mm, {num_within} within 2 mm, errors over their sigma \
          {spread:.2}{held}",
         errors.len(),
         cases.len()

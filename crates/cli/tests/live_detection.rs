@@ -35,7 +35,7 @@ fn a_folder_is_played_and_its_part_followed() {
     let pictures = folder.path().join("pictures");
     fs::create_dir(&pictures).unwrap();
     fs::copy(shipped("pendulum", "image.png"), pictures.join("a.png")).unwrap();
-    // Three seconds, in which searches take as long as the machine's load requires.
+    // In these three seconds, searches take as long as the machine's load requires.
     let from = format!("dir:{}?loop&fps=25", pictures.display());
     let detected = sdg(&["detect", "--grasp-model", &model, "--from", &from, "--frames", "75", "--json"]);
     assert_eq!(detected.status.code(), Some(0), "{}", String::from_utf8_lossy(&detected.stderr));

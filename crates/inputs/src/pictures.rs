@@ -10,7 +10,7 @@ use sdg_files::{read, read_bounded};
 /// Maximum size of a picture's file.
 const MAX_IMAGE_BYTES: u64 = 256 << 20;
 
-/// Reads an upright picture of any format of [`decode_image_in`].
+/// Reads a picture of any format of [`decode_image_in`], rotated upright.
 pub fn read_image(path: &Path) -> Result<RgbImage> {
     read_image_in(path, PixelFrame::Upright)
 }

@@ -80,7 +80,7 @@ impl Piece {
         }
     }
 
-    /// Upper bound of the angle of each joint over the piece, from its largest rate.
+    /// Upper bound of the angle that each joint covers along the piece, from its largest rate.
     pub(crate) fn max_turns(&self) -> JointVector {
         self.direction.abs().sup(&(self.direction + self.change).abs()) * self.length
     }
@@ -97,12 +97,12 @@ impl RoundedPath {
     /// # Panics
     /// If the numbers do not match, a size is not positive, or corners overlap.
     pub fn new(waypoints: &[JointVector], corner_secs: &[f64]) -> Self {
-        assert!(waypoints.len() >= 2 && corner_secs.len() == waypoints.len() - 2, "each inner waypoint has a corner");
+        assert!(waypoints.len() >= 2 && corner_secs.len() == waypoints.len() - 2, "one corner for each inner waypoint");
         let mut pieces = Vec::with_capacity(2 * waypoints.len());
         let mut from = 0.0;
         for (index, pair) in waypoints.windows(2).enumerate() {
             let length = length_secs(&pair[0], &pair[1]);
-            assert!(length > 0.0, "waypoints {index} and the next are the same");
+            assert!(length > 0.0, "waypoint {index} equals the next one");
             let before = if index == 0 { 0.0 } else { corner_secs[index - 1] };
             let after = corner_secs.get(index).copied().unwrap_or(0.0);
             let straight = length - before - after;

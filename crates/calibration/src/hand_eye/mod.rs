@@ -46,7 +46,7 @@ pub struct HandEye {
     pub frame_from_board: Isometry3<f64>,
     /// Root of the expected squared distance of the camera from its true position, metres.
     pub sigma_m: f64,
-    /// Root of the expected squared angle, radians.
+    /// Root of the expected squared angular error, radians.
     pub sigma_rad: f64,
     /// Root of the mean squared distance of corners, with the given robot poses.
     pub rms_px: f64,

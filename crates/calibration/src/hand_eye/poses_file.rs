@@ -1,4 +1,4 @@
-//! Robot poses and the pictures taken there, as YAML, JSON or CSV.
+//! Robot poses with their pictures, as YAML, JSON or CSV.
 //!
 //! ```yaml
 //! poses:

@@ -35,7 +35,7 @@ pub fn run(args: &TeachArgs, folder: &Path) -> Result<Outcome> {
             Some(outcome) => outcome,
             None => {
                 let Some((model, outcome)) = teach_part(part, options, &|| interrupt.is_requested()) else {
-                    bail!("interrupted: the same command continues with {}", part.name);
+                    bail!("interrupted: run the same command again to continue with {}", part.name);
                 };
                 store.write(&part.name, model.as_deref(), &PartRecord { key, outcome: outcome.clone() })?;
                 outcome

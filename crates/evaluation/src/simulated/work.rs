@@ -101,7 +101,7 @@ impl Evaluation<'_> {
             self.store.write(&cell.file("look"), &record)?;
             let right = record.present.iter().filter(|p| p.verified.is_right()).count();
             let false_alarms = record.absent.iter().filter(|p| p.verified.is_accepted()).count();
-            summary.push(format!("{} right on {right}, {false_alarms} false alarms", cell.model));
+            summary.push(format!("{}: {right} correct, {false_alarms} false alarms", cell.model));
         }
         Ok(Some(if summary.is_empty() { NO_MODEL.to_owned() } else { summary.join("; ") }))
     }

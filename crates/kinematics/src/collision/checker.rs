@@ -2,7 +2,7 @@
 //!
 //! An edge is the straight motion in joint space between two configurations. It is checked by *conservative
 //! advancement*: at a configuration, each pair of bodies has a distance d and an upper bound v of its approach speed
-//! along the edge, from the joints' angles and the bodies' reach. Over the next d / v of the edge, the pair cannot
+//! along the edge, from the angles that the joints cover and the bodies' reach. Over the next d / v of the edge, the pair cannot
 //! touch. Steps are therefore long in free space and short near obstacles, and the edge is also proven free between two
 //! checked configurations. Lanes start at evenly distributed points of the edge, and each advances to the next lane's
 //! start. Curves are proven in the same way, with the largest rate of each joint along them.
@@ -102,15 +102,15 @@ impl<'a> Checker<'a> {
     }
 
     /// Like [`Checker::blocked_share`], for any curve, given by its configuration at a fraction of its length.
-    /// `max_turns` is the angle of each joint over the whole curve at its largest rate, rad.
+    /// `max_turns` bounds the angle that each joint covers along the curve: its largest rate times the length, rad.
     pub(crate) fn blocked_share_of_curve(
         &mut self,
         at: impl Fn(f64) -> JointVector,
         max_turns: &JointVector,
     ) -> Option<f64> {
         let weights = self.edge_weights(max_turns);
-        // Lane i starts at i of L - 1 parts of the length, and ends at the start of the next lane. The last lane is at
-        // the end.
+        // Lane i starts at the fraction i / (L - 1) of the length, and ends at the start of the next lane. The last lane
+        // is at the end.
         let start = |lane: usize| lane as f64 / (NUM_LANES - 1) as f64;
         let mut share: Lane = std::array::from_fn(start);
         let mut active: Lanes = Lanes::all();

@@ -212,7 +212,7 @@ impl CollisionModel {
     }
 }
 
-/// Speed of a point of a body along a direction per joint, m/rad.
+/// Derivative of a body point's position along a direction with respect to each joint, m/rad.
 fn moved_along(frames: &Frames, body: usize, point: &Point3<f64>, direction: &nalgebra::Vector3<f64>) -> JointVector {
     JointVector::from_fn(|joint_idx, _| {
         if joint_idx >= body.min(NUM_JOINTS) {

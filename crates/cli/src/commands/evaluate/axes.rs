@@ -66,7 +66,7 @@ pub fn run(args: &EvaluateArgs, names: &[String]) -> Result<Outcome> {
     }
     match (failures.first(), remaining) {
         (None, 0) => Ok(Outcome::Done),
-        (None, _) => bail!("interrupted with {remaining} units of work to do: the same command continues"),
+        (None, _) => bail!("interrupted with {remaining} units of work left: run the same command again to continue"),
         (Some(first), _) => bail!(
             "{} units of work failed, {remaining} are to do: the same command tries again; the first: {first}",
             failures.len()

@@ -36,7 +36,7 @@ pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
 
     let remaining = write_tables(args, &evaluation, &settings)?;
     if interrupted {
-        bail!("interrupted with {remaining} units of work to do: the same command continues");
+        bail!("interrupted with {remaining} units of work left: run the same command again to continue");
     }
     Ok(Outcome::Done)
 }

@@ -133,7 +133,7 @@ fn do_units(asked: &Asked, args: &EvaluateArgs) -> Result<Outcome> {
         let (told, how) = match done {
             Ok(Ended::Done(summary)) => (summary, "done"),
             Ok(Ended::Already(receipt)) => (format!("done already, by {}", receipt.by), "already"),
-            Ok(Ended::Interrupted) => bail!("{}: interrupted; the same command continues", unit.name),
+            Ok(Ended::Interrupted) => bail!("{}: interrupted; run the same command again to continue", unit.name),
             Err(error) => {
                 failures.push(error);
                 continue;
