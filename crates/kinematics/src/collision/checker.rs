@@ -2,10 +2,10 @@
 //!
 //! An edge is the straight motion in joint space between two configurations. It is checked by *conservative
 //! advancement*: at a configuration, each pair of bodies has a distance d and an upper bound v of its approach speed
-//! along the edge, from the angles that the joints cover and the bodies' reach. Over the next d / v of the edge, the pair cannot
-//! touch. Steps are therefore long in free space and short near obstacles, and the edge is also proven free between two
-//! checked configurations. Lanes start at evenly distributed points of the edge, and each advances to the next lane's
-//! start. Curves are proven in the same way, with the largest rate of each joint along them.
+//! along the edge, from the angles that the joints cover and the bodies' reach. Over the next d / v of the edge, the
+//! pair cannot touch. Steps are therefore long in free space and short near obstacles, and the edge is also proven free
+//! between two checked configurations. Lanes start at evenly distributed points of the edge, and each advances to the
+//! next lane's start. Curves are proven in the same way, with the largest rate of each joint along them.
 #![allow(clippy::needless_range_loop, reason = "one index for the lanes of several arrays")]
 
 use super::lanes::{Lane, NUM_LANES};
