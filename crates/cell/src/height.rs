@@ -6,7 +6,7 @@ use sdg_robot::height::{GivenHeight, HeightMeasurement};
 
 use crate::mounted_camera::MountedCamera;
 
-/// The settings for measuring the height of a model's part with a camera on the hand, for a model with known lengths.
+/// The settings for measuring a part's height; `None` unless the camera is on the hand and the model knows lengths.
 /// `told` is the given z in the base frame, in metres.
 pub fn height_measurement(
     model: &GraspModel,

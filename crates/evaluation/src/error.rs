@@ -17,7 +17,7 @@ pub enum EvaluationError {
     UnitOfOtherSettings { unit: String, difference: String },
     /// Labelled pictures have several labels, and none of them is the model's object.
     #[error(
-        "{}: expected instances of one label, or some labelled {object} as the model's object is, found {found}",
+        "{}: expected instances of one label, or some with the label {object} of the model's object, found {found}",
         folder.display()
     )]
     SeveralLabels { folder: PathBuf, object: String, found: String },

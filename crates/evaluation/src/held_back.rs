@@ -31,6 +31,7 @@ pub struct HeldBackSamples(Augmenter);
 
 impl HeldBackSamples {
     /// Creates samples from photos and a seed, with the part's size in this range, and with a limited picture size.
+    ///
     /// # Errors
     /// No samples can be made from the photos.
     pub fn new(demonstrations: &[Demonstration], sizes: &RangeInclusive<f64>, seed: u64) -> Result<Self> {

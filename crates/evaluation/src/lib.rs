@@ -7,7 +7,7 @@
 //! SplitSet ─ ReadySet ─ Measured                           sets to tune on, sets to report    split
 //! DemonstrationFolder ─ CrossCheck ─ Findings              many parts, for look-alikes        many_parts
 //! feature simulation:
-//! Rehearsal ─ attempts of a simulated arm, found as with a real one       rehearsal
+//! Rehearsal ─ attempts of a simulated arm, with the finder of a real one                       rehearsal
 //! Evaluation, AxesEvaluation, CamerasEvaluation ─ units ─ Store ─ Summary ─ tables, page       simulated
 //! ```
 //!

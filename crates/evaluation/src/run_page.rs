@@ -89,8 +89,8 @@ pub fn demo(page: &RunPage, taught: &TaughtHere) -> Result<Report> {
 fn lifted(page: &RunPage) -> String {
     match (page.rehearsed.successes(), page.rehearsed.attempts.len()) {
         (0, of) => format!("and lifted it in none of {of} attempts"),
-        (successes, of) if successes == of => format!("went to it and lifted it, {of} times"),
-        (successes, of) => format!("and went to it and lifted it in {successes} of {of} attempts"),
+        (successes, of) if successes == of => format!("and lifted it in {of} of {of} attempts"),
+        (successes, of) => format!("and lifted it in {successes} of {of} attempts"),
     }
 }
 

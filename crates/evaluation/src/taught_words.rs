@@ -45,7 +45,7 @@ pub fn training(taught: &Taught) -> String {
         Ending::Interrupted => ", interrupted",
     };
     let orientation = facts.orientation.map_or(String::new(), |cnn| {
-        format!("; its angles alone: {:.0} % within 10°, median {:.1}°", 100.0 * cnn.hit_rate, cnn.error_degrees)
+        format!("; angles alone: {:.0} % within 10°, median {:.1}°", 100.0 * cnn.hit_rate, cnn.error_degrees)
     });
     format!(" ({} steps{ending}{orientation})", facts.steps)
 }

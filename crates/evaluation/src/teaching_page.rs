@@ -170,7 +170,7 @@ pub fn demonstration(model: &GraspModel, demonstrations: &[Demonstration], seed:
                  blur, noise, objects in front. Scenes without a box lack the part, so that the model learns to reject."
             } else {
                 "Samples from which a network would be trained, all made from that photo: other backgrounds, light, \
-                 blur, noise, objects in front. Model S has no network; it searches for the photo's part itself."
+                 blur, noise, objects in front. Model S has no network; it searches directly for the part in the photo."
             },
         ))
 }

@@ -37,7 +37,7 @@ impl Findings {
                     Some("its model does not find it in its own photo".to_owned())
                 }
                 PartOutcome::Taught { found, parts, .. } if (*found as f64) < MIN_FOUND * *parts as f64 => {
-                    Some(format!("its model finds {found} of {parts} held-out samples"))
+                    Some(format!("its model finds it in {found} of {parts} held-out samples"))
                 }
                 PartOutcome::Taught { false_alarms, without_part, .. } if 2 * false_alarms > *without_part => {
                     Some(format!("its model finds it in {false_alarms} of {without_part} samples without it"))
@@ -103,7 +103,7 @@ mod tests {
             told,
             [
                 "b: not taught: no outline",
-                "c: its model finds 10 of 18 held-out samples",
+                "c: its model finds it in 10 of 18 held-out samples",
                 "d: its model finds it in 4 of 6 samples without it",
                 "e: its model does not find it in its own photo"
             ]

@@ -68,7 +68,7 @@ impl PartOutcome {
     pub fn in_words(&self) -> String {
         match self {
             Self::Taught { seconds, found, parts, .. } => {
-                format!("finds {found} of {parts} held-out samples ({seconds:.1} s)")
+                format!("finds the part in {found} of {parts} held-out samples ({seconds:.1} s)")
             }
             Self::Failed { why } => format!("failed: {why}"),
         }

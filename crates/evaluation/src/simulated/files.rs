@@ -40,7 +40,7 @@ impl Evaluation<'_> {
         let facts = [
             ("seed", settings.seed.to_string()),
             ("preset", settings.preset.clone()),
-            ("side by side", format!("{} units of work", self.jobs)),
+            ("in parallel", format!("{} units of work", self.jobs)),
             ("machine", machine()),
             ("version", format!("sdg {}", env!("CARGO_PKG_VERSION"))),
         ];

@@ -78,7 +78,7 @@ impl Teaching<'_> {
                 self.store.write_bytes(&cell.model_file(marks), &bytes)?;
                 let facts = taught.model.facts().clone();
                 let summary = facts.validation.map_or("nothing to train".to_owned(), |validation| {
-                    format!("finds {:.0} % of held-out samples", 100.0 * validation.hit_rate)
+                    format!("finds the part in {:.0} % of held-out samples", 100.0 * validation.hit_rate)
                 });
                 let losses = taught.history.as_ref().map_or_else(Vec::new, mean_losses);
                 (

@@ -23,10 +23,10 @@ pub fn tables(measured: &Measured, sides: &[Side]) -> String {
     let seeds: Vec<String> = measured.seeds.iter().map(u64::to_string).collect();
     let seeds = match seeds.as_slice() {
         [seed] => format!("seed {seed}"),
-        seeds => format!("the worst of seeds {}, each figure by itself", seeds.join(", ")),
+        seeds => format!("the worst of seeds {}, each figure separately", seeds.join(", ")),
     };
     let speed =
-        measured.pictures_per_second().map_or_else(String::new, |speed| format!("; {speed:.1} pictures a second"));
+        measured.pictures_per_second().map_or_else(String::new, |speed| format!("; {speed:.1} pictures per second"));
     let [sets, kinds, totals] =
         [of_sets(measured), of_kinds(measured, sides), of_sides(measured, sides)].map(|table| table.to_markdown());
     format!("model {}, {seeds}{speed}\n\n{sets}\n{kinds}\n{totals}", measured.model)

@@ -61,7 +61,7 @@ pub fn run(args: &EvaluateArgs, names: &[String]) -> Result<Outcome> {
         println!("{}", json_line(&line)?);
     } else {
         print!("{}{}", summary_lines(&summary), difference_lines(&comparisons));
-        println!("seconds of a worker: {}", summary.seconds);
+        println!("worker seconds: {}", summary.seconds);
         println!("tables: {}\nreport: {}", tables.display(), report.display());
     }
     match (failures.first(), remaining) {

@@ -30,8 +30,8 @@ impl AxesSummary {
         let facts = [
             ("seed", settings.seed.to_string()),
             ("preset", settings.preset.clone()),
-            ("seconds of a worker", self.seconds.to_string()),
-            ("side by side", format!("{jobs} units of work")),
+            ("worker seconds", self.seconds.to_string()),
+            ("in parallel", format!("{jobs} units of work")),
             ("machine", machine()),
             ("version", format!("sdg {}", env!("CARGO_PKG_VERSION"))),
         ];

@@ -140,7 +140,7 @@ fn thirds(group: &GroupSummary) -> (String, String, Table) {
                 difficulty increases: height relative to the usual one, tilt in degrees, covered as a fraction of the \
                 part, dark as a fraction of the usual light, blur in pixels; the parameters of the other axes are \
                 counts or ratios.";
-    ("found, by how much the axis changes".to_owned(), lead.to_owned(), table)
+    ("found, by difficulty along the axis".to_owned(), lead.to_owned(), table)
 }
 
 fn lowest_parts(group: &GroupSummary) -> (String, String, Table) {

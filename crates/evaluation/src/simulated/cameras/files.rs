@@ -21,8 +21,8 @@ impl CamerasSummary {
         let facts = [
             ("seed", settings.seed.to_string()),
             ("preset", settings.preset.clone()),
-            ("seconds of a worker on pictures", format!("{:.0}", self.seconds)),
-            ("side by side", format!("{jobs} units of work")),
+            ("worker seconds for pictures", format!("{:.0}", self.seconds)),
+            ("in parallel", format!("{jobs} units of work")),
             ("machine", machine()),
             ("version", format!("sdg {}", env!("CARGO_PKG_VERSION"))),
         ];

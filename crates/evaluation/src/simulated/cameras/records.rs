@@ -10,9 +10,9 @@ pub struct MetricAnswer {
     pub error_mm: Option<f64>,
     /// Angle error, in degrees, modulo the part's symmetry.
     pub error_deg: Option<f64>,
-    /// Standard deviation of each coordinate according to the detection, in millimetres.
+    /// Radius that contains the position with a probability of 68 % according to the detection, in millimetres.
     pub sigma_mm: f64,
-    /// Standard deviation of the angle according to the detection, in degrees.
+    /// Angle error that the detection does not exceed with a probability of 68 % by its own estimate, in degrees.
     pub sigma_deg: f64,
     /// The instance that the detection found: within 10 mm and 10°, and not found by a better detection.
     pub found: Option<usize>,

@@ -7,7 +7,7 @@ use super::titled::Titled;
 /// A notice that precedes the tables, if units of work remain.
 pub fn incomplete(remaining: usize) -> Option<String> {
     (remaining > 0)
-        .then(|| format!("Not complete: {remaining} units of work are still to do. The same command continues."))
+        .then(|| format!("Not complete: {remaining} units of work are left. Run the same command again to continue."))
 }
 
 /// Tables as a document in Markdown; `facts` and `command` are for reproducing the results.
