@@ -123,7 +123,7 @@ fn cameras_that_are_none_are_refused() {
         sdg(&[&["camera", "grab", "--out", out.to_str().unwrap(), "--from", address], further].concat())
     };
     assert_refused(&grab("/dev/video0", &[]), 2, &["expected an address of a camera", "/dev/video0"]);
-    assert_refused(&grab("https://camera/", &[]), 2, &["TLS"]);
+    assert_refused(&grab("https://camera/", &[]), 2, &["https is not supported"]);
     assert_refused(&grab("dir:/nowhere", &[]), 1, &["--from", "dir:/nowhere", "expected a folder"]);
     assert_refused(&grab("v4l:/dev/null", &[]), 1, &["v4l:/dev/null", "does not open"]);
     assert_refused(&grab("cmd:no-such-program", &[]), 1, &["cannot be started"]);

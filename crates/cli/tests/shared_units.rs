@@ -280,7 +280,7 @@ fn failures_are_recorded_and_told() {
     fs::write(unit.join("running.json"), running).unwrap();
     let lock = File::create(unit.join("lock")).unwrap();
     lock.lock().unwrap();
-    refused(&evaluate(&out, &["--collect"]), 1, &["look-rod_end: still at work on n7 (process 12, job 31)"]);
+    refused(&evaluate(&out, &["--collect"]), 1, &["look-rod_end: still running on n7 (process 12, job 31)"]);
     let watched = json(&sdg(&["evaluate", "--watch", &out, "--json"]));
     assert_eq!((&watched["running"][0]["unit"], &watched["running"][0]["by"]["host"]), (&LOOK.into(), &"n7".into()));
     // A second process for the same unit waits until it is free.
@@ -289,7 +289,10 @@ fn failures_are_recorded_and_told() {
     let mut waiting = command.spawn().unwrap();
     let mut told = String::new();
     BufReader::new(waiting.stderr.as_mut().unwrap()).read_line(&mut told).unwrap();
-    assert!(told.starts_with("look-rod_end: at work elsewhere, by n7 (process 12, job 31); waiting"), "{told}");
+    assert!(
+        told.starts_with("look-rod_end: running in another process, by n7 (process 12, job 31); waiting"),
+        "{told}"
+    );
     assert!(waiting.try_wait().unwrap().is_none());
     drop(lock);
     // Then it begins, and reports what is missing.

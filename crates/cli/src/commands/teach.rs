@@ -241,7 +241,7 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
         }
         if let Some(NegativeFacts { pictures, refused, log_odds }) = facts.negatives {
             println!(
-                "refuses {refused} of {pictures} pictures without the part; for them, every score is lowered by {:.1} log-odds",
+                "refuses {refused} of {pictures} pictures without the part; for this, every score is lowered by {:.1} log-odds",
                 -log_odds
             );
         }

@@ -68,7 +68,7 @@ pub fn run(args: &EvaluateArgs, names: &[String]) -> Result<Outcome> {
         (None, 0) => Ok(Outcome::Done),
         (None, _) => bail!("interrupted with {remaining} units of work left: run the same command again to continue"),
         (Some(first), _) => bail!(
-            "{} units of work failed, {remaining} are to do: the same command tries again; the first: {first}",
+            "{} units of work failed, {remaining} are left: run the same command again to retry; the first error: {first}",
             failures.len()
         ),
     }

@@ -170,7 +170,7 @@ fn collect(asked: &Asked, args: &EvaluateArgs) -> Result<Outcome> {
     sdg_files::prepare_folder(protocol::report_folder(args))?;
     let remaining = protocol::write_tables(args, &evaluation, &asked.settings)?;
     if remaining > 0 {
-        bail!("{}: {remaining} units have a receipt and no result", args.out.display());
+        bail!("{}: {remaining} units have a receipt but no result", args.out.display());
     }
     Ok(Outcome::Done)
 }
