@@ -7,14 +7,14 @@
 //! camera_matrix: {rows: 3, cols: 3, data: [612.3, 0, 318.7, 0, 609.8, 244.1, 0, 0, 1]}
 //! distortion_model: plumb_bob
 //! distortion_coefficients: {rows: 1, cols: 5, data: [-0.28, 0.11, 0.0013, -0.0007, -0.02]}
-//! table:                       # ours; ROS's readers pass over it
+//! table:                       # ours; ROS ignores it
 //!   frame: base                # or: table
 //!   height_m: 0.0              # the table's z in that frame
 //!   frame_from_camera:
 //!     translation_m: [0.5, 0.0, 0.58]
 //!     rotation_xyzw: [1.0, 0.0, 0.0, 0.0]
 //!   workspace_m: {x: [0.3, 0.7], y: [-0.3, 0.3]}   # may be left out
-//! hand_eye:                    # ours; where the camera is on the robot's hand
+//! hand_eye:                    # ours; the camera's pose on the robot's hand
 //!   flange_from_camera: {translation_m: [0.05, 0.0, 0.06], rotation_xyzw: [0.0, 0.0, 0.0, 1.0]}
 //! ```
 

@@ -114,7 +114,7 @@ pub enum CalibrationError {
     },
     /// The placement of the grid on the board is unknown.
     #[error(
-        "expected enough of the board to identify the visible squares, found {corners} corners and no place on the \
+        "expected enough of the board to identify the visible squares, found {corners} corners and no position on the \
          board that matches its dots: show more of it, or print it with `sdg camera board`; a checkerboard without \
          dots must be completely visible"
     )]
@@ -158,7 +158,7 @@ pub enum CalibrationError {
         hint: String,
     },
     /// No pose explains the corners.
-    #[error("expected corners that a pinhole camera can show of a flat board, found none that converge")]
+    #[error("expected corners of a flat board in a pinhole camera's picture, found corners that no pose explains")]
     NoPose,
     /// The camera is below the sheet, or near its horizon.
     #[error(

@@ -64,7 +64,7 @@ impl Folder {
         };
         let metadata = fs::metadata(path).map_err(|error| refused(error.to_string()))?;
         if metadata.is_dir() {
-            return Err(refused(format!("a folder, for which there is dir:{}", path.display())));
+            return Err(refused(format!("a folder; use dir:{}", path.display())));
         }
         Ok(Self::at(Place::File(path.to_owned()), playback))
     }
@@ -280,6 +280,6 @@ mod tests {
         assert!(
             refused(Folder::open(&files.path().join("no"), Playback::default(), "dir:x")).contains("expected a folder")
         );
-        assert!(refused(Folder::open_file(files.path(), Playback::default(), "file:x")).contains("there is dir:"));
+        assert!(refused(Folder::open_file(files.path(), Playback::default(), "file:x")).contains("a folder; use dir:"));
     }
 }

@@ -25,7 +25,7 @@ pub enum GeometryError {
         area: f64,
     },
     /// Run lengths that do not add up to the mask's size.
-    #[error("expected run lengths of {expected} pixels in all, found {found}")]
+    #[error("expected run lengths with a sum of {expected} pixels, found {found}")]
     RunLengthMismatch {
         expected: u64,
         /// The sum of the runs.

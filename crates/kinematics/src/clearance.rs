@@ -61,7 +61,7 @@ impl Trajectory {
                 Clearance { time_secs, ..arm.clearance(&q, table_height_m) }
             })
             .min_by(|a, b| a.lowest_m.total_cmp(&b.lowest_m))
-            .expect("there are at least two looks")
+            .expect("at least two times are checked")
     }
 }
 

@@ -137,7 +137,7 @@ impl Trajectory {
                 q[joint_idx] = found_rad;
                 if limits.margins(&q)[joint_idx] < -LIMIT_ROUNDING_RAD {
                     return Err(KinematicsError::JointOutOfRange {
-                        what: "the motion on its way",
+                        what: "a point of the motion",
                         violation: limits.violation_at(&q, joint_idx),
                     });
                 }

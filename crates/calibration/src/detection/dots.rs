@@ -135,8 +135,8 @@ fn place(grid: &Grid, dots: &Dots, sides: [u32; 2]) -> Option<Placed> {
     is_clear.then(|| turned.corners(grid, sides))
 }
 
-/// The placement of a board without dots, which must be completely visible. The colours of the squares tell it from the
-/// same board rotated by 180 degrees.
+/// The placement of a board without dots, which must be completely visible. The colours of the squares
+/// distinguish it from the same board rotated by 180 degrees.
 fn plain(grid: &Grid, board: &Board) -> Option<Placed> {
     let sides = [board.columns(), board.rows()];
     if grid.len() != board.num_corners() {

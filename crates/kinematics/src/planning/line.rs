@@ -56,8 +56,8 @@ pub fn checked_line(
     })
 }
 
-/// Fraction of the part that could be followed which is followed again for the check; at its end a joint reaches its
-/// limit.
+/// Fraction of the followed part of a path that is followed again for the check: at the end of that part, a joint
+/// reaches its limit.
 const FOLLOWED_AGAIN: f64 = 0.98;
 
 /// The first blocked point of a path, as a fraction of it, and the obstacle.
