@@ -113,7 +113,7 @@ fn found_at(page: &Page, place: [f64; 2]) {
             && document.getElementById('live-found').innerText.includes('Found the part')",
         place[0], place[1]
     );
-    // Text and drawing are of the same frame; a next frame might change both between two queries.
+    // Text and drawing are of the same frame; a new frame might change both between two queries.
     patiently(page, "the grasp where the part is, and the words", &drawn);
 }
 
